@@ -1,5 +1,5 @@
-//! The state follows what happens: 200 actions, one after the other, each of which needs one fact
-//! throughout and makes another one true, among so many facts.
+//! Time to progress the belief state through 200 sequential actions, for growing numbers of facts.
+//! Each action has one over-all condition and one effect.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ fn main() {
     divan::main();
 }
 
-/// How many actions start and end in one sample.
+/// Number of actions that start and end in one sample.
 const ACTIONS: usize = 200;
 
 #[divan::bench(args = [1_000, 10_000, 100_000])]

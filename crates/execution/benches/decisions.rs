@@ -1,8 +1,10 @@
-//! How long the decisions of executors take that go by orders of a plan's happenings: taking up the
-//! plan, the first decision (which looks for an order), then median, 99th percentile and worst of all
-//! others, and the whole run. Robots visit rooms, each robot one room after the other, all at the
-//! same time, and facts change by themselves now and then. What was done lasts to the end, so that
-//! much has to hold behind each happening.
+//! Decision times of the executors that execute orders of a plan's happenings. Printed are the
+//! times of adopting the plan and of the first decision (which searches for an order), then median,
+//! 99th percentile and maximum of all other decisions, and the time of the whole run.
+//!
+//! Robots visit rooms in parallel, each robot one room after the other, and facts change by
+//! themselves now and then. The effects of the actions are needed until the end, so each layer has
+//! many conditions.
 //!
 //! ```text
 //! cargo bench -p elbowroom-execution --bench decisions
@@ -39,7 +41,7 @@ const DOMAIN: &str = "(define (domain rooms) (:requirements :typing :durative-ac
     :effect (and (at start (not (at ?r ?a))) (at end (at ?r ?b)) (at end (visited ?r ?b)))))";
 
 fn main() {
-    // As the harness of tests does: only those whose name contains the words are run.
+    // As in the test harness, words are filters on the names.
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<_> = words.iter().filter(|word| !word.starts_with('-')).collect();
     println!(
@@ -97,7 +99,7 @@ fn milliseconds(time: Duration) -> String {
     format!("{:.3} ms", time.as_secs_f64() * 1000.0)
 }
 
-/// A world in which everything goes as planned.
+/// World in which everything happens as planned.
 struct World {
     running: BTreeMap<(Rational, StepId), Arc<Action>>,
     now: Rational,
@@ -115,7 +117,7 @@ impl World {
         }
     }
 
-    /// What each decision took.
+    /// Executes the plan. Returns the time of each decision.
     fn run(mut self, executor: &mut dyn Executor) -> Vec<Duration> {
         let mut times = Vec::new();
         loop {
@@ -172,7 +174,7 @@ impl World {
     }
 }
 
-/// A mission with so many moves.
+/// Creates a mission with `actions` moves.
 fn mission(robots: usize, actions: usize) -> Mission {
     let rooms = actions / robots;
     let (mut init, mut goal, mut plan) = (String::new(), String::new(), String::new());

@@ -1,5 +1,5 @@
-//! One event in a plan with 10,000 time points: taking note of it, moving the windows, deciding.
-//! The plan is that of [`robots`].
+//! Time of one event in a plan with 10,000 time points: processing the event, updating the windows,
+//! and deciding. The plan is that of [`robots`].
 
 mod robots;
 
@@ -11,7 +11,7 @@ fn main() {
     divan::main();
 }
 
-/// How many actions end in one sample.
+/// Number of actions that end in one sample.
 const EVENTS: usize = 200;
 
 #[divan::bench(args = [1_000, 10_000, 100_000])]
@@ -36,7 +36,7 @@ fn fixed(bencher: Bencher<'_, '_>, nodes: usize) {
     events(bencher, "fixed:60", nodes);
 }
 
-/// Nothing but orderings.
+/// The plan contains only orderings.
 #[divan::bench(args = [1_000, 10_000, 100_000])]
 fn esterel(bencher: Bencher<'_, '_>, nodes: usize) {
     events(bencher, "esterel", nodes);
@@ -51,7 +51,7 @@ fn events(bencher: Bencher<'_, '_>, executor: &str, nodes: usize) {
             for _ in 0..EVENTS {
                 events.next(executor.as_mut());
             }
-            // Given back, so that dropping them does not count.
+            // They are returned so that dropping them does not count.
             (executor, events)
         });
 }

@@ -1,5 +1,5 @@
-//! How long single events take: median, 99th percentile and worst of all events of a plan (the
-//! first 20,000 of long ones), for each executor with a network. The plan is that of [`robots`].
+//! Latency of single events: median, 99th percentile and maximum over all events of a plan (the
+//! first 20,000 of long plans), for each executor with a network. The plan is that of [`robots`].
 //!
 //! ```text
 //! cargo bench -p elbowroom-execution --bench latency
@@ -17,7 +17,7 @@ use robots::{Events, mission, ready};
 const MOST_EVENTS: usize = 20_000;
 
 fn main() {
-    // As the harness of tests does: only those whose name contains the words are run.
+    // As in the test harness, words are filters on the names.
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<_> = words.iter().filter(|word| !word.starts_with('-')).collect();
     println!("| executor | time points | adopting | median | p99 | worst |");

@@ -1,9 +1,9 @@
-//! Dispatching an STN plan: what all executors that go by a temporal network have in common.
+//! Dispatching of an STN plan: the common part of all executors that use a temporal network.
 //!
-//! A time point is *ready* when everything that must come before it has been observed; it is
-//! started as soon as its window opens (paper 1, Algorithm 2, lines 6 to 10). Time points that
-//! have happened are fixed in the network, and with a whole [`Horizon`] that moves the windows of
-//! all others, deadlines included. Work per event is in proportion to the windows that move.
+//! A time point is *ready* when everything that must come before it has been observed. It is
+//! started as soon as its window opens (paper 1, Algorithm 2, lines 6 to 10). Executed time points
+//! are fixed in the network. With a whole [`Horizon`], this updates the windows of all others,
+//! including deadlines. The work per event is proportional to the number of windows that change.
 
 mod apart;
 mod explain;
@@ -47,10 +47,10 @@ pub(crate) enum Sight {
     OneHop,
 }
 
-/// The plan's constraints from which the parts of its network were made, by position.
+/// For each part of the network, the position of the plan's constraint that it comes from.
 #[derive(Clone, Debug)]
 struct Sources {
-    /// For each constraint of the network; `None` if it comes from none.
+    /// For each constraint of the network; `None` if it comes from no constraint of the plan.
     requirements: Vec<Option<usize>>,
     /// For each contingent link.
     links: Vec<usize>,
@@ -65,7 +65,8 @@ impl Sources {
     }
 }
 
-/// No executor could keep to the plan's network.
+/// Returns the reason for rejecting a plan whose network is not controllable: the conflicting
+/// constraints.
 fn contradiction(mission: &Mission, sources: &Sources, behind: &[NetworkLimit]) -> Reason {
     let mut reason = Reason::new(Cause::Late).about(About::NoTimes);
     let indices = behind.iter().filter_map(|behind| sources.of(*behind));
@@ -76,12 +77,12 @@ fn contradiction(mission: &Mission, sources: &Sources, behind: &[NetworkLimit]) 
     reason
 }
 
-/// A plan being dispatched.
+/// State of the dispatch of a plan.
 #[derive(Clone, Debug)]
 pub(crate) struct Dispatch {
     task: Arc<Task>,
     plan: StnPlan,
-    /// The actions, with nominal values for what is left open.
+    /// The actions, with nominal values for the open parameters.
     actions: Vec<Arc<Action>>,
     nominal: Schedule,
     /// The time on the world's clock when the plan's clock reads 0.
@@ -89,33 +90,34 @@ pub(crate) struct Dispatch {
     epsilon: Rational,
     horizon: Horizon,
     sources: Sources,
-    /// For each instance its start and end; twice the same if it is instantaneous.
+    /// Start and end node of each instance; the same node twice if it is instantaneous.
     ends: Vec<[NodeId; 2]>,
-    /// For each instance, the bounds on its duration.
+    /// Bounds on the duration of each instance.
     durations: Vec<Bounds>,
     progress: Progress,
     /// See [`watch::numbers_of_durations`].
     numbers_of_durations: BTreeMap<InstanceId, Vec<DurationConstraint>>,
-    /// When instances that have not been seen to start were told to, on the plan's clock.
+    /// The times, on the plan's clock, at which instances were commanded whose start has not been
+    /// observed.
     told: BTreeMap<InstanceId, Rational>,
-    /// Timed initials that have not happened, the last one first, with their times.
+    /// Coming timed initials with their times, the last one first.
     timed: Vec<(Rational, NodeId)>,
-    /// Instances that were under way before the plan began: of these it knows the rest.
+    /// Instances that were running before the plan began. The plan contains only their remainder.
     resumed: BTreeSet<InstanceId>,
-    /// Starts that have failed and are to be tried again.
+    /// Failed starts that are to be retried.
     retries: BTreeMap<NodeId, Retry>,
-    /// What has happened outside the network's bounds since it was last known to work.
+    /// Violations of the network's bounds since the network was last known to be executable.
     strain: Strain,
     /// The happenings that starts are separated from; `None` if the network orders all interfering happenings.
     separation: Option<Separation>,
 }
 
 impl Dispatch {
-    /// Takes up a plan. `bounds` says what a constraint of the plan is taken for; all windows are
-    /// taken for the executor's to choose from.
+    /// Creates the dispatch of a plan. `bounds` returns the bounds of each constraint. The executor
+    /// is assumed to choose all times.
     ///
     /// # Errors
-    /// When no times satisfy these.
+    /// If no times satisfy the bounds.
     pub(crate) fn new(
         mission: &Mission,
         sight: Sight,
@@ -147,10 +149,11 @@ impl Dispatch {
         Ok(Self::with_horizon(mission, horizon, sources, bounds))
     }
 
-    /// Takes up a plan in which the world decides on what `reading` says is contingent.
+    /// Creates the dispatch of a plan whose contingent durations (according to `reading`) are
+    /// decided by the world.
     ///
     /// # Errors
-    /// When no executor could be sure to keep to it: the constraints that stand against each other.
+    /// If the network is not dynamically controllable: the conflicting constraints.
     pub(crate) fn controlled(
         mission: &Mission,
         reading: &dyn Fn(&Constraint) -> Reading,
@@ -174,12 +177,11 @@ impl Dispatch {
         Ok(Self::with_horizon(mission, horizon, sources, &bounds))
     }
 
-    /// Goes by other readings of the constraints from now on; what has happened stays, and nothing
-    /// else happens before now.
+    /// Replaces the network by one with other readings of the constraints. Executed time points
+    /// keep their times; the others cannot happen before `now`.
     ///
     /// # Errors
-    /// When no executor could be sure to keep to it: the plan's constraints that stand against each
-    /// other, in words.
+    /// If the new network is not dynamically controllable: the conflicting constraints of the plan.
     pub(crate) fn rebound(
         &mut self,
         now: &Rational,
@@ -228,20 +230,22 @@ impl Dispatch {
         Ok(())
     }
 
-    /// The network of what is left: what has happened stays, and nothing else happens before now.
+    /// Returns the network of the remaining plan. Executed time points keep their times; the others
+    /// cannot happen before `now`.
     fn rest(
         &self,
         now: &Rational,
         reading: &dyn Fn(&Constraint) -> Reading,
     ) -> Result<PlanNetwork, Impossible> {
         let has_happened = |node: NodeId| self.happened(node).is_some();
-        // When something ends that is under way is not the executor's to decide.
+        // The executor does not decide when a running action ends, so ends have no lower bound at
+        // `now`.
         let waits = |what: Node| !matches!(what, Node::End(_));
         let plan = self.plan.remainder(now, |node| self.happened(node), waits);
         plan.uncertain_network(&|constraint| {
             if constraint.from == NodeId::ZERO && constraint.reason == elbowroom_plan::Reason::Given
             {
-                // Of these some are the plan's own, which say what they say.
+                // These include constraints of the plan itself; their bounds are kept as they are.
                 let (lower, upper) = given(constraint);
                 return Reading::Requirement { lower, upper };
             }
@@ -255,9 +259,9 @@ impl Dispatch {
         })
     }
 
-    /// The latest time at which a running action can end so that there are times for all the rest, on the world's clock.
-    /// Each contingent link takes any time within its reading. `None` if there is no limit, or if there are no such
-    /// times. Takes time in proportion to the plan.
+    /// Returns the latest end of a running action with which the remaining plan has a schedule, on
+    /// the world's clock. Contingent links may take any time within their reading. `None` if there
+    /// is no limit, or no schedule. Takes time in proportion to the plan.
     pub(crate) fn latest_end(
         &self,
         id: InstanceId,
@@ -267,7 +271,7 @@ impl Dispatch {
         self.latest_end_in(&self.possible_times(now, reading)?, id)
     }
 
-    /// The same in a network that [`Dispatch::possible_times`] returned.
+    /// Returns the same for a network from [`Dispatch::possible_times`].
     pub(crate) fn latest_end_in(
         &self,
         network: &ConsistentNetwork,
@@ -279,8 +283,8 @@ impl Dispatch {
         Some(self.world(&latest))
     }
 
-    /// The possible times of the rest of the plan, where each contingent link takes any time within its reading; `None`
-    /// if there are none.
+    /// Returns the schedules of the remaining plan as a consistent network; `None` if there are
+    /// none. Contingent links may take any time within their reading.
     pub(crate) fn possible_times(
         &self,
         now: &Rational,
@@ -344,10 +348,10 @@ impl Dispatch {
         dispatch
     }
 
-    /// Time 0 has happened, and so have the starts of what is running.
+    /// Marks time 0 and the starts of the running actions as executed.
     fn begin(&mut self, running: &BTreeMap<StepId, crate::event::Ticket>) {
         if let Horizon::Dispatchable(_) = self.horizon {
-            // To the others the origin has always happened.
+            // In other horizons, the origin is always executed.
             let _ = self
                 .horizon
                 .fix(network_node(NodeId::ZERO), &Rational::ZERO);
@@ -357,7 +361,7 @@ impl Dispatch {
         for step in running.keys() {
             let id = step.instance();
             let start = self.ends[id.index()][0];
-            // The rest of a running action begins with the plan itself.
+            // The plan contains the remainder of a running action, which begins with the plan.
             let _ = self.horizon.fix(network_node(start), &Rational::ZERO);
             self.progress.happen(&self.plan, start, &Rational::ZERO);
             self.progress.ready.remove(&start);
@@ -365,7 +369,7 @@ impl Dispatch {
         }
     }
 
-    /// It is `now`, by the plan's clock: timed initials have happened by then, as the problem says.
+    /// Executes the timed initials up to `now`, on the plan's clock.
     fn pass_time(&mut self, now: &Rational) {
         while let Some((time, node)) = self.timed.pop_if(|(time, _)| *time <= *now) {
             if let Horizon::Dispatchable(_) = self.horizon {
@@ -374,28 +378,28 @@ impl Dispatch {
         }
     }
 
-    /// The plan.
+    /// Returns the plan.
     pub(crate) fn plan(&self) -> &StnPlan {
         &self.plan
     }
 
-    /// The action of an instance.
+    /// Returns the action of an instance.
     pub(crate) fn action(&self, id: InstanceId) -> &Arc<Action> {
         &self.actions[id.index()]
     }
 
-    /// The planned duration of an instance.
+    /// Returns the planned duration of an instance.
     pub(crate) fn nominal_duration(&self, id: InstanceId) -> Rational {
         let [start, end] = self.ends[id.index()];
         &self.nominal[end] - &self.nominal[start]
     }
 
-    /// Start and end of an instance.
+    /// Returns the start and the end node of an instance.
     pub(crate) fn nodes_of(&self, id: InstanceId) -> [NodeId; 2] {
         self.ends[id.index()]
     }
 
-    /// The ground of the plan's own bounds on an instance's duration.
+    /// Returns the name of the plan's own bounds on an instance's duration, for reasons.
     fn duration_of(&self, id: InstanceId) -> About {
         if self.resumed.contains(&id) {
             About::RestOfDuration
@@ -404,39 +408,39 @@ impl Dispatch {
         }
     }
 
-    /// The time at which a node happened, on the plan's clock.
+    /// Returns the time at which a node was executed, on the plan's clock.
     pub(crate) fn happened(&self, node: NodeId) -> Option<&Rational> {
         self.progress.happened[node.index()].as_ref()
     }
 
-    /// The instances that have started, or were told to, and have not ended.
+    /// Instances that have started, or were commanded to, and have not ended.
     pub(crate) fn running(&self) -> &BTreeSet<InstanceId> {
         &self.progress.running
     }
 
-    /// The time at which a node happens if nothing deviates, on the plan's clock.
+    /// Returns the time at which a node happens if nothing deviates, on the plan's clock.
     pub(crate) fn nominal_time(&self, node: NodeId) -> &Rational {
         &self.nominal[node]
     }
 
-    /// The window of a node, by the world's clock.
+    /// Returns the window of a node, on the world's clock.
     pub(crate) fn window_of(&self, node: NodeId) -> Bounds {
         let (earliest, latest) = self.horizon.window(network_node(node));
         let world = |time: Rational| self.world(&time);
         (earliest.map(world), latest.map(world))
     }
 
-    /// The time by the plan's clock.
+    /// Converts a time from the world's clock to the plan's clock.
     pub(crate) fn local(&self, time: &Rational) -> Rational {
         time - &self.origin
     }
 
-    /// The time by the world's clock.
+    /// Converts a time from the plan's clock to the world's clock.
     pub(crate) fn world(&self, time: &Rational) -> Rational {
         time + &self.origin
     }
 
-    /// The window of a step's start or end, by the world's clock.
+    /// Returns the window of a step's start or end, on the world's clock.
     pub(crate) fn planned(&self, step: StepId, is_end: bool) -> Option<Planned> {
         let node = self.ends.get(step.instance().index())?[usize::from(is_end)];
         let (earliest, latest) = self.window_of(node);
@@ -444,7 +448,7 @@ impl Dispatch {
     }
 }
 
-/// For each instance, the bounds on its duration.
+/// Returns the bounds on the duration of each instance.
 fn durations(plan: &StnPlan, bounds: &dyn Fn(&Constraint) -> Bounds) -> Vec<Bounds> {
     let mut durations = vec![(None, None); plan.instances.len()];
     for constraint in &plan.constraints {
@@ -464,7 +468,7 @@ fn bounds_of(reading: Reading) -> Bounds {
     }
 }
 
-/// The intersection of both.
+/// Returns the intersection of both.
 fn both(one: Bounds, other: Bounds) -> Bounds {
     let lower = one.0.into_iter().chain(other.0).max();
     (lower, one.1.into_iter().chain(other.1).min())
@@ -483,7 +487,8 @@ fn ends_of(plan: &StnPlan) -> Vec<[NodeId; 2]> {
     ends
 }
 
-/// The plan's network, and where each of its constraints comes from.
+/// Returns the network of a plan and, for each of its constraints, the position of the plan's
+/// constraint that it comes from.
 fn network(
     plan: &StnPlan,
     bounds: &dyn Fn(&Constraint) -> Bounds,
@@ -514,7 +519,7 @@ fn network(
     (network, sources)
 }
 
-/// The bounds of a constraint without parameters.
+/// Returns the bounds of a constraint without parameters.
 pub(crate) fn given(constraint: &Constraint) -> Bounds {
     let value = |bound: &Bound| match bound {
         Bound::Finite(value) => Some(value.clone()),
@@ -523,7 +528,7 @@ pub(crate) fn given(constraint: &Constraint) -> Bounds {
     (value(&constraint.lower), value(&constraint.upper))
 }
 
-/// Whether an action takes no time.
+/// Returns `true` if the action is instantaneous.
 pub(crate) fn is_instantaneous(action: &Action) -> bool {
     matches!(action.body, Body::Instantaneous(_))
 }

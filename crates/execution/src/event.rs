@@ -1,4 +1,4 @@
-//! What passes between an executor's side and the world: commands and observations.
+//! Commands to the world, and observations from it.
 
 use std::fmt;
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::sync::Arc;
 use elbowroom_model::ground::{Action, FactId, FluentId};
 use elbowroom_num::Rational;
 
-/// One start of one action, numbered from 0 within a run.
+/// Identifier of one start of one action, numbered from 0 within a run.
 ///
-/// Numbers are never used again, so that a late report of an earlier plan cannot be taken for one
-/// of the present plan.
+/// Numbers are never reused, so a late report on an earlier plan cannot be mistaken for one on the
+/// present plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Ticket(pub u64);
 
@@ -24,37 +24,37 @@ impl fmt::Display for Ticket {
 pub enum Command {
     /// Start an action now.
     Start {
-        /// By which the world's reports refer to it.
+        /// The identifier for reports of the world.
         ticket: Ticket,
         /// The action.
         action: Arc<Action>,
         /// The planned duration; `None` for an instantaneous action.
         duration: Option<Rational>,
     },
-    /// Stop an action. What it did at its start stays done; its end does not happen.
+    /// Cancel an action. Its start effects remain; its end effects do not happen.
     Cancel {
-        /// Which start.
+        /// The ticket of its start.
         ticket: Ticket,
     },
 }
 
-/// Something the world reports.
+/// A report of the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observation {
-    /// The time at which it happened, by the world's clock. It may be reported later.
+    /// The time of the event, on the world's clock. The report may arrive later.
     pub time: Rational,
     /// The event.
     pub event: Event,
 }
 
-/// An observation.
+/// An event that the world reports.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// An action has started.
     Started {
         /// The ticket of its start.
         ticket: Ticket,
-        /// By how much its start really changed fluents, where that was measured.
+        /// Measured changes of fluents by its start.
         measured: Vec<Measured>,
     },
     /// An action has ended.
@@ -63,39 +63,39 @@ pub enum Event {
         ticket: Ticket,
         /// The outcome.
         ending: Ending,
-        /// By how much its end really changed fluents, where that was measured.
+        /// Measured changes of fluents by its end.
         measured: Vec<Measured>,
     },
-    /// A running action reports the part of it that is done. If that is more than before, its time-out counts from then on.
+    /// A running action reports its completion. If it has grown, the time-out counts from then on.
     Feedback {
         /// The ticket of its start.
         ticket: Ticket,
-        /// The part that is done, from 0 to 1, if that is known.
+        /// The completed part, from 0 to 1, if it is known.
         completion: Option<Rational>,
-        /// What there is to say about it; may be empty.
+        /// A note from the world as text; may be empty.
         note: String,
     },
-    /// A fact is seen to be true or false.
+    /// The truth of a fact was observed.
     Fact {
         /// The fact.
         fact: FactId,
-        /// Whether it is true.
+        /// `true` if the fact is true.
         truth: bool,
     },
-    /// A fluent is seen to have a value.
+    /// The value of a fluent was observed.
     Value {
         /// The fluent.
         fluent: FluentId,
         /// Its value.
         value: Rational,
     },
-    /// People, or other programs, ask something of the run ([`Request`]).
+    /// A request to the run from people or other programs ([`Request`]).
     Asked(Request),
-    /// The plan that was begun beside the run is there, or it is certain that there will be none.
+    /// The plan that is made in the background is finished, or certain to fail.
     PlanMade,
-    /// The plan that was being made ready beside the run is ready, or it is certain that it cannot be.
+    /// The plan that is prepared in the background is ready, or certain to fail.
     PlanReady,
-    /// The world has said something that cannot be understood.
+    /// The world has sent a message that cannot be read.
     Unintelligible {
         /// The message, or its beginning.
         said: String,
@@ -104,42 +104,42 @@ pub enum Event {
     },
 }
 
-/// What is asked of a run that goes on when its goal is reached
-/// ([`Run::lasting`](crate::run::Run::lasting)); to others nothing of it means anything.
+/// Request from an operator to an executive ([`Run::lasting`](crate::run::Run::lasting)).
+/// [Attended](crate::run::Run::attended) runs do not accept goals; other runs ignore all requests.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// To reach this goal, too, or in place of that of the same name.
+    /// Add a goal. It replaces an open goal of the same name.
     Pursue {
-        /// By which it is named from then on.
+        /// The name of the goal.
         name: String,
-        /// The goal, as the domain's language writes it.
+        /// The goal, in the language of the domain.
         goal: String,
-        /// Its value and its times.
+        /// Its value and its deadline.
         terms: GoalTerms,
     },
-    /// To reach the goal of that name no more.
+    /// Abandon the goal of this name.
     Abandon {
         /// Its name.
         name: String,
     },
-    /// To cancel a running action. What its end means for the plan is found out when the world reports it.
+    /// Cancel a running action. The plan is checked when the world reports the end of the action.
     CancelAction {
         /// The ticket of its start.
         ticket: Ticket,
     },
-    /// To start nothing more; what is under way goes on.
+    /// Stop dispatching; running actions continue.
     Pause,
-    /// To go on after a pause.
+    /// Resume after a pause.
     Resume,
 }
 
-/// Value and times of a goal.
+/// Value and deadline of a goal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GoalTerms {
     /// A positive number: if not all goals can be reached together, those with the greatest sum of values are pursued.
     pub value: Rational,
-    /// The time, on the run's clock, at which the goal has failed if it has not been achieved; `None` for no limit. Plans
-    /// achieve it by then.
+    /// The time, on the run's clock, at which the goal fails unless it was achieved; `None` for no
+    /// limit. Plans achieve it by then.
     pub deadline: Option<Rational>,
 }
 
@@ -156,9 +156,9 @@ impl Default for GoalTerms {
 /// The outcome of an action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// As the domain says.
+    /// It ended as the domain describes.
     Succeeded,
-    /// Its end effects did not happen.
+    /// It failed; its end effects did not happen.
     Failed {
         /// The reason as text; may be empty.
         why: String,
@@ -167,8 +167,8 @@ pub enum Ending {
     Cancelled,
 }
 
-/// The amount by which an action's effect changed a fluent: what stands behind the operator in
-/// `(increase fluent amount)`, `(decrease fluent amount)`, `(assign fluent amount)`.
+/// The amount of an effect on a fluent: the value of the second argument in `(increase …)`,
+/// `(decrease …)` or `(assign …)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// The fluent.
@@ -178,7 +178,7 @@ pub struct Measured {
 }
 
 impl Ending {
-    /// One word for it.
+    /// Returns the name used in traces.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Succeeded => "succeeded",

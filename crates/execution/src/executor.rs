@@ -1,4 +1,4 @@
-//! The port through which a run asks what to do next.
+//! Port: decision making during a run.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,26 +16,24 @@ use crate::reason::Reason;
 /// The form of a plan that an executor requires, from the least to the most preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
-    /// Which orderings facts need. Nothing is left open, and where numbers matter, nothing is
-    /// guaranteed: what `ROSPlan`'s dispatcher has.
+    /// The orderings that facts require. There are no open parameters, and numeric conditions are
+    /// not guaranteed. This is the information of `ROSPlan`'s dispatcher.
     Orderings,
-    /// The same, and the partial order of the plan's happenings, whose layers can be executed in
-    /// more than one order.
+    /// The orderings, and the partial order of the plan's happenings, whose layers can be executed
+    /// in more than one order.
     PartialOrder,
-    /// The orderings, with as many differences of times fixed as it takes for every schedule to
-    /// work.
+    /// The orderings, with enough fixed differences of times that every schedule works.
     Network,
-    /// The same, with quantities left open, and for which values the plan is guaranteed to work if
-    /// that can be found out.
+    /// The network with open parameters, and the envelope of their values if it can be computed.
     OpenNetwork,
-    /// The same; without knowing for which values the plan is guaranteed to work it is of no use.
+    /// The network with open parameters and their envelope, which is required.
     Envelope,
 }
 
-/// An action of the present plan, by a number that the executor chooses.
+/// Identifier of an action of the present plan, chosen by the executor.
 ///
-/// What is running already when a plan is taken up ([`Mission::running`]) has the number of its
-/// instance in [`Mission::plan`]. Executors that go by that plan number all steps so.
+/// An action that is running when a plan is adopted ([`Mission::running`]) has the number of its
+/// instance in [`Mission::plan`]. Executors that execute that plan number all steps this way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StepId(pub u32);
 
@@ -46,70 +44,75 @@ impl From<InstanceId> for StepId {
 }
 
 impl StepId {
-    /// The instance, for executors that number steps by the instances of their plan.
+    /// Returns the instance, for executors that number steps by the instances of their plan.
     pub fn instance(self) -> InstanceId {
         InstanceId(self.0)
     }
 }
 
-/// Chooses what to do next. No clock, no input or output, no randomness: the same history leads to
-/// the same decisions.
+/// Makes the decisions of a run. Implementations use no clock, no input or output and no
+/// randomness: the same history leads to the same decisions.
 pub trait Executor: Send {
-    /// The form of a plan that it requires.
+    /// Returns the form of a plan that it requires.
     fn need(&self) -> Need;
 
-    /// Takes up a plan, and forgets the one before.
+    /// Adopts a plan, and forgets the previous one.
     ///
     /// # Errors
-    /// When the plan cannot be executed (any more): why.
+    /// The reason for which the plan cannot be executed (any more).
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>>;
 
-    /// Says what to do. It is asked again until it says [`Decision::Wait`]; what is new is told
-    /// only once.
+    /// Returns the next decision. The run calls this again until the decision is
+    /// [`Decision::Wait`]. Each news item is passed only once.
     fn decide(&mut self, moment: &Moment<'_>) -> Decided;
 
-    /// Returns whether the plan for which it last requested another one ([`Decision::Replan`]) has a fair chance to work,
-    /// so that it is better to [carry on](Executor::carry_on) than to cancel overdue actions.
+    /// Returns `true` if the plan that it last abandoned ([`Decision::Replan`]) has a fair chance
+    /// to work, so that it is better to [carry on](Executor::carry_on) than to cancel overdue
+    /// actions.
     fn may_carry_on(&self) -> bool {
         false
     }
 
-    /// Continues with that plan, without any guarantee, because no other one was found. Returns whether it does.
+    /// Continues with that plan, without any guarantee, because no other one was found. Returns
+    /// `false` if it does not.
     fn carry_on(&mut self, _now: &Rational) -> bool {
         false
     }
 
-    /// Returns whether a better plan is to be searched for while the present one is executed. Asked before each wait;
-    /// the answer is `true` once for each loss of guarantee, and after each end without any guarantee.
+    /// Returns `true` if a better plan is to be searched for while the present one is executed.
+    /// Called before each wait. The answer is `true` once for each loss of guarantee, and after
+    /// each end without any guarantee.
     fn seeks_better_plan(&mut self, _now: &Rational) -> bool {
         false
     }
 
-    /// Returns whether this plan is better than the rest of the present one.
+    /// Returns `true` if this plan is better than the rest of the present one.
     fn prefers(&self, _mission: &Mission, _now: &Rational) -> bool {
         false
     }
 
-    /// The window of a time point of a step at present, for the record; in the world's time.
+    /// Returns the present window of a step's start or end for the record, on the world's clock.
     fn window(&self, _step: StepId, _is_end: bool) -> Option<Planned> {
         None
     }
 
-    /// The last moment, in the world's time, at which a step under way can end so that no new plan is needed, if nothing
-    /// else deviates and as far as that can be told. `None` if nothing is known but its window.
+    /// Returns the latest end of a running step with which no new plan is needed if nothing else
+    /// deviates, on the world's clock, as far as it can be computed. `None` if only the step's
+    /// window is known.
     fn bears_until(&self, _step: StepId, _now: &Rational) -> Option<Rational> {
         None
     }
 
-    /// One more of it, as it stands, which decides as this one would: to try out what comes of
-    /// going on. `None` if it cannot be had.
+    /// Returns a copy of the executor in its present state, which makes the same decisions.
+    /// Rehearsals use it to simulate the rest of the run. `None` if the executor cannot be copied.
     fn fork(&self) -> Option<Box<dyn Executor>> {
         None
     }
 }
 
-/// Whether a run can be on a clock: not in the browser's module, which is the smaller for it. There, nobody plans beside
-/// a run, and the room of what is under way is not watched.
+/// `true` if runs may use a real clock. In the module for browsers it is `false`, which
+/// keeps the module small: plans are not made in the background there, and the slack of running
+/// actions is not monitored.
 pub(crate) const CAN_HAVE_A_CLOCK: bool = !cfg!(target_family = "wasm");
 
 /// The time window of a happening.
@@ -121,38 +124,38 @@ pub struct Planned {
     pub latest: Option<Rational>,
 }
 
-/// A plan made ready to be executed.
+/// A plan prepared for execution.
 #[derive(Clone, Debug)]
 pub struct Mission {
-    /// The rest of the task, with a clock of its own.
+    /// The remaining task, with its own clock.
     pub task: Arc<Task>,
     /// The time on the world's clock when the task's clock reads 0.
     pub origin: Rational,
     /// The present time on the world's clock; the plan cannot begin earlier.
     pub now: Rational,
-    /// The plan as the planner made it, on the task's clock.
+    /// The planner's plan, on the task's clock.
     pub time_triggered: TimeTriggeredPlan,
-    /// The plan with room, and with quantities left open.
+    /// The deordered plan, with open parameters.
     pub plan: ParametrizedPlan,
     /// For each step of `time_triggered`, its instance in `plan`.
     pub instances: Vec<InstanceId>,
     /// The time of each event if nothing deviates, on the task's clock.
     pub nominal: Schedule,
-    /// In which values of the open quantities the plan is guaranteed to work.
+    /// The values of the open parameters for which the plan is guaranteed to work.
     pub envelope: Option<DecoupledEnvelope>,
-    /// Forms of the plan's network that executors have asked for before.
+    /// Cache of the dispatchable forms of the plan's networks.
     pub forms: Forms,
-    /// The partial order of the plan's happenings, for those that need it
+    /// The partial order of the plan's happenings, for executors that need it
     /// ([`Need::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
-    /// The actions under way, which go on in the plan: see [`StepId`].
+    /// The running actions, which continue in the plan: see [`StepId`].
     pub running: BTreeMap<StepId, Ticket>,
-    /// Other steps of the plan that have begun since the time from which it is, before it is taken up.
-    /// That they have, and what has ended, is told as news.
+    /// Other steps of the plan that have begun between the plan's start time and its adoption.
+    /// Their starts and ends are reported to the executor as news.
     pub begun: BTreeMap<StepId, Ticket>,
 }
 
-/// A moment at which to decide.
+/// Input of a decision.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
     /// The present time, by the world's clock.
@@ -163,8 +166,7 @@ pub struct Moment<'a> {
     pub belief: &'a Progression,
 }
 
-/// Something observed that concerns the present plan, already checked: each start and end is told
-/// once.
+/// Checked observation that concerns the present plan. Each start and end is reported once.
 #[derive(Clone, Debug, PartialEq)]
 pub enum News {
     /// An action has started.
@@ -196,17 +198,17 @@ pub enum News {
         /// The action.
         action: String,
     },
-    /// Nothing has been heard of an action for longer than the run's patience.
+    /// An action has timed out.
     Silence {
         /// The action.
         action: String,
-        /// Since when it should have ended.
+        /// The time at which it should have ended.
         since: Rational,
     },
 }
 
 impl News {
-    /// Returns the news that this change has taken place.
+    /// Returns a change as news.
     pub(crate) fn of_change(change: &Change) -> Self {
         match change {
             Change::Add(fact) | Change::Delete(fact) => Self::Fact(*fact),
@@ -215,14 +217,14 @@ impl News {
     }
 }
 
-/// An amount that was measured, and what the domain's expression for it reads.
+/// A measured amount, with the inputs of the domain's expression for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Amount {
-    /// The quantity that was measured.
+    /// The measured quantity.
     pub measured: Measured,
     /// The value of `?duration`: the action's actual duration, or, at its start, the planned one.
     pub duration: Option<Rational>,
-    /// The fluents in the expression, as they were before.
+    /// The values of the fluents in the expression before the effect.
     pub values: Vec<(FluentId, Rational)>,
 }
 
@@ -240,14 +242,14 @@ pub struct Decided {
 pub enum Decision {
     /// Start these actions now.
     Start(Vec<Order>),
-    /// Nothing before `until`, unless something is observed earlier; `None`: whenever that is.
+    /// Wait until `until`, or until the next observation if that is earlier; `None` for no limit.
     Wait {
-        /// By the world's clock.
+        /// On the world's clock.
         until: Option<Rational>,
     },
-    /// Stop these.
+    /// Cancel these steps.
     Cancel(Vec<StepId>),
-    /// Give up the plan, and make another one.
+    /// Abandon the plan, and request another one.
     Replan,
     /// The goal is reached.
     GoalReached,
@@ -256,18 +258,18 @@ pub enum Decision {
 /// An action to start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Order {
-    /// By which news refer to it.
+    /// The identifier for news.
     pub step: StepId,
     /// The action.
     pub action: Arc<Action>,
     /// The planned duration; `None` for an instantaneous action.
     pub duration: Option<Rational>,
-    /// When it may start.
+    /// The window of its start.
     pub planned: Planned,
 }
 
 impl Decision {
-    /// The word by which traces name it.
+    /// Returns the name used in traces.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Start(_) => "start",

@@ -1,8 +1,8 @@
-//! The executors: one file each, and one list of them all.
+//! The executors: one file each, and the list of all.
 //!
-//! To add one: a file with its [`Executor`] and its [`Registered`] entry, and a line in
+//! To add one, write a file with its [`Executor`] and its [`Registered`] entry, and add a line to
 //! [`EXECUTORS`]. The command line, its help, `docs/executors.md` and the captions of reports are
-//! made from that list.
+//! generated from that list.
 
 mod adaptable;
 mod chooser;
@@ -33,11 +33,11 @@ use crate::preparation::Region;
 use crate::reason::{About, Cause, Reason};
 use crate::rehearsal::Rehearsal;
 
-/// The executor that is used where none is named. It gives a plan up only where the rest of it does not work even if
-/// nothing deviates any more; `docs/executors.md` compares it with the baselines.
+/// The default executor. It abandons a plan only if the remaining plan fails even when executed
+/// nominally; `docs/executors.md` compares it with the baselines.
 pub const DEFAULT_EXECUTOR: &str = live::REGISTERED.name;
 
-/// Every executor, in the order in which help and reports list them.
+/// All executors, in the order used by help and reports.
 pub const EXECUTORS: &[Registered] = &[
     fixed::REGISTERED,
     stn::REGISTERED,
@@ -54,17 +54,17 @@ pub const EXECUTORS: &[Registered] = &[
 pub struct Registered {
     /// Its name.
     pub name: &'static str,
-    /// The meaning of the number after the name and a colon, if it takes one.
+    /// The meaning of the argument, the number after the name and a colon, if it takes one.
     pub argument: Option<&'static str>,
-    /// Whether that number can be left out.
+    /// `true` if the argument is optional.
     pub is_optional: bool,
     /// A summary, in one sentence.
     pub summary: &'static str,
-    /// Where it comes from.
+    /// The paper on which it is based.
     pub paper: &'static str,
-    /// The knowledge of a plan that it needs.
+    /// The form of a plan that it requires.
     pub need: Need,
-    /// Makes one.
+    /// Constructor.
     make: fn(Option<Rational>, Means) -> Box<dyn Executor>,
 }
 
@@ -74,23 +74,23 @@ pub struct Means {
     pub region: Box<dyn Region>,
     /// The likelihoods of failures and spontaneous changes.
     pub likelihoods: Arc<Likelihoods>,
-    /// For those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not
-    /// look.
+    /// For executors that search for more likely plans ([`ExecutorSpec::asks_odds`]). Without it,
+    /// they do not search.
     pub odds: Option<Box<dyn Odds>>,
-    /// For `lookahead`: what it found out about the same problem and likelihoods in other runs.
+    /// For `lookahead`: results for the same problem and likelihoods from other runs.
     pub foresight: Foresight,
-    /// For `adaptable`: what it found out about the same plans in other samples of the same scene.
+    /// For `adaptable`: results for the same plans from other samples of the same scene.
     pub orders: Option<Orders>,
-    /// For those that weigh each move ([`ExecutorSpec::asks_outlook`]); without, they go by their
-    /// plan.
+    /// For executors that evaluate each move ([`ExecutorSpec::asks_outlook`]). Without it, they
+    /// follow their plan.
     pub outlook: Option<Arc<dyn Outlook>>,
-    /// For those that weigh each move, where nobody can tell what it is worth: who tries out what
-    /// can be done.
+    /// For executors that evaluate each move, if there is no [`Outlook`]: simulates the possible
+    /// moves.
     pub rehearsal: Option<Box<dyn Rehearsal>>,
 }
 
 impl Means {
-    /// With these odds.
+    /// Sets the odds.
     #[must_use]
     pub fn with_odds(self, odds: Option<Box<dyn Odds>>) -> Self {
         Self { odds, ..self }
@@ -98,7 +98,7 @@ impl Means {
 }
 
 impl<R: Region + 'static> From<Box<R>> for Means {
-    /// Everything is certain, and no plan likelier than another.
+    /// Creates means with certain outcomes, and without comparison of plans.
     fn from(region: Box<R>) -> Self {
         Self {
             region,
@@ -112,7 +112,7 @@ impl<R: Region + 'static> From<Box<R>> for Means {
     }
 }
 
-/// An executor as one asks for it: `guarded`, `fixed:30`.
+/// Specification of an executor: `guarded`, `fixed:30`.
 #[derive(Clone)]
 pub struct ExecutorSpec {
     /// The executor.
@@ -121,10 +121,10 @@ pub struct ExecutorSpec {
     pub argument: Option<Rational>,
 }
 
-/// There is no such executor.
+/// Error in the specification of an executor.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownExecutor {
-    /// The name is none of the list.
+    /// The name is not in the list.
     #[error("there is no executor `{name}`; choose one of {known}")]
     Name {
         /// The name that was asked for.
@@ -132,7 +132,7 @@ pub enum UnknownExecutor {
         /// The names that exist.
         known: String,
     },
-    /// The number is missing, superfluous, or none.
+    /// The number is missing, superfluous, or invalid.
     #[error("`{text}`: {problem}")]
     Argument {
         /// The text of the specification.
@@ -143,29 +143,29 @@ pub enum UnknownExecutor {
 }
 
 impl ExecutorSpec {
-    /// Makes the executor, from the envelope alone, or from all [`Means`].
+    /// Creates the executor, from the envelope alone or from all [`Means`].
     pub fn build(&self, means: impl Into<Means>) -> Box<dyn Executor> {
         (self.registered.make)(self.argument.clone(), means.into())
     }
 
-    /// Whether the executor looks for plans that are likelier to succeed.
+    /// Returns `true` if the executor searches for plans that are more likely to succeed.
     pub fn asks_odds(&self) -> bool {
         self.asks_outlook() || (self.registered.is_optional && self.argument.is_some())
     }
 
-    /// Whether the executor chooses the likeliest order of a plan's actions.
+    /// Returns `true` if the executor chooses the most likely order of a plan's actions.
     pub fn reorders(&self) -> bool {
         [adaptable::REGISTERED.name, lookahead::REGISTERED.name].contains(&self.registered.name)
     }
 
-    /// Whether the executor weighs each move, if somebody can tell it what it is worth.
+    /// Returns `true` if the executor evaluates each move with an [`Outlook`], where there is one.
     pub fn asks_outlook(&self) -> bool {
         self.registered.name == policy::REGISTERED.name
     }
 }
 
 impl PartialEq for ExecutorSpec {
-    /// Names are unique, and where code lies in memory says nothing.
+    /// Compares the names, which are unique; function addresses are not compared.
     fn eq(&self, other: &Self) -> bool {
         self.registered.name == other.registered.name && self.argument == other.argument
     }
@@ -182,7 +182,7 @@ impl Default for ExecutorSpec {
 }
 
 impl fmt::Debug for ExecutorSpec {
-    /// Its name: where its code lies in memory is another in each process.
+    /// Writes the specification, because function addresses differ between processes.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "ExecutorSpec({self})")
     }
@@ -201,7 +201,7 @@ impl fmt::Display for ExecutorSpec {
 impl FromStr for ExecutorSpec {
     type Err = UnknownExecutor;
 
-    /// `NAME`, `NAME:NUMBER` or `NAME(NUMBER)`.
+    /// Parses `NAME`, `NAME:NUMBER` or `NAME(NUMBER)`.
     fn from_str(text: &str) -> Result<Self, UnknownExecutor> {
         let (name, argument) = match text.trim().split_once([':', '(']) {
             Some((name, argument)) => (name, Some(argument.trim_end_matches(')').trim())),
@@ -246,7 +246,7 @@ impl FromStr for ExecutorSpec {
 }
 
 impl Registered {
-    /// Its syntax in specifications: `guarded`, `fixed:X`, `live[:X]`.
+    /// Returns its syntax in specifications: `guarded`, `fixed:X`, `live[:X]`.
     pub fn usage(&self) -> String {
         match self.argument {
             Some(_) if self.is_optional => format!("{}[:X]", self.name),
@@ -255,7 +255,7 @@ impl Registered {
         }
     }
 
-    /// One that there is: `guarded`, `fixed:30`, `live`.
+    /// Returns a valid specification: `guarded`, `fixed:30`, `live`.
     pub fn example(&self) -> String {
         match self.argument {
             Some(_) if !self.is_optional => format!("{}:30", self.name),
@@ -264,7 +264,7 @@ impl Registered {
     }
 }
 
-/// The decision of an executor that has no plan.
+/// Returns the decision of an executor that has no plan.
 fn without_plan() -> Decided {
     Decided {
         decision: Decision::Replan,

@@ -1,4 +1,4 @@
-//! Dispatchable forms that have been computed before.
+//! Cache of dispatchable forms.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,25 +8,25 @@ use elbowroom_stn::uncertain::{Dispatchable, UncertainNetwork};
 
 use crate::horizon::{NetworkLimit, grounds};
 
-/// The number of networks remembered; an executor asks for one of a few.
+/// Number of networks that are kept; an executor uses a few.
 const MOST: usize = 8;
 
-/// The form of a network, or what stands against there being one.
+/// The dispatchable form of a network, or the conflict that shows that there is none.
 pub(crate) type Form = Result<Arc<Dispatchable<Rational>>, Vec<NetworkLimit>>;
 
-/// A network that somebody has asked for.
+/// A network that was converted before.
 #[derive(Clone)]
 enum Known {
-    /// Its form, which has the network.
+    /// Its form, which contains the network.
     Controllable(Arc<Dispatchable<Rational>>),
-    /// The network, and what stands against it.
+    /// The network, and the conflict.
     Refused(Arc<UncertainNetwork>, Vec<NetworkLimit>),
 }
 
-/// The dispatchable forms of the networks of a plan, each computed once for all executions of it.
+/// Cache of the dispatchable forms of a plan's networks. Each form is computed once for all
+/// executions of the plan.
 ///
-/// Copies share what they remember. Networks are compared in full, so that it makes no difference
-/// to any answer what is remembered.
+/// Copies share the cache. Networks are compared in full, so cached forms do not change any result.
 #[derive(Clone, Default)]
 pub struct Forms(Arc<Mutex<Vec<Known>>>);
 
@@ -47,7 +47,7 @@ impl Known {
 }
 
 impl Forms {
-    /// The form of a network.
+    /// Returns the form of a network.
     pub(crate) fn of(&self, network: UncertainNetwork) -> Form {
         let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let same = known()

@@ -1,4 +1,4 @@
-//! How far an executor looks when it asks when a time point may happen.
+//! Time windows of time points, with different reach of constraint propagation.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use elbowroom_stn::{
     ConsistentNetwork, Constraint, ConstraintId, MovingWindows, Network, NodeId, WindowEnd,
 };
 
-/// The window of a time point, its ends `None` where they are infinite.
+/// Window of a time point; an end is `None` if it is infinite.
 pub(crate) type Ends = (Option<Rational>, Option<Rational>);
 
 /// The time windows of time points, given those that have been executed.
@@ -16,15 +16,15 @@ pub(crate) type Ends = (Option<Rational>, Option<Rational>);
 pub(crate) enum Horizon {
     /// Windows that follow from all constraints together.
     Whole(Box<MovingWindows>),
-    /// What follows from each single constraint with a time point that has happened: what paper
-    /// 1's dispatcher and `ROSPlan`'s see.
+    /// Windows that follow from single constraints with executed time points, as in the dispatchers
+    /// of paper 1 and `ROSPlan`.
     OneHop(OneHop),
-    /// What follows from the network in a form in which that shows at each time point's neighbours,
-    /// the world deciding on some of them.
+    /// Windows that follow from a dispatchable form of the network: an event has to be propagated
+    /// only to its neighbours. The world decides on the contingent links.
     Dispatchable(Box<Dispatcher>),
 }
 
-/// The origin of one end of a time window.
+/// Cause of one end of a time window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NetworkLimit {
     /// A constraint of the network.
@@ -40,15 +40,15 @@ pub(crate) struct OneHop {
     happened: Vec<Option<Rational>>,
 }
 
-/// A time that a window does not allow.
+/// Violation of a time window.
 #[derive(Clone, Debug)]
 pub(crate) struct Missed {
-    /// The end that was missed.
+    /// The violated end.
     pub(crate) end: WindowEnd,
-    /// The amount by which it is missed.
+    /// The amount of the violation.
     pub(crate) by: Rational,
-    /// Whether it is outside nothing but the bounds of the link that ends there, so that the rest may work all the
-    /// same.
+    /// `true` if only the bounds of the contingent link that ends there are violated. Then the
+    /// remaining plan may still work.
     pub(crate) is_only_link: bool,
 }
 
@@ -63,12 +63,13 @@ impl Horizon {
         Self::OneHop(OneHop { network, happened })
     }
 
-    /// A network in a form that can be dispatched.
+    /// Creates the horizon of a network in dispatchable form.
     pub(crate) fn dispatchable(form: Arc<Dispatchable<Rational>>) -> Self {
         Self::Dispatchable(Box::new(Dispatcher::new(form)))
     }
 
-    /// Whether all that must come before a time point has happened, as far as that is known here.
+    /// Returns `true` if all time points that must come before have happened. Without a
+    /// dispatchable form, always `true`.
     pub(crate) fn is_ready(&self, node: NodeId) -> bool {
         match self {
             Self::Whole(_) | Self::OneHop(_) => true,
@@ -76,7 +77,8 @@ impl Horizon {
         }
     }
 
-    /// Whether the world decides when a time point happens.
+    /// Returns `true` if the world decides when a time point happens. Without a dispatchable form,
+    /// always `true`.
     pub(crate) fn is_contingent(&self, node: NodeId) -> bool {
         match self {
             Self::Whole(_) | Self::OneHop(_) => true,
@@ -84,8 +86,8 @@ impl Horizon {
         }
     }
 
-    /// The time at which a time point that is ready may happen if nothing happens before. `Err` if
-    /// it has to wait for the end of that link, however late it comes.
+    /// Returns the earliest time of a time point that is ready, if no event comes before. `Err` if
+    /// it has to wait for the end of that link, however late that is.
     pub(crate) fn earliest(&self, node: NodeId) -> Result<Option<Rational>, LinkId> {
         match self {
             Self::Whole(_) | Self::OneHop(_) => Ok(self.window(node).0),
@@ -104,8 +106,8 @@ impl Horizon {
         }
     }
 
-    /// The node happens, or happened, at `time`. But for [`Horizon::Whole`], it
-    /// does in any case.
+    /// Executes a node at `time`. If that is outside its window, [`Horizon::Whole`] does not record
+    /// it; the others do.
     pub(crate) fn fix(&mut self, node: NodeId, time: &Rational) -> Result<(), Missed> {
         match self {
             Self::Whole(windows) => windows.fix(node, time).map_err(|out| Missed {
@@ -142,7 +144,8 @@ impl Horizon {
         }
     }
 
-    /// Whether all goes on to work after a time point has happened outside the bounds of its link, and nothing else.
+    /// Returns `true` if the network is still executable after a time point has happened outside
+    /// the bounds of its link, and nothing else was violated.
     pub(crate) fn bears(&self, node: NodeId, now: &Rational) -> bool {
         match self {
             Self::Whole(_) | Self::OneHop(_) => false,
@@ -150,8 +153,8 @@ impl Horizon {
         }
     }
 
-    /// Takes the link under way that ends at a time point for one that ends by `until`, or at any time. Whether the
-    /// executor is still sure to satisfy everything.
+    /// Assumes that the running link that ends at a time point ends by `until`, or at any time.
+    /// Returns `true` if the network is still executable.
     pub(crate) fn prolong(
         &mut self,
         end: NodeId,
@@ -167,7 +170,8 @@ impl Horizon {
         }
     }
 
-    /// The latest time, `until` at most, by which the link under way that ends at a time point may be taken to end.
+    /// Returns the latest end, at most `until`, that can be assumed for the running link that ends
+    /// at a time point.
     pub(crate) fn prolongable(
         &self,
         end: NodeId,
@@ -183,7 +187,7 @@ impl Horizon {
         }
     }
 
-    /// The grounds of one end of a window, beginning far away from the node.
+    /// Returns the causes of one end of a window, the one farthest from the node first.
     pub(crate) fn grounds(&self, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
         match self {
             Self::Whole(windows) => windows
@@ -205,7 +209,7 @@ impl Horizon {
     }
 }
 
-/// The grounds of one end of a window of a node, or of its link if that is tighter.
+/// Returns the causes of one end of a node's window, or of its link if that is tighter.
 fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
     let (earliest, latest) = dispatcher.window(node);
     let (least, most) = dispatcher.bounds(node);
@@ -218,13 +222,13 @@ fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<NetworkL
     }
     let mut behind = grounds(&dispatcher.behind(node, end));
     if end == WindowEnd::Earliest {
-        // These lead from the node back to the event.
+        // These lead from the node back to the cause.
         behind.reverse();
     }
     behind
 }
 
-/// The parts of a network behind these steps.
+/// Returns the parts of a network that justify these steps.
 pub(crate) fn grounds(steps: &[Step]) -> Vec<NetworkLimit> {
     let ground = |step: &Step| match step.ground {
         Ground::Requirement(id) => NetworkLimit::Constraint(id),
@@ -239,7 +243,7 @@ impl OneHop {
         (time(WindowEnd::Earliest), time(WindowEnd::Latest))
     }
 
-    /// The constraint that says most about one end of the window.
+    /// Returns the tightest constraint on one end of the window.
     fn grounds(&self, node: NodeId, end: WindowEnd) -> Option<ConstraintId> {
         let limit = |id| Some((self.limit(id, end)?, id));
         let most = match end {
@@ -249,7 +253,8 @@ impl OneHop {
         most.map(|(_, id)| id)
     }
 
-    /// The bound that one constraint sets, if the time point at its other end has happened.
+    /// Returns the bound that a constraint sets, if the time point at its other end has been
+    /// executed.
     fn limit(&self, id: ConstraintId, end: WindowEnd) -> Option<Rational> {
         let Constraint { from, to, bound } = self.network.constraint(id);
         match end {

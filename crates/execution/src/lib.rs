@@ -1,19 +1,19 @@
 //! Plan execution: dispatching, monitoring and replanning, with a reason for each decision.
 //!
-//! In: a task, a plan, and what is observed. Out: decisions, each with its [`Reason`], and in the
-//! end a [`Report`](run::Report). No clock, no input or output, no randomness: the same history
-//! leads to the same decisions, so that a simulation, a robot, a test and a stored trace all drive
-//! the same code.
+//! In: a task, a plan, and observations. Out: decisions, each with its [`Reason`], and in the end a
+//! [`Report`](run::Report). This crate uses no clock, no input or output and no randomness: the
+//! same history leads to the same decisions, so a simulation, a robot, a test and a stored trace
+//! all drive the same code.
 //!
 //! - [`Executor`]: a dispatch policy. [`executors::EXECUTORS`] lists them all.
 //! - [`run::Run`]: the execution loop: decide, wait, take in observations, replan.
 //! - [`Progression`]: the believed state, progressed through time and observations.
 //! - [`Recorder`]: records a run.
 //!
-//! What it needs from outside are ports, traits that it owns: [`World`] (a simulation, a robot),
-//! [`Planner`], [`Preparer`], [`Region`] (what a plan survives), [`Odds`] (how likely it is to
-//! succeed) and [`Outlook`] (how likely the goal is by each move). It does not depend on their
-//! implementations; in particular it cannot reach a solver.
+//! External services are ports, that is, traits of this crate: [`World`] (a simulation, a robot),
+//! [`Planner`], [`Preparer`], [`Region`] (the deviations that a plan tolerates), [`Odds`] (success
+//! probabilities of plans) and [`Outlook`] (success probabilities of moves). This crate does not
+//! depend on their implementations; in particular, it cannot call a solver.
 //!
 //! ```
 //! use elbowroom_execution::executors::{EXECUTORS, ExecutorSpec};

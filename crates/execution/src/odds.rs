@@ -1,14 +1,14 @@
-//! How likely plans are to succeed: a port.
+//! Port: success probabilities of plans.
 
 use elbowroom_num::Rational;
 
 use crate::executor::Mission;
 use crate::progression::Progression;
 
-/// Knows how likely plans are to succeed.
+/// Estimates the success probabilities of plans.
 pub trait Odds: Send {
-    /// Compares the rest of the present plan with a plan made now; `None` where there is no other
-    /// plan, or nothing can be said.
+    /// Compares the remaining plan with a plan made now; `None` if there is no other plan, or no
+    /// estimate.
     fn compare(&mut self, rest: &Remainder<'_>) -> Option<Compared>;
 }
 
@@ -17,7 +17,7 @@ pub trait Odds: Send {
 pub struct Remainder<'a> {
     /// The plan.
     pub mission: &'a Mission,
-    /// When each of its time points happened, on its own clock.
+    /// The times of its executed time points, on its own clock.
     pub happened: Vec<Option<Rational>>,
     /// The present time, by the world's clock.
     pub now: &'a Rational,
@@ -25,10 +25,10 @@ pub struct Remainder<'a> {
     pub belief: &'a Progression,
 }
 
-/// The probabilities that two plans succeed.
+/// Success probabilities of two plans.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Compared {
-    /// The rest of the present plan.
+    /// The remaining plan.
     pub present: Rational,
     /// The other plan.
     pub other: Rational,

@@ -1,32 +1,33 @@
-//! Where plans come from: a port.
+//! Port: sources of plans.
 
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 /// Makes plans.
 pub trait Planner: Send {
-    /// A plan from here. See [`Situation`] for what such a plan looks like.
+    /// Makes a plan from this situation. See [`Situation`] for the form of such a plan.
     ///
-    /// The plan's facts and fluents are those of `task`, whose table may grow for that.
+    /// The plan's facts and fluents are those of `task`, whose table may grow.
     fn plan(&mut self, task: &Task, situation: &Situation) -> Planned;
 
-    /// A plan from there will be asked for soon, unless things go otherwise. Whoever can work aside
-    /// begins with it, and has it ready when it is asked for. Answers do not depend on it.
+    /// Announces that a plan from this situation will probably be requested soon. Planners that can
+    /// work in the background may begin with it. Answers do not depend on it.
     fn expect(&mut self, _task: &Task, _situation: &Situation) {}
 
-    /// Begins to make a plan from there, beside whoever asks, in place of what was begun before;
-    /// whether it can do that. When there is an answer, whoever drives the run tells it so
-    /// ([`Event::PlanMade`](crate::Event::PlanMade)), and it is [collected](Planner::collect).
+    /// Begins to plan from this situation in the background, and replaces any search begun before.
+    /// Returns `false` if the planner cannot do that. When there is an answer, the driver of the
+    /// run reports [`Event::PlanMade`](crate::Event::PlanMade), and the run
+    /// [collects](Planner::collect) it.
     fn begin(&mut self, _task: &Task, _situation: &Situation) -> bool {
         false
     }
 
-    /// The answer to what was begun, which it is waited for if it is not there.
+    /// Returns the answer of the search that was begun; blocks until there is one.
     fn collect(&mut self, task: &Task, situation: &Situation) -> Planned {
         self.plan(task, situation)
     }
 
-    /// What was begun is not needed any more.
+    /// Cancels the search that was begun.
     fn give_up(&mut self) {}
 
     /// Returns `true` if the next answer is read from the record of a run. The planner must then be asked, even if the
@@ -95,25 +96,26 @@ pub struct Planned {
     pub answer: PlanAnswer,
     /// The planning time in seconds, if it was measured.
     pub seconds: Option<Rational>,
-    /// What there is to say about the plan, for people: why it and not another one.
+    /// A remark about the plan for users, for example the reason for which it was chosen.
     pub remark: Option<String>,
     /// Known reasons for which the goals have no plan.
     pub shortfall: Shortfall,
 }
 
-/// Reasons for which there is no plan, as far as the planner knows any.
+/// Reasons for which there is no plan, as far as the planner knows them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Shortfall {
     /// The deadlines that cannot be met, or for which no plan was found.
     pub late: Vec<Lateness>,
-    /// Conjuncts of the goal that exclude each other, as a certificate proves; none is known to be needless for that.
+    /// Conjuncts of the goal that exclude each other, as a certificate proves. None of them is
+    /// known to be redundant.
     pub conflict: Vec<String>,
 }
 
 /// A deadline that is missed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lateness {
-    /// Its position among the deadlines of the task ([`Task::deadlines`]).
+    /// Index of the deadline in [`Task::deadlines`].
     pub place: usize,
     /// The time at which the earliest plan found without deadlines reaches the goal.
     pub reached: Option<Rational>,
@@ -154,7 +156,7 @@ impl Lateness {
 }
 
 impl From<PlanAnswer> for Planned {
-    /// Without a clock, and nothing to say about it.
+    /// Creates an answer without a planning time and a remark.
     fn from(answer: PlanAnswer) -> Self {
         Self {
             answer,
@@ -170,24 +172,24 @@ impl From<PlanAnswer> for Planned {
 pub enum PlanAnswer {
     /// A plan.
     Plan(TimeTriggeredPlan),
-    /// No plan exists, with a certificate that the verifier of such claims accepts.
+    /// No plan exists, with a certificate that the verifier accepts.
     Unsolvable,
     /// No plan has been found; there may be one.
     NotFound {
-        /// Why not.
+        /// The reason.
         why: String,
     },
-    /// The planner has failed, which says nothing about plans: it has crashed, for example.
+    /// The planner has failed, for example crashed. Plans may exist.
     Failed {
-        /// How.
+        /// The error.
         why: String,
     },
-    /// There is no planner to ask.
+    /// There is no planner in this run.
     NoPlanner,
 }
 
 impl PlanAnswer {
-    /// Why there is no plan, in words.
+    /// Returns the reason for which there is no plan, in words.
     pub fn why_not(&self) -> Option<&str> {
         match self {
             Self::Plan(_) => None,
@@ -197,7 +199,7 @@ impl PlanAnswer {
         }
     }
 
-    /// The plan.
+    /// Returns the plan.
     pub fn plan(&self) -> Option<&TimeTriggeredPlan> {
         match self {
             Self::Plan(plan) => Some(plan),
@@ -208,7 +210,7 @@ impl PlanAnswer {
     }
 }
 
-/// Answers that there is no plan to be had: for runs of a single given plan.
+/// Planner without plans, for runs of a single given plan.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoPlanner;
 

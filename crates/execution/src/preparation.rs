@@ -1,6 +1,6 @@
-//! Ports through which plans are made ready, and asked what they survive.
+//! Ports: preparation of plans for execution, and analysis of the deviations they tolerate.
 //!
-//! What executes needs no solver; what stands behind these traits may have one.
+//! The executing side needs no solver; the implementations of these traits may use one.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,51 +19,51 @@ use crate::event::Ticket;
 use crate::executor::{Mission, Need, StepId};
 use crate::forms::Forms;
 
-/// A plan made ready to be executed.
+/// A plan prepared for execution.
 #[derive(Clone, Debug)]
 pub struct Prepared {
-    /// The plan with room.
+    /// The deordered plan, with open parameters.
     pub plan: ParametrizedPlan,
-    /// For each step of the plan that was made ready, its instance.
+    /// For each step of the given plan, its instance.
     pub instances: Vec<InstanceId>,
     /// The time of each event if nothing deviates.
     pub nominal: Schedule,
-    /// For which values it is guaranteed to work, if that was asked for.
+    /// The values for which it is guaranteed to work, if they were requested.
     pub envelope: Option<DecoupledEnvelope>,
-    /// Forms of the plan's network that executors have asked for before.
+    /// Cache of the dispatchable forms of the plan's networks.
     pub forms: Forms,
-    /// The partial order of its happenings, if that was asked for ([`Need::PartialOrder`]).
+    /// The partial order of its happenings, if it was requested ([`Need::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
 }
 
-/// Why a plan cannot be made ready: it does not work, or what is to be known of it cannot be found
-/// out.
+/// Reason for which a plan cannot be prepared: the plan does not work, or the required analysis is
+/// not possible.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PrepareError {
-    /// The judge rejects the plan.
+    /// The validator rejects the plan.
     #[error("the plan is not valid: {0}")]
     Invalid(Box<Violation>),
     /// The plan has no order.
     #[error(transparent)]
     Deorder(#[from] DeorderError),
-    /// Something cannot be left open.
+    /// A quantity cannot be left open.
     #[error(transparent)]
     Parametrize(#[from] ParametrizeError),
     /// The plan is not guaranteed to work even if nothing deviates.
     #[error("the plan is not guaranteed to work even if nothing deviates")]
     NoGuarantee,
-    /// The analyst cannot decide about this plan: the reason.
+    /// The analysis cannot decide about this plan: the reason.
     #[error("{0}")]
     Beyond(String),
 }
 
-/// Makes plans ready.
+/// Prepares plans for execution.
 pub trait Preparer: Send {
-    /// Frees a plan from the order that it does not need, and finds out what was asked for.
+    /// Removes unnecessary orderings from a plan, and computes the form that is needed.
     ///
     /// # Errors
-    /// When the plan does not work.
+    /// If the plan does not work.
     fn prepare(
         &mut self,
         task: &Arc<Task>,
@@ -71,51 +71,52 @@ pub trait Preparer: Send {
         need: Need,
     ) -> Result<Prepared, PrepareError>;
 
-    /// Begins to make a plan ready, beside whoever asks, in place of what was begun before; whether it
-    /// can do that. When it is ready, whoever drives the run tells it so
-    /// ([`Event::PlanReady`](crate::Event::PlanReady)), and it is [collected](Preparer::collect).
+    /// Begins to prepare a plan in the background, and replaces any preparation begun before.
+    /// Returns `false` if the preparer cannot do that. When the plan is prepared, the driver of the
+    /// run reports [`Event::PlanReady`](crate::Event::PlanReady), and the run
+    /// [collects](Preparer::collect) it.
     fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {
         false
     }
 
-    /// What was begun, which is waited for if it is not ready. The answer is the same as if it had not
-    /// been begun beside.
+    /// Returns the plan whose preparation was begun; blocks until it is prepared. The result is the
+    /// same as without background preparation.
     ///
     /// # Errors
-    /// When the plan does not work.
+    /// If the plan does not work.
     fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
         wanted.mission(self)
     }
 
-    /// What was begun is not needed any more.
+    /// Cancels the preparation that was begun.
     fn give_up(&mut self) {}
 }
 
-/// A plan that is to be made ready, and where it begins.
+/// A plan to be prepared, with its initial situation.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
     /// The task, with the goals of the plan.
     pub task: &'a Task,
     /// The plan, on the world's clock.
     pub plan: &'a TimeTriggeredPlan,
-    /// From where.
+    /// The initial situation of the plan.
     pub situation: &'a Situation,
-    /// The tickets of what is under way there, in its order.
+    /// The tickets of the actions that are running there, in its order.
     pub running: &'a [Ticket],
-    /// The present time: it is not begun earlier.
+    /// The present time; the plan does not begin earlier.
     pub now: &'a Rational,
-    /// The form that is asked for.
+    /// The requested form.
     pub need: Need,
 }
 
 impl Wanted<'_> {
-    /// What is wanted, made ready by this preparer at once.
+    /// Prepares the plan with this preparer, in the foreground.
     ///
     /// # Errors
-    /// When the plan does not work.
+    /// If the plan does not work.
     pub fn mission<P: Preparer + ?Sized>(&self, preparer: &mut P) -> Result<Mission, PrepareError> {
         let task = Arc::new(self.situation.rest_of_task(self.task));
-        // What is running comes first in it.
+        // The running actions come first in it.
         let plan = self.situation.rest_of_plan(self.plan);
         let ready = preparer.prepare(&task, &plan, self.need)?;
         let steps = ready.instances.iter().copied().map(StepId::from);
@@ -159,9 +160,10 @@ impl<P: Preparer + ?Sized> Preparer for &mut P {
     }
 }
 
-/// Knows which values a plan survives.
+/// Decides for which parameter values a plan is guaranteed to work.
 pub trait Region: Send {
-    /// Why the plan is not guaranteed to work for these values; `None` if it is.
+    /// Returns the reason for which the plan is not guaranteed to work for these values; `None` if
+    /// it is.
     fn objection(
         &mut self,
         task: &Arc<Task>,
@@ -169,12 +171,12 @@ pub trait Region: Send {
         values: &Valuation,
     ) -> Option<String>;
 
-    /// A box around these values in which the plan is guaranteed to work: as much of the room nearby as is found soon,
-    /// or no more than the values. Of a plan beyond exact analysis, the values are returned if nothing is known to fail
-    /// with them.
+    /// Returns a box around these values for which the plan is guaranteed to work. Depending on the
+    /// effort, the box may contain only the values themselves. If the plan is beyond exact
+    /// analysis, the values are returned, unless they are known to fail.
     ///
     /// # Errors
-    /// Why the plan is not guaranteed to work for the values themselves.
+    /// The reason for which the plan is not guaranteed to work for the values themselves.
     fn surroundings(
         &mut self,
         task: &Arc<Task>,
@@ -187,16 +189,18 @@ pub trait Region: Send {
         }
     }
 
-    /// Whether it is to be asked about plans of which a box says already that they work.
+    /// Returns `true` if the region is to be queried even if a known box shows that the plan works.
     fn is_asked_inside(&self) -> bool {
         false
     }
 
-    /// Asks again and again how much greater one of the values may be, the others being as they are: whether the
-    /// plan is guaranteed to work with that value of the parameter. It works for `values`.
+    /// Returns a predicate for repeated queries that increase one value while the others stay the
+    /// same. The predicate holds for a value of the parameter if the plan is guaranteed to work
+    /// with it. The plan must work for `values`.
     ///
-    /// Whoever has seen that it works with all values up to a greater one may say so without looking again; where it
-    /// does not work with something in between, that may be said of what is beyond, too.
+    /// Implementations may answer from earlier queries: if the plan works with all values up to a
+    /// greater one, the predicate holds; if it fails with some smaller value, the predicate may be
+    /// `false`.
     fn growing<'a>(
         &'a mut self,
         task: &'a Arc<Task>,
@@ -211,7 +215,7 @@ pub trait Region: Send {
         })
     }
 
-    /// One more of it; `None` if it cannot be had.
+    /// Returns a copy; `None` if it cannot be copied.
     fn fork(&self) -> Option<Box<dyn Region>> {
         None
     }

@@ -1,11 +1,11 @@
-//! A state that follows what happens: progression, as planners call it.
+//! Progression: a state that follows the events of an execution.
 //!
-//! The same type is what an executor's side *believes* and what a simulated world *is*. As for the
-//! judge, all that happens at one time is a group: conditions, guards and amounts are read in the
-//! state on arrival, before anything of that time has changed it, and over-all conditions count
-//! strictly between start and end, at the time of a group in between as it leaves things. Whether
-//! two happenings of a group interfere is not asked here: that makes the executed plan invalid,
-//! which the judge says.
+//! The same type is the *belief* of the executing side and the *true state* of a simulated world.
+//! As in the validator, all happenings at one time form a group. Conditions, guards and amounts are
+//! read in the state on arrival, before any change at that time. Over-all conditions must hold
+//! strictly between start and end; at the time of a group in between, in the state after it.
+//! Interference between happenings of a group is not checked here: it makes the executed plan
+//! invalid, which the validator reports.
 
 mod effects;
 mod goal;
@@ -33,58 +33,60 @@ pub(crate) use start::conditions_on_duration;
 use crate::event::{Measured, Ticket};
 use motion::{Motion, Rate};
 
-/// The state at one moment, with what is under way.
+/// The state at one moment, with the running actions.
 #[derive(Clone, Debug)]
 pub struct Progression {
     task: Arc<Task>,
     time: Rational,
     facts: Vec<bool>,
     values: Vec<Option<Rational>>,
-    /// The time of the present group: [`Progression::time`], or earlier for what is told late.
+    /// The time of the present group: [`Progression::time`], or earlier for late reports.
     group: Rational,
-    /// Facts that have changed since the beginning of the present group, as they were on arrival.
+    /// Truth on arrival of the facts that have changed since the beginning of the present group.
     facts_on_arrival: BTreeMap<FactId, bool>,
-    /// The values on arrival, likewise.
+    /// The same for values.
     values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
     /// Facts that an action may have changed: see [`Progression::doubt`].
     doubtful_facts: BTreeMap<FactId, Vec<Doubt>>,
     /// Fluents that an action may have changed.
     doubtful_values: BTreeMap<FluentId, Vec<Doubt>>,
-    /// How many groups of timed initials have happened.
+    /// Number of groups of timed initials that have happened.
     timed: usize,
     running: BTreeMap<Ticket, Underway>,
 }
 
-/// A durative action under way.
+/// A running durative action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Underway {
     /// The action.
     pub action: Arc<Action>,
     /// The time at which it started.
     pub start: Rational,
-    /// The planned duration: what `?duration` means until it has ended.
+    /// The planned duration, which is the value of `?duration` until the action has ended.
     pub planned: Rational,
-    /// For each end effect, whether the part of its guard that concerns start and interval holds.
+    /// For each end effect, `true` if the part of its guard that concerns the start and the
+    /// interval holds.
     end_guards: Vec<bool>,
-    /// For each continuous effect, whether it is at work.
+    /// For each continuous effect, `true` if it is active.
     continuous: Vec<bool>,
-    /// The conjuncts of the over-all condition that have not held at some moment since the start.
+    /// Conjuncts of the over-all condition that have failed at some moment since the start.
     broken: BTreeSet<usize>,
 }
 
-/// The reason why facts or values are in doubt.
+/// Reason for which facts or values are in doubt.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Doubt {
-    /// Since when.
+    /// Beginning of the doubt.
     pub since: Rational,
-    /// The start of the action.
+    /// The ticket of the action's start.
     pub ticket: Ticket,
-    /// The name of the action that may or may not have come to its end.
+    /// The name of the action whose end may or may not have happened.
     pub action: String,
 }
 
 impl Underway {
-    /// The parts of the over-all condition that have not held at some moment since the start.
+    /// Returns the conjuncts of the over-all condition that have failed at some moment since the
+    /// start.
     pub fn broken_parts(&self) -> Vec<&Condition> {
         let Some(body) = self.action.durative() else {
             return Vec::new();
@@ -96,7 +98,7 @@ impl Underway {
 }
 
 impl Progression {
-    /// The beginning of a task.
+    /// Creates the initial state of a task.
     pub fn new(task: Arc<Task>) -> Self {
         let mut facts = vec![false; task.fact_count()];
         let mut values = vec![None; task.fluent_count()];
@@ -121,12 +123,13 @@ impl Progression {
         }
     }
 
-    /// The task whose facts these are.
+    /// Returns the task, which defines the facts.
     pub fn task(&self) -> &Arc<Task> {
         &self.task
     }
 
-    /// The same state, of a task whose table of facts grows by itself: for what is only thought of.
+    /// Returns the same state with a task whose table of facts grows independently, for
+    /// hypothetical states.
     #[must_use]
     pub fn with_own_table(&self) -> Self {
         let task = Arc::new(self.task.with_own_table());
@@ -136,27 +139,28 @@ impl Progression {
         }
     }
 
-    /// The same state, of a task that differs in its goal alone.
+    /// Replaces the task by one that differs only in its goal.
     pub(crate) fn pursue(&mut self, task: &Arc<Task>) {
         self.task = Arc::clone(task);
     }
 
-    /// The moment.
+    /// Returns the present time.
     pub fn time(&self) -> &Rational {
         &self.time
     }
 
-    /// The running actions.
+    /// Returns the running actions.
     pub fn running(&self) -> &BTreeMap<Ticket, Underway> {
         &self.running
     }
 
-    /// The groups of timed initials that have happened: the first so many of [`Task::timed`].
+    /// Returns the number of groups of timed initials that have happened; they are the first ones
+    /// of [`Task::timed`].
     pub fn timed_past(&self) -> usize {
         self.timed
     }
 
-    /// Whether a basic fact is true.
+    /// Returns `true` if a basic fact is true.
     pub fn fact(&self, fact: FactId) -> bool {
         let truth = self.facts.get(fact.index()).copied().unwrap_or(false);
         truth && !self.doubtful_facts.contains_key(&fact)
@@ -172,12 +176,12 @@ impl Progression {
         &self.doubtful_values
     }
 
-    /// A fluent's value.
+    /// Returns a fluent's value.
     pub fn value(&self, fluent: FluentId) -> Option<&Rational> {
         self.values.get(fluent.index()).and_then(Option::as_ref)
     }
 
-    /// A fluent's value on arrival at the present moment, before anything happened at it.
+    /// Returns a fluent's value on arrival at the present moment, before any happening of it.
     pub fn value_on_arrival(&self, fluent: FluentId) -> Option<&Rational> {
         match self.values_on_arrival.get(&fluent) {
             Some(value) => value.as_ref(),
@@ -185,7 +189,7 @@ impl Progression {
         }
     }
 
-    /// Facts and values as the model knows them.
+    /// Returns facts and values as a state of the model.
     pub fn state(&self) -> State {
         let facts = (0..self.facts.len()).map(|index| FactId(narrow(index)));
         let values = self.values.iter().enumerate();
@@ -197,15 +201,16 @@ impl Progression {
         }
     }
 
-    /// The time at which the next timed initials happen.
+    /// Returns the time of the next timed initials.
     pub fn next_timed(&self) -> Option<&Rational> {
         self.task.timed().get(self.timed).map(|timed| &timed.time)
     }
 
-    /// Lets time pass: continuous change, and the timed initials up to and including `to`.
+    /// Advances the time: applies continuous change, and the timed initials up to and including
+    /// `to`.
     ///
     /// # Errors
-    /// When a fluent that moves has no value. Time passes all the same.
+    /// If a fluent that changes continuously has no value. The time is advanced in any case.
     pub fn advance(&mut self, to: &Rational) -> Result<(), Unreadable> {
         let mut outcome = Ok(());
         while let Some(timed) = self.task.timed().get(self.timed).filter(|t| t.time <= *to) {
@@ -221,8 +226,8 @@ impl Progression {
         outcome.and(self.drift(to))
     }
 
-    /// What comes next happened at `time`: lets time pass until then, or, if that is past, begins a
-    /// group of its own for it. Time is never taken back.
+    /// Prepares for happenings at `time`: advances the time to it, or begins a separate group for
+    /// it if it is past. Time never goes back.
     ///
     /// # Errors
     /// As [`Progression::advance`].
@@ -244,11 +249,11 @@ impl Progression {
         }
     }
 
-    /// An action starts now, or happens, if it is instantaneous. `measured` overrides the amounts
-    /// that the domain has.
+    /// Starts an action now, or executes it if it is instantaneous. Amounts in `measured` replace
+    /// those of the domain.
     ///
     /// # Errors
-    /// When an effect reads a fluent without a value; the other effects take place.
+    /// If an effect reads a fluent without a value. The other effects take place.
     pub fn start(
         &mut self,
         ticket: Ticket,
@@ -282,7 +287,7 @@ impl Progression {
         }
     }
 
-    /// A running action ends now, as the domain says. Nothing if it is not running.
+    /// Ends a running action successfully. Has no effect if it is not running.
     ///
     /// # Errors
     /// As [`Progression::start`].
@@ -302,12 +307,13 @@ impl Progression {
         )
     }
 
-    /// A running action stops without its end taking place.
+    /// Stops a running action without its end effects.
     pub fn stop(&mut self, ticket: Ticket) {
         self.running.remove(&ticket);
     }
 
-    /// A fact is seen; whether that is news. It counts as having been so on arrival.
+    /// Records an observed fact, also for the state on arrival. Returns `true` if it differs from
+    /// the belief, or was in doubt.
     pub fn see_fact(&mut self, fact: FactId, truth: bool) -> bool {
         let was_doubtful = self.doubtful_facts.remove(&fact).is_some();
         let is_news = self.fact(fact) != truth;
@@ -316,7 +322,8 @@ impl Progression {
         is_news || was_doubtful
     }
 
-    /// A value is seen; whether that is news. It counts as having been so on arrival.
+    /// Records an observed value, also for the state on arrival. Returns `true` if it differs from
+    /// the belief, or was in doubt.
     pub fn see_value(&mut self, fluent: FluentId, value: &Rational) -> bool {
         let was_doubtful = self.doubtful_values.remove(&fluent).is_some();
         let is_news = self.value(fluent) != Some(value);
@@ -325,19 +332,20 @@ impl Progression {
         is_news || was_doubtful
     }
 
-    /// A fact becomes true or false by itself.
+    /// Changes a fact spontaneously.
     pub fn change_fact(&mut self, fact: FactId, truth: bool) {
         self.set_fact(fact, truth);
     }
 
-    /// A fluent gets a value by itself.
+    /// Changes a value spontaneously.
     pub fn change_value(&mut self, fluent: FluentId, value: &Rational) {
         self.doubtful_values.remove(&fluent);
         self.set_value(fluent, Some(value.clone()));
     }
 
-    /// It is unknown whether these effects have taken place. Until that is known, the facts that they write count as
-    /// false, for planners as for executors, and the fluents keep their values; a goal that reads them is not reached.
+    /// Marks the effects as doubtful: it is unknown whether they have taken place. Until that is
+    /// known, the facts that they write count as false, for planners and for executors, and the
+    /// fluents keep their values. A goal that reads them is not reached.
     pub fn doubt(&mut self, snap: &SnapAction, doubt: &Doubt) {
         for effect in &snap.effects {
             match effect.change {
@@ -360,16 +368,17 @@ impl Progression {
         facts.chain(values).sum()
     }
 
-    /// Ends the doubts about an action's end: it has not taken place. Returns the facts and fluents that were in doubt
-    /// because of it.
+    /// Ends the doubts about an action's end, which has not happened. Returns the facts and fluents
+    /// that were in doubt because of it.
     pub fn settle(&mut self, ticket: Ticket) -> (Vec<FactId>, Vec<FluentId>) {
         let facts = without_doubts(&mut self.doubtful_facts, ticket);
         let fluents = without_doubts(&mut self.doubtful_values, ticket);
         (facts, fluents)
     }
 
-    /// Ends the doubts about an action: these effects have taken place. Facts and values that have been seen since stay, and
-    /// other doubts remain.
+    /// Ends the doubts about an action, and applies these effects, which have happened. Facts and
+    /// values that were observed since are not changed, and other doubts remain. Returns the facts
+    /// and fluents that were in doubt.
     pub fn settle_happened(
         &mut self,
         ticket: Ticket,
@@ -385,16 +394,17 @@ impl Progression {
                 Change::Add(fact) | Change::Delete(fact) => facts.contains(fact),
                 Change::Update { fluent, .. } => fluents.contains(fluent),
             });
-            // An effect that cannot be computed leaves its fluent as it was.
+            // An effect that cannot be computed does not change its fluent.
             let _ = self.happen(&snap, Some(duration), None, measured);
         }
         (self.doubtful_facts, self.doubtful_values) = others;
         (facts, fluents)
     }
 
-    /// The first running action whose over-all condition has not held at some moment that has
-    /// passed since it started; [`Underway::broken_parts`] has what. What fails just now has not
-    /// failed yet, as long as more can happen at this moment: see [`Progression::breaking`].
+    /// Returns the first running action whose over-all condition has failed at some past moment
+    /// since its start; [`Underway::broken_parts`] has the conjuncts. A condition that fails at the
+    /// present moment does not count yet, as long as more can happen at this moment: see
+    /// [`Progression::breaking`].
     pub fn broken(&self) -> Option<(Ticket, &Underway)> {
         let mut running = self.running.iter();
         running
@@ -402,8 +412,8 @@ impl Progression {
             .map(|(ticket, underway)| (*ticket, underway))
     }
 
-    /// Returns a running action as the model knows it, with its guards decided. Before its end, it reads
-    /// the planned duration.
+    /// Returns a running action in the form of the model, with its guards decided. Before its end,
+    /// it reads the planned duration.
     pub fn running_action(&self, underway: &Underway, duration: Interval) -> RunningAction {
         let planned = underway.action.with_planned_duration(&underway.planned);
         let mut action = planned.unwrap_or_else(|| Action::clone(&underway.action));
@@ -417,7 +427,7 @@ impl Progression {
         }
     }
 
-    /// From the present group on until `to`, where another one may come.
+    /// Advances the time from the present group to `to`, where the next one may begin.
     fn drift(&mut self, to: &Rational) -> Result<(), Unreadable> {
         if *to <= self.time {
             return Ok(());
@@ -437,7 +447,7 @@ impl Progression {
         outcome
     }
 
-    /// The changes by the continuous effects under way.
+    /// Returns the changes by the active continuous effects.
     fn motion(&self) -> Result<Motion, Unreadable> {
         let mut rates = Vec::new();
         for underway in self.running.values() {
@@ -476,7 +486,7 @@ impl Progression {
     }
 }
 
-/// Leaves out the effects that will not take place, and what is decided of the others' guards.
+/// Removes the effects that will not take place, and the decided parts of the guards of the others.
 fn decide_guards(body: &mut DurativeBody, at_end: &[bool], continuous: &[bool]) {
     let mut on = at_end.iter();
     let end = Arc::make_mut(&mut body.end);

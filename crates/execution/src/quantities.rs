@@ -1,4 +1,4 @@
-//! Amounts that were measured, and what they say about a plan's parameters.
+//! Measured amounts, and the parameter values that follow from them.
 
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression, FluentId};
 use elbowroom_model::problem::Unknown;
@@ -10,16 +10,17 @@ use crate::executor::{Amount, Moment, News};
 /// A measured amount as a linear equation over the parameters in its expression.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Reading {
-    /// The action in whose effect they stand.
+    /// The action with the effect.
     pub(crate) action: String,
     pub(crate) fluent: String,
-    /// The amount as the domain has it, and its change with each parameter; at least one.
+    /// The constant term of the domain's expression, and the coefficients of the parameters; at
+    /// least one.
     pub(crate) constant: Rational,
     pub(crate) slopes: Vec<(ParameterId, Rational)>,
     pub(crate) observed: Rational,
 }
 
-/// An amount that differs from what the domain says, where no parameter stands.
+/// An amount that differs from the domain's, in an expression without parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Deviation {
     pub(crate) action: String,
@@ -33,12 +34,12 @@ pub(crate) struct Deviation {
 pub(crate) struct Amounts {
     pub(crate) readings: Vec<Reading>,
     pub(crate) deviations: Vec<Deviation>,
-    /// How many amounts there is nothing to compare with.
+    /// Number of amounts for which the plan has no expected value.
     pub(crate) unread: usize,
 }
 
 impl Reading {
-    /// The one parameter with the value that it must have had.
+    /// Returns the value of the parameter, if there is only one.
     pub(crate) fn value(&self) -> Option<(ParameterId, Rational)> {
         let [(parameter, slope)] = self.slopes.as_slice() else {
             return None;
@@ -48,14 +49,14 @@ impl Reading {
     }
 }
 
-/// An amount that was measured in the news, and where.
+/// A measured amount in the news, with its action.
 pub(crate) struct Place<'n> {
     pub(crate) instance: InstanceId,
     pub(crate) is_end: bool,
     pub(crate) amount: &'n Amount,
 }
 
-/// All amounts that were measured.
+/// Returns all measured amounts.
 pub(crate) fn places(news: &[News]) -> impl Iterator<Item = Place<'_>> {
     let measured = news.iter().filter_map(|news| {
         let (step, is_end, measured) = match news {
@@ -72,7 +73,7 @@ pub(crate) fn places(news: &[News]) -> impl Iterator<Item = Place<'_>> {
     measured.flatten()
 }
 
-/// Reads the amounts in the news.
+/// Returns the measured amounts in the news.
 pub(crate) fn amounts(plan: &ParametrizedPlan, moment: &Moment<'_>) -> Amounts {
     let mut amounts = Amounts::default();
     for place in places(moment.news) {
@@ -88,7 +89,7 @@ pub(crate) fn amounts(plan: &ParametrizedPlan, moment: &Moment<'_>) -> Amounts {
     amounts
 }
 
-/// The plan's parameters that are the durations of instances.
+/// Returns the plan's parameters that are durations, with their instances.
 pub(crate) fn duration_parameters(
     plan: &ParametrizedPlan,
 ) -> impl Iterator<Item = (ParameterId, InstanceId)> + '_ {
@@ -99,7 +100,7 @@ pub(crate) fn duration_parameters(
     })
 }
 
-/// The nominal amount by the domain, or by the plan.
+/// Returns the expression for the nominal amount of an effect, in the domain or the plan.
 pub(crate) fn expression(action: &Action, is_end: bool, fluent: FluentId) -> Option<&Expression> {
     let effects: &[Effect] = match (&action.body, is_end) {
         (Body::Instantaneous(snap), _) => &snap.effects,
@@ -124,7 +125,7 @@ fn note(
     let Place {
         instance, amount, ..
     } = place;
-    // How long it took is known.
+    // The actual duration is known.
     let is_duration = |index: u32| {
         let parameter = plan.parameters.get(index as usize);
         parameter.is_some_and(|own| own.kind == ParameterKind::Duration(*instance))
@@ -138,7 +139,7 @@ fn note(
     });
     open.sort_unstable();
     open.dedup();
-    // The amount where one parameter is 1, or none, and the others are 0.
+    // The amount for one parameter, or none, set to 1 and the others to 0.
     let at = |one: Option<ParameterId>| {
         value.evaluate(&mut |leaf| match leaf {
             Expression::Fluent(fluent) => {
@@ -166,7 +167,7 @@ fn note(
         amounts.unread += 1;
         return;
     };
-    // The amount is affine in the parameters: a point for each gives the plane.
+    // The amount is affine in the parameters, so one point for each determines it.
     let slope = |id: &ParameterId| Some((*id, at(Some(*id))? - &constant));
     let slopes: Vec<(ParameterId, Rational)> = open.iter().filter_map(slope).collect();
     let slopes: Vec<_> = slopes.into_iter().filter(|(_, by)| !by.is_zero()).collect();

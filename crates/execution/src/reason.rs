@@ -1,4 +1,4 @@
-//! Why an executor decides as it does.
+//! Reasons for the decisions of executors.
 
 mod about;
 mod behind;
@@ -10,8 +10,9 @@ use elbowroom_num::{Interval, Rational};
 pub use about::About;
 pub use behind::{Behind, Changed};
 
-/// Why an executor decides as it does: what was observed or not, what was allowed, what stands
-/// behind that, by how much it was missed, and since when. Times are the world's.
+/// The reason for a decision of an executor: the observation, the allowed values, the constraints
+/// and events that caused it, the amount of the violation, and the time since when it holds. Times
+/// are on the world's clock.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reason {
     /// The kind of reason.
@@ -24,32 +25,33 @@ pub struct Reason {
     pub observed: Option<Rational>,
     /// The interval that is allowed.
     pub allowed: Option<Interval>,
-    /// The constraints or events behind that; the one it begins with comes first.
+    /// The constraints or events that caused it, the origin of the chain first.
     pub behind: Vec<Behind>,
-    /// By how much it was missed.
+    /// The amount of the violation.
     pub by: Option<Rational>,
-    /// Since when this has been so.
+    /// The time since when it holds.
     pub since: Option<Rational>,
-    /// The promise for the rest of the plan, if the executor makes promises.
+    /// The promise for the remaining plan, if the executor makes promises.
     pub promise: Option<Promise>,
 }
 
-/// The guarantee for the rest of a plan, the strongest first.
+/// Guarantee for the remaining plan, the strongest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Promise {
-    /// It works whatever the world does within the envelope.
+    /// The remaining plan works for all deviations within the envelope.
     Envelope,
-    /// It works whatever the world does within a part of the envelope around what is planned.
+    /// The remaining plan works for all deviations within a part of the envelope around the planned
+    /// values.
     PartOfEnvelope,
-    /// It works if what is still to begin takes as long as planned, however long it takes what is
-    /// under way to end.
+    /// The remaining plan works if all future actions take as long as planned, however long the
+    /// running actions take.
     Planned,
-    /// It can still work.
+    /// The remaining plan may still work.
     Luck,
 }
 
 impl Promise {
-    /// All of them, with the words by which traces name them.
+    /// All of them, with their names in traces.
     pub const NAMES: &[(Self, &str)] = &[
         (Self::Envelope, "envelope"),
         (Self::PartOfEnvelope, "part-of-envelope"),
@@ -57,7 +59,7 @@ impl Promise {
         (Self::Luck, "luck"),
     ];
 
-    /// The word by which traces name it.
+    /// Returns the name used in traces.
     pub fn name(self) -> &'static str {
         let found = Self::NAMES.iter().find(|(promise, _)| *promise == self);
         found.map_or("unknown", |(_, name)| name)
@@ -67,35 +69,35 @@ impl Promise {
 /// Kinds of [`Reason`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
-    /// All that comes before has happened, and the window is open.
+    /// All predecessors have been executed, and the window is open.
     Due,
-    /// Something must happen first.
+    /// An event must happen first.
     NothingDue,
     /// An observed quantity is not in its interval.
     OutsideInterval,
     /// A running action has not ended by the upper end of its interval.
     Outlived,
-    /// Too little time is left for something to happen.
+    /// Too little time is left for a time point.
     Unreachable,
-    /// A condition that is needed does not hold.
+    /// A required condition does not hold.
     Condition,
     /// An action failed.
     Failed,
-    /// An action was said to have ended in two ways.
+    /// Reports on the end of an action contradict each other.
     Contradiction,
-    /// Something else than believed was seen, and the plan does not work with it.
+    /// An observation differs from the belief, and the plan does not work with it.
     Surprise,
     /// An action has reached its time-out.
     Silence,
-    /// The rest of the plan is no longer guaranteed to work.
+    /// The remaining plan is no longer guaranteed to work.
     GuaranteeLost,
     /// No order of the plan's actions leads to the goal.
     NoOrder,
-    /// Another plan is likelier to succeed.
+    /// Another plan is more likely to succeed.
     Likelier,
     /// The guarantee has become weaker, and another plan may have a stronger one or more slack.
     MoreSlack,
-    /// The plan came too late to be started.
+    /// The plan was finished too late to be started.
     Late,
     /// The plan is done, but the goal is not reached.
     PlanDone,
@@ -114,7 +116,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All of them, with the words by which traces name them.
+    /// All of them, with their names in traces.
     pub const NAMES: &[(Self, &str)] = &[
         (Self::Due, "due"),
         (Self::NothingDue, "nothing-due"),
@@ -140,7 +142,7 @@ impl Cause {
         (Self::TooLate, "too-late"),
     ];
 
-    /// The word by which traces name it.
+    /// Returns the name used in traces.
     pub fn name(self) -> &'static str {
         let found = Self::NAMES.iter().find(|(cause, _)| *cause == self);
         found.map_or("unknown", |(_, name)| name)
@@ -148,7 +150,7 @@ impl Cause {
 }
 
 impl Reason {
-    /// A reason that says no more than its kind.
+    /// Creates a reason that contains only its kind.
     pub fn new(cause: Cause) -> Self {
         Self {
             cause,
@@ -163,21 +165,21 @@ impl Reason {
         }
     }
 
-    /// About which action.
+    /// Sets the action.
     #[must_use]
     pub fn of(mut self, action: &str) -> Self {
         self.action = Some(action.to_owned());
         self
     }
 
-    /// About what.
+    /// Sets the subject.
     #[must_use]
     pub fn about(mut self, about: About) -> Self {
         self.about = Some(about);
         self
     }
 
-    /// Since when.
+    /// Sets the time since when it holds.
     #[must_use]
     pub fn since(mut self, time: Rational) -> Self {
         self.since = Some(time);
@@ -206,7 +208,7 @@ impl fmt::Display for Reason {
         if let Some(since) = &self.since {
             write!(f, ", since {}", since.to_decimal(3))?;
         }
-        // What it is about explains nothing.
+        // The subject of the reason is not repeated as its explanation.
         let about = self.about.as_ref().map(ToString::to_string);
         let behind = self.behind.iter().map(ToString::to_string);
         let behind: Vec<String> = behind.filter(|it| about.as_ref() != Some(it)).collect();
@@ -218,7 +220,7 @@ impl fmt::Display for Reason {
 }
 
 impl Reason {
-    /// The reason without its numbers.
+    /// Returns the text without numbers.
     fn statement(&self) -> String {
         let action = self.action.as_deref().unwrap_or("the plan");
         let known = self.about.as_ref().map(ToString::to_string);
@@ -270,7 +272,7 @@ impl Reason {
     }
 }
 
-/// An interval with three digits.
+/// Formats an interval with three digits.
 fn short(interval: &Interval) -> String {
     let end = |value: Option<&Rational>, infinity: &str| match value {
         Some(value) => value.to_decimal(3),

@@ -1,4 +1,4 @@
-//! The record of a run: everything that came in and went out, in order.
+//! Record of a run: all inputs and outputs, in order.
 
 use elbowroom_model::{Situation, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -37,20 +37,20 @@ pub enum WarningCause {
     Timeout,
 }
 
-/// Takes the record of a run as it comes about.
+/// Receives the record of a run, entry by entry.
 pub trait Recorder: Send {
-    /// One entry. What is kept must be kept before this returns, so that a run that is cut short
-    /// leaves its record.
+    /// Records an entry. Persistent recorders must write the entry before this returns, so that the
+    /// record of an interrupted run is complete.
     fn record(&mut self, entry: &Entry<'_>);
 
-    /// The world is told now what was recorded since the last time, all commands of one decision. Whoever
-    /// promises that nothing is begun that is not on record sees to that here, once for all of them.
+    /// Called before the world receives the commands recorded since the last call, which are all
+    /// commands of one decision. Recorders that must record each command before it is executed
+    /// synchronise their storage here, once for all of them.
     fn commit(&mut self) {}
 
-    /// A lasting run takes up a plan, or rests with nothing under way, and could be gone on with from
-    /// what `stand` says, without what was recorded before: whoever wants to, may begin its record
-    /// anew here, and says whether it has. Asked whenever a plan is taken up, before that is recorded,
-    /// and as long as the run rests.
+    /// Offers to rotate the record. It is called when an executive adopts a plan, before that is
+    /// recorded, and while it is idle with no running action. The run can then be resumed from
+    /// `stand` alone, without the earlier record. Returns `true` if the recorder has rotated.
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
         let _ = stand;
         false
@@ -85,7 +85,7 @@ impl<R: Recorder + ?Sized> Recorder for Box<R> {
     }
 }
 
-/// Keeps nothing.
+/// Recorder that keeps nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoRecord;
 
@@ -93,52 +93,52 @@ impl Recorder for NoRecord {
     fn record(&mut self, _entry: &Entry<'_>) {}
 }
 
-/// One entry of a run's record. All times are the world's, except in plans, where it is said.
+/// One entry of a run's record. All times are on the world's clock unless stated otherwise.
 #[derive(Clone, Copy, Debug)]
 pub enum Entry<'a> {
-    /// A plan is taken up; its times are those of [`Mission::origin`].
+    /// A plan is adopted; its times are relative to [`Mission::origin`].
     Mission(&'a Mission),
-    /// The executor decided.
+    /// A decision of the executor.
     Decided {
         /// The time.
         now: &'a Rational,
         /// The decision and its reason.
         decided: &'a Decided,
     },
-    /// The world was given a command.
+    /// A command to the world.
     Command {
         /// The time.
         now: &'a Rational,
         /// The command.
         command: &'a Command,
-        /// When that was planned.
+        /// The planned window.
         planned: &'a Planned,
         /// The time-out of an action that is started; `None` if time-outs are off.
         timeout: Option<&'a Rational>,
     },
-    /// Time has passed, up to `now`, which `until` would have been the end of.
+    /// The answer to a wait: time has passed up to `now`.
     Passed {
-        /// Until when the world was asked to wait at most.
+        /// The end of the requested wait.
         until: &'a Rational,
         /// The present time.
         now: &'a Rational,
         /// The observations.
         observations: &'a [Observation],
     },
-    /// The observations made when the world was asked to look at the goal.
+    /// The observations from the [look](crate::World::look) at the goal.
     Looked {
         /// The time.
         now: &'a Rational,
         /// The observations.
         observations: &'a [Observation],
     },
-    /// An observation, and what was made of it.
+    /// An observation, and its interpretation.
     Taken {
         /// The time of the report.
         now: &'a Rational,
         /// The observation.
         observation: &'a Observation,
-        /// When that was planned.
+        /// The planned window.
         planned: &'a Planned,
         /// The objection, if the report was ignored or corrected.
         remark: Option<&'a str>,
@@ -149,24 +149,24 @@ pub enum Entry<'a> {
         now: &'a Rational,
         /// The reason.
         reason: &'a Reason,
-        /// From where.
+        /// The initial situation of the plan.
         situation: &'a Situation,
     },
-    /// A plan has been made, or not.
+    /// The answer of the planner.
     Planned {
-        /// The time, planning time included.
+        /// The time, including planning time.
         now: &'a Rational,
-        /// The time that it took, by the world's clock.
+        /// The planning time, on the world's clock.
         took: &'a Rational,
         /// The plan, on the task's clock.
         plan: Option<&'a TimeTriggeredPlan>,
-        /// Why there is none.
+        /// The reason for which there is none.
         why_not: Option<&'a str>,
-        /// Whether it is certain that there is none.
+        /// `true` if it is certain that there is none.
         is_unsolvable: bool,
-        /// Whether there is none because the planner has failed.
+        /// `true` if there is none because the planner has failed.
         has_failed: bool,
-        /// What the planner has to say about it.
+        /// The planner's remark.
         remark: Option<&'a str>,
         /// Known reasons for which the goals have no plan.
         shortfall: &'a Shortfall,
@@ -175,24 +175,26 @@ pub enum Entry<'a> {
     Warning {
         /// The time.
         now: &'a Rational,
-        /// Its start.
+        /// The ticket of its start.
         ticket: Ticket,
         /// Its name.
         action: &'a str,
-        /// When a new plan is needed, or when the action times out, if it has not ended.
+        /// The time at which a new plan is needed, or at which the action times out, unless it ends
+        /// before.
         until: &'a Rational,
         /// The cause of the warning.
         cause: WarningCause,
     },
-    /// The present plan continues: the goals have changed, and its rest reaches these, too; or it was given up, and no
-    /// other plan was found; or the one that was found is no better.
+    /// The present plan continues, for one of these reasons: the goals have changed and the
+    /// remaining plan also reaches the new ones; the plan was abandoned and no other one was found;
+    /// or the plan that was found is no better.
     Kept {
         /// The time.
         now: &'a Rational,
-        /// How the goals have changed, or why the plan was given up.
+        /// The change of the goals, or the reason for abandoning the plan.
         reason: &'a Reason,
     },
-    /// One of several goals of a lasting run is closed, set aside, or pursued again.
+    /// One of several goals of an executive is closed, set aside, or pursued again.
     Goal {
         /// The time.
         now: &'a Rational,
@@ -201,18 +203,18 @@ pub enum Entry<'a> {
         /// The change.
         change: GoalChange<'a>,
     },
-    /// A lasting run has nothing to do, or cannot do it, and waits for a change.
+    /// An executive is idle: it has nothing to do, or no plan, and waits for a change.
     Resting {
         /// The time.
         now: &'a Rational,
-        /// What came of the goals; `None` if there were none.
+        /// The verdict on the goals; `None` if there were none.
         verdict: Option<&'a Verdict>,
-        /// The goals by name: those that were reached, or else those that are open.
+        /// The names of the reached goals, or else of the open ones.
         goals: &'a [String],
-        /// What can never become true again, as in [`Report::dead_end`].
+        /// The parts of the goal that can never become true again, as in [`Report::dead_end`].
         dead_end: &'a [Reason],
     },
-    /// Somebody asked the run to end.
+    /// The end of the run was requested.
     Interrupted {
         /// The time.
         now: &'a Rational,

@@ -1,4 +1,4 @@
-//! What comes of each thing that can be done, tried out in samples of the world: a port.
+//! Port: rollouts of the possible choices in samples of the world.
 
 use std::collections::BTreeMap;
 
@@ -10,17 +10,19 @@ use crate::event::Ticket;
 use crate::executor::{Executor, Mission, News, StepId};
 use crate::progression::Progression;
 
-/// Knows what comes of going on with a plan, of handing it to another executor, of another plan
-/// and of waiting: how often each reaches the goal in samples of a world of which it knows the
-/// distributions and not what will happen.
+/// Compares the possible choices by rollouts: continuing the plan, handing it over to another
+/// executor, making another plan, and waiting. The value of a choice is the share of samples in
+/// which it reaches the goal. The samples are drawn from the distributions of a world; the future
+/// of the real world is not known.
 ///
-/// No clock is read and no dice are thrown that the scene does not determine: the same scene leads
-/// to the same answer.
+/// The result depends on the scene alone: no clock is read, and the random numbers are determined
+/// by the scene.
 pub trait Rehearsal: Send {
-    /// The facts whose changes are to be remembered for [`Scene::seen`].
+    /// Returns the facts whose changes are to be recorded for [`Scene::seen`].
     fn watched(&self, task: &Task) -> Vec<FactId>;
 
-    /// What is learnt of the world when an action goes as it should. By default everything may be.
+    /// Returns the events of a successful action that carry information about the world. By default
+    /// all do.
     fn tells(&self, action: &str) -> Tells {
         let _ = action;
         Tells {
@@ -29,79 +31,80 @@ pub trait Rehearsal: Send {
         }
     }
 
-    /// Whether anything is learnt of the world by time passing alone.
+    /// Returns `true` if the passage of time alone carries information about the world.
     fn tells_by_itself(&self) -> bool {
         true
     }
 
-    /// What does best from here.
+    /// Returns the best choice in this scene.
     fn rehearse(&mut self, scene: &Scene<'_>) -> Rehearsed;
 }
 
-/// What is learnt when an action goes as it should.
+/// Events of a successful action that carry information.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tells {
-    /// Whether anything is by its being still under way: it might have ended, or failed.
+    /// `true` if its continued execution does: it could have ended or failed.
     pub by_lasting: bool,
-    /// Whether anything is by its end, or by what it has changed.
+    /// `true` if its end does, or its effects.
     pub by_ending: bool,
 }
 
-/// A moment of a run at which all that was told to start has started.
+/// A moment of a run at which all commanded actions have started.
 pub struct Scene<'a> {
-    /// What is believed; its time is the present.
+    /// The believed state, at the present time.
     pub belief: &'a Progression,
-    /// The changes so far of the facts that are watched.
+    /// Changes of the [watched](Rehearsal::watched) facts until now.
     pub seen: &'a [SeenChange],
-    /// Who executes the plan, before it is told of the news.
+    /// The present executor, before it receives the news.
     pub present: &'a dyn Executor,
-    /// The news, and its steps that are under way.
+    /// The news for that executor.
     pub news: &'a [News],
-    /// See there.
+    /// The tickets of its running steps.
     pub running: &'a BTreeMap<StepId, Ticket>,
-    /// Whether it gives the plan up now.
+    /// `true` if that executor abandons the plan now.
     pub is_given_up: bool,
-    /// Whether the plan was taken up just now.
+    /// `true` if the plan was adopted just now.
     pub is_new: bool,
-    /// What of the plan was not begun, by the world's clock.
+    /// The steps of the plan that have not begun, on the world's clock.
     pub left: &'a [Step],
-    /// How many new plans there have been.
+    /// Number of new plans so far.
     pub replans: usize,
 }
 
-/// A change of a fact that was seen.
+/// An observed change of a fact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeenChange {
-    /// When it was seen.
+    /// The time of the observation.
     pub time: Rational,
-    /// Of which fact.
+    /// The fact.
     pub fact: FactId,
-    /// What it is from then on.
+    /// The truth of the fact after the change.
     pub truth: bool,
-    /// Whether the world has made it by itself.
+    /// `true` if the change was spontaneous.
     pub is_by_itself: bool,
 }
 
-/// What does best, and how well.
+/// The best choice, with its value.
 pub struct Rehearsed {
-    /// What to do.
+    /// The choice.
     pub choice: Rehearsing,
-    /// The share of samples in which the goal is reached by it.
+    /// The share of samples where the choice reaches the goal.
     pub value: Rational,
-    /// The same of what would be done without any choice.
+    /// The share of samples in which the decision of the present executor reaches the goal.
     pub present: Rational,
-    /// Whether nothing else was tried out, because going on reaches the goal in next to all samples.
+    /// `true` if no alternatives were tried, because continuing reaches the goal in almost all
+    /// samples.
     pub is_fine: bool,
 }
 
-/// Something that can be done with a plan.
+/// A choice for a plan.
 pub enum Rehearsing {
-    /// What its executor says: to go on, or to give it up.
+    /// The decision of its executor is carried out: it continues or abandons the plan.
     AsDecided,
-    /// Another executor takes up what is left of it.
+    /// Another executor adopts the remaining plan.
     HandsOver(Box<dyn Executor>, Box<Mission>),
     /// Another plan is made.
     Replans,
-    /// Nothing is begun until then.
+    /// Nothing is started until then.
     WaitsUntil(Rational),
 }

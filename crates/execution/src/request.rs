@@ -20,10 +20,10 @@ pub struct RequestId(pub u64);
 pub enum Urgency {
     /// The run waits for the answer.
     Awaited,
-    /// The run continues without the answer, and takes it in whenever it arrives.
+    /// The run continues without the answer, and processes it when it arrives.
     Background,
-    /// The run expects to request the same later, and takes in no answer to this request. A worker that plans in the
-    /// background can begin now.
+    /// The run expects to make the same request later, and ignores answers to this one. A worker
+    /// that plans in the background can begin now.
     Foreseen,
 }
 
@@ -34,7 +34,7 @@ pub struct PlanRequest {
     pub id: RequestId,
     /// The task, with the goals of the plan.
     pub task: Arc<Task>,
-    /// The situation in which the plan begins.
+    /// The initial situation of the plan.
     pub situation: Situation,
     /// When the answer is needed.
     pub urgency: Urgency,
@@ -55,7 +55,7 @@ pub struct PrepareRequest {
     pub task: Arc<Task>,
     /// The plan, on the world's clock.
     pub plan: TimeTriggeredPlan,
-    /// The situation in which the plan begins.
+    /// The initial situation of the plan.
     pub situation: Situation,
     /// The tickets of the actions that are running there, in its order.
     pub running: Vec<Ticket>,
@@ -169,8 +169,8 @@ impl<W: Workers + ?Sized> Workers for Box<W> {
 
 /// Workers made of a planner and a preparer.
 ///
-/// Ports that work in the background ([`Planner::begin`], [`Preparer::begin`]) report by
-/// [`Event::PlanMade`] and [`Event::PlanReady`] of the world that there is an answer.
+/// Ports that work in the background ([`Planner::begin`], [`Preparer::begin`]) announce their
+/// answers by [`Event::PlanMade`] and [`Event::PlanReady`] in the world's observations.
 pub struct PortWorkers<'a> {
     planner: Box<dyn Planner + 'a>,
     preparer: Box<dyn Preparer + 'a>,
@@ -191,7 +191,7 @@ impl<'a> PortWorkers<'a> {
         }
     }
 
-    /// Takes the answer that a port says is there.
+    /// Collects the answer that a port has announced.
     fn collect(&mut self, event: &Event) {
         match event {
             Event::PlanMade => self.answers.extend(self.planning.take().map(|it| {

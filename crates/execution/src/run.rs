@@ -1,74 +1,78 @@
-//! A run: a plan is executed in a world, watched, and replaced when it no longer works.
+//! Execution of a plan in a world, with monitoring and replanning.
 //!
-//! A [`Run`] is a state machine. [`Run::next`] returns its next request to the driver. Requests to the world are
-//! commands, waits and looks: [`Run::observe`] and [`Run::see`] take the answers. Other requests are for plans, and for
-//! plans prepared for the executor: [`Run::planned`] and [`Run::prepared`] take these answers, at once or while the run
-//! continues. The driver implements waiting and planning, as an event loop or otherwise. [`Run::go`] is the loop for a
-//! [`World`] that blocks, with [`Workers`] that plan and prepare.
+//! A [`Run`] is a state machine. [`Run::next`] returns its next request to the driver. Requests to
+//! the world are commands, waits and looks: [`Run::observe`] and [`Run::see`] take the answers.
+//! Other requests are for plans, and for plans prepared for the executor: [`Run::planned`] and
+//! [`Run::prepared`] take these answers, at once or while the run continues. The driver implements
+//! waiting and planning, as an event loop or otherwise. [`Run::go`] is the loop for a [`World`]
+//! that blocks, with [`Workers`] that plan and prepare.
 //!
-//! What happens when reports are wrong is defined here, so that no executor needs to know:
+//! The run handles incorrect reports, so executors do not have to:
 //!
-//! | report | what is made of it |
+//! | report | handling |
 //! | --- | --- |
-//! | a second `Started` or an equal second `Ended` | nothing |
-//! | `Ended` without `Started` | the action is taken to have started when it was told to |
-//! | `Ended` after another, different `Ended` | a contradiction: what the action's end writes counts as unknown until it is seen, and the plan is given up |
-//! | a report on a ticket that was never given out | nothing |
-//! | a report on an action of an earlier plan | the state follows it; the present plan is told what it changed |
-//! | a success after a cancel | the success counts: the action was faster |
-//! | a report with a time in the future, or before the action's start | its time is taken as the nearest possible one |
-//! | a report that comes late | it counts from its own time on for durations, from its arrival on for the state |
-//! | a refusal, again and again, and nothing else | plans beside the run are asked for later and later ([`Refusals`]) |
-//! | feedback | if more is done than before, the time-out counts from then on |
-//! | a report that cannot be understood, or names what the problem does not have | nothing; the record has it |
-//! | answers without end while the clock stands still, or creeps | the world is broken ([`Verdict::WorldFailed`]) |
-//! | no report at all | a warning ([`Entry::Warning`]), and at its time-out ([`TimeoutRule`]) the action is cancelled and counts as failed. Where the slack of running actions is watched ([`RunSettings::watches_room`]), so is an action that no plan tolerates any longer |
-//! | a fact or value other than believed | believed; the executor is told, and plays the rest of its plan through |
+//! | a second `Started` or an equal second `Ended` | ignored |
+//! | `Ended` without `Started` | the action is assumed to have started when it was commanded |
+//! | `Ended` after another, different `Ended` | a contradiction: the effects of the action's end are in doubt until they are observed, and the plan is abandoned |
+//! | a report on a ticket that was never issued | ignored |
+//! | a report on an action of an earlier plan | updates the state; the executor is notified of the changes |
+//! | a success after a cancellation | the success counts: the action ended before the cancellation |
+//! | a report with a time in the future, or before the action's start | its time is replaced by the nearest possible one |
+//! | a late report | its own time counts for durations, its arrival for the state |
+//! | repeated refusals, and nothing else | background plans are requested at growing intervals ([`Refusals`]) |
+//! | feedback | if the completion has grown, the time-out counts from then on |
+//! | a report that cannot be read, or names an object that the problem does not have | recorded and ignored |
+//! | endless answers while the clock stands still or hardly advances | the world is broken ([`Verdict::WorldFailed`]) |
+//! | no report at all | a warning ([`Entry::Warning`]), and at its time-out ([`TimeoutRule`]) the action is cancelled and counts as failed. If the slack of running actions is monitored ([`RunSettings::watches_room`]), the same applies to an action whose delay no plan tolerates any more |
+//! | a fact or value other than believed | believed; the executor is notified, and simulates the remaining plan |
 //!
-//! A run may also outlast its goal ([`Run::lasting`]): goals are given and abandoned while it goes
-//! on, and it can be paused.
+//! A run can also continue after its goal is reached ([`Run::lasting`]): goals are added and
+//! abandoned while it runs, and it can be paused.
 //!
-//! Where plans are made beside the run ([`RunSettings::plans_aside`]), it goes on meanwhile:
+//! With background planning ([`RunSettings::plans_aside`]), execution continues during a search:
 //!
 //! | a plan is needed because | until it is there |
 //! | --- | --- |
-//! | goals were given or abandoned | the present plan goes on. The new one is made for where this will have led when planning is expected to be over; what is begun until then is committed |
-//! | the present plan works no more, or there is none | nothing is started; what is under way goes on, and is followed |
+//! | goals were added or abandoned | the present plan continues. The new plan starts from the state that is expected when planning ends; actions that start until then are committed |
+//! | the present plan is infeasible, or there is none | nothing is started; running actions continue and are monitored |
 //!
-//! A new plan takes over when what was committed has begun, at the latest when planning was expected
-//! to be over: with what has been done meanwhile left out, as much later as it is late, if the judge
-//! finds that this works from there. If not, it is *outdated*, and another one is made: during the
-//! second search in a row the present plan goes on only until that is expected to be over, and during
-//! further ones nothing is started. Each outdated plan counts as a new plan
-//! ([`RunSettings::most_replans`]). Goals that are given during a search wait for its end; one that is
-//! abandoned ends it at once, three times in a row. The next search is let go on for a while, which
-//! becomes longer each time that it is over before there is a plan: neither a search without end nor
-//! somebody who keeps changing goals keeps the run from acting.
+//! A new plan takes over when the committed actions have begun, at the latest when planning was
+//! expected to end. Steps that were executed meanwhile are removed from it, and it is shifted by
+//! its delay. If the validator rejects the result, the plan is *outdated*, and another one is made.
+//! During the second search in a row, the present plan continues only until that search is expected
+//! to end; during further searches, nothing is started. Each outdated plan counts as a new plan
+//! ([`RunSettings::most_replans`]).
 //!
-//! Where the present plan leads is reckoned with its network: what is late takes a quarter longer than
-//! it has taken, what waits for that is as late, and what could not be started then is not expected.
-//! When a plan will be needed because something is late ([`RunSettings::watches_room`]), the planner is
-//! told so ahead, from where everything else has started and ended as planned; and anew where things
-//! come otherwise.
+//! Goals that are added during a search wait for its end. When a goal is abandoned, the search ends
+//! at once, three times in a row. The next search may then continue for a limited time, which grows
+//! each time that it passes before there is a plan. So neither an endless search nor frequent
+//! changes of goals block the run.
 //!
-//! Plans can also be made ready beside the run ([`RunSettings::readies_aside`]). Then a new plan is
-//! made to fit as soon as it is there, with what was committed and has not begun in it, and is made
-//! ready from there. It takes over as soon as it is ready, and its executor is told what has begun and
-//! ended since:
+//! The expected state is computed with the network of the present plan: an overdue action is
+//! assumed to take a quarter longer than it has taken so far, its successors are delayed
+//! accordingly, and actions that could not be started are left out. If a delay will make a new plan
+//! necessary ([`RunSettings::watches_room`]), the planner is notified in advance, of the situation
+//! in which everything else has started and ended as planned. It is notified again when events
+//! deviate from that.
 //!
-//! | until it is ready | |
+//! Plans can also be prepared in the background ([`RunSettings::readies_aside`]). Then a new plan
+//! is fitted to the present situation as soon as it exists, including committed actions that have
+//! not begun, and is prepared for that situation. It takes over as soon as it is prepared, and its
+//! executor is notified of the starts and ends since then:
+//!
+//! | until it is prepared | |
 //! | --- | --- |
-//! | the present plan begins something that the new one has, too, after nothing that disturbs it | it is part of the new plan |
-//! | it would begin anything else | nothing is started any more |
-//! | something unexpected is reported: a failure, silence, another fact or value, an amount | the plan is made to fit again from there, twice at most, and nothing is started any more; after that the executor is told, and finds whether the plan can bear it |
+//! | the present plan starts an action that the new plan also has, and no earlier step of the new plan interferes with it | the action becomes part of the new plan |
+//! | the present plan would start anything else | nothing is started any more |
+//! | an unexpected report: a failure, silence, another fact or value, an amount | the plan is fitted again from there, at most twice, and nothing is started any more; after that, the executor is notified, and decides whether the plan is still feasible |
 //!
-//! The rest of the running plan for goals that were added is made ready in the same way.
+//! If the remaining plan is kept for added goals, it is prepared in the same way.
 //!
-//! However a run ends, nothing is left running: what has not ended is cancelled, and has
-//! [`FAREWELL`] to stop. Only a world that can no longer be reached receives no commands.
+//! At the end of a run, running actions are cancelled and have [`FAREWELL`] seconds to stop. Only a
+//! world that cannot be reached any more receives no commands.
 //!
-//! The goal is not taken as reached while anything is under way or in doubt, not before the last
-//! timed initial that changes what it reads, and not before the world has had a chance to look
+//! The goal counts as reached only when no action is running, nothing is in doubt, the last timed
+//! initial that affects the goal has happened, and the world has had the chance to look
 //! ([`World::look`]).
 
 mod account;
@@ -137,7 +141,7 @@ use pending::Pending;
 use progress::Progress;
 use search::{Lost, Search};
 
-/// Work that is counted for a decision, and for each step of the plan in it, in units of [`elbowroom_num::work`].
+/// Work units ([`elbowroom_num::work`]) of a decision, and of each step of the plan in it.
 const DECISION_WORK: u64 = 10_000;
 const STEP_WORK: u64 = 250;
 
@@ -149,7 +153,7 @@ pub struct Ports<'a> {
     pub recorder: Box<dyn Recorder + 'a>,
 }
 
-/// A plan being executed.
+/// Execution of a plan.
 pub struct Run<'a> {
     task: Arc<Task>,
     ports: Ports<'a>,
@@ -157,67 +161,67 @@ pub struct Run<'a> {
     now: Rational,
     progress: Progress,
     belief: Progression,
-    /// The actions that were started, and how they ended.
+    /// The starts, and their outcomes.
     account: Account,
-    /// How many steps the present plan has.
+    /// Number of steps of the present plan.
     steps: usize,
     news: Vec<News>,
     replans: usize,
     reasons: Vec<Reason>,
     /// The expected planning time.
     allowance: Rational,
-    /// The task with its goals, the situation and the guess of the last request that was answered by a plan while the
-    /// run waited.
+    /// The task with its goals, the situation and the guess of the last awaited request whose
+    /// answer was a plan.
     planned_for: Option<(Arc<Task>, Situation, here::Guess)>,
-    /// All that was observed and believed, in order.
+    /// All believed observations, in order.
     history: Vec<Happened>,
-    /// Asked whether to end.
+    /// Returns `true` if the run is to end.
     is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
-    /// Where a plan will be needed if what is late does not end, as the planner was told.
+    /// The situation of the next plan if a late action does not end, as reported to the planner.
     foreseen: Option<Foreseen>,
-    /// What was believed before the first event of the history.
+    /// The belief before the first event of the history.
     beginning: Progression,
-    /// Told what is believed, whenever something was taken in.
+    /// Receives the belief whenever reports were processed.
     listener: Box<dyn FnMut(&Progression) + Send + 'a>,
-    /// What a run needs that goes on when its goal is reached.
+    /// State of an executive, or of an attended run.
     lasting: Option<Lasting<'a>>,
-    /// The tasks before the executor is asked again; the next one is last.
+    /// The tasks before the next decision; the last one is next.
     agenda: Vec<Todo>,
-    /// The question that has not been answered.
+    /// The open question to the driver.
     asked: Option<Next>,
     /// Requests for the driver without an awaited answer.
     outbox: VecDeque<Next>,
     /// Number of requests for plans and prepared plans so far.
     requests: u64,
-    /// Continuation at the answer for which the run waits.
+    /// Continuation of the run when the awaited answer arrives.
     pending: Option<Pending>,
-    /// The plan that is made beside the run.
+    /// The background search for a plan.
     search: Option<Search>,
-    /// The task with the goals that the present plan is for, while plans are made beside the run.
+    /// The task with the goals of the present plan, with background planning.
     plan_task: Option<Arc<Task>>,
-    /// What became of earlier searches, while plans are made beside the run.
+    /// Results of earlier background searches.
     lost: Lost,
-    /// What the world has refused since anything else has happened.
+    /// Actions refused by the world since the last other event.
     refusals: Refusals,
-    /// How the run ends, while what is running is told to stop.
+    /// The end of the run, while running actions are being cancelled.
     closing: Option<Closing>,
     /// The report, once the run is over.
     report: Option<Report>,
-    /// How often it goes on after it was over.
+    /// Number of times that the run continues after it was over.
     reopenings: usize,
 }
 
-/// Why the plan is not gone on with.
+/// Reason to stop following the plan.
 enum Stop {
     Over(Verdict),
     World(WorldError),
 }
 
-/// Executes a plan in a world, or, without a plan, first makes one.
+/// Executes a plan in a world. Without a plan, makes one first.
 ///
-/// Always returns if the ports do: the run has an end ([`RunSettings::time_limit`]), and a world
-/// whose clock does not come forward to it is broken ([`Verdict::WorldFailed`]).
+/// Always returns if the ports do: the run has a time limit ([`RunSettings::time_limit`]), and a
+/// world whose clock does not reach it is broken ([`Verdict::WorldFailed`]).
 pub fn run(
     task: Arc<Task>,
     first: Option<&TimeTriggeredPlan>,
@@ -230,7 +234,7 @@ pub fn run(
 }
 
 impl<'a> Run<'a> {
-    /// A run that has not begun, of this plan; without one, a plan is made first.
+    /// Creates a run of this plan; without one, the run makes a plan first.
     pub fn new(
         task: Arc<Task>,
         first: Option<TimeTriggeredPlan>,
@@ -278,8 +282,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The same run, which ends in order as soon as `is_to_end` says so: what runs is cancelled,
-    /// and there is a whole report. It is asked before each decision, and after each answer of the
+    /// Makes the run end as soon as `is_to_end` returns `true`: running actions are cancelled, and
+    /// the report is complete. It is called before each decision, and after each answer of the
     /// world and of the planner.
     #[must_use]
     pub fn ending_when(mut self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
@@ -287,17 +291,17 @@ impl<'a> Run<'a> {
         self
     }
 
-    /// The same run, which says, where no plan reaches the goal any more, what can never become
-    /// true again and since when ([`Report::dead_end`]). That takes some grounding by reachability,
-    /// each about as long as the embedded planner's.
+    /// Makes the run explain why no plan reaches the goal any more: the parts of the goal that can
+    /// never become true again, and since when ([`Report::dead_end`]). That takes several
+    /// groundings by reachability, each about as long as the embedded planner's.
     #[must_use]
     pub fn explaining(mut self) -> Self {
         self.is_explaining = true;
         self
     }
 
-    /// The same run, which tells `listener` what it believes, at its beginning and whenever it has
-    /// taken in what the world reported. Decisions wait for that.
+    /// Passes the belief to `listener`, at the beginning and whenever reports of the world were
+    /// processed. Decisions wait for the listener.
     #[must_use]
     pub fn told_to(mut self, mut listener: impl FnMut(&Progression) + Send + 'a) -> Self {
         listener(&self.belief);
@@ -321,7 +325,7 @@ impl<'a> Run<'a> {
         decided
     }
 
-    /// One decision; what follows from it goes onto the agenda.
+    /// Makes a decision, and adds its consequences to the agenda.
     fn decide_and_follow(&mut self) -> Result<(), Stop> {
         self.heed()?;
         self.close_momentary_goals();
@@ -338,11 +342,11 @@ impl<'a> Run<'a> {
             self.give_up_optional_search();
         }
         match decided.decision {
-            // What is begun now, the plan that is being made ready could not go on with.
+            // The plan that is being prepared could not continue these actions.
             Decision::Start(orders) if !self.may_start(&orders) => self.let_go_of_plan(),
             Decision::Start(orders) => {
-                // What starts at once is told at once, and must be known before anything else is
-                // decided.
+                // Immediate starts are reported at once, and must be known before the next
+                // decision.
                 self.agenda.push(Todo::Pass(self.now.clone()));
                 self.start(orders);
             }
@@ -358,7 +362,7 @@ impl<'a> Run<'a> {
                 self.note_abandoned(&decided.reason);
                 self.replan(&decided.reason)?;
             }
-            // The plan has done what it was made for, and another one is in the making.
+            // The plan has reached its goals, and another one is being made.
             Decision::GoalReached if self.search.is_some() => self.let_go_of_plan(),
             Decision::GoalReached => match self.belief.outlook() {
                 Outlook::Awaited(time) => self.wait(Some(self.moment_until(time)))?,
@@ -368,7 +372,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Records that actions start; the world is told before anything else is done.
+    /// Records the starts of actions. The world receives the commands before anything else is done.
     fn start(&mut self, orders: Vec<Order>) {
         let mut commands = Vec::with_capacity(orders.len());
         for order in orders {
@@ -391,7 +395,8 @@ impl<'a> Run<'a> {
         self.send(commands);
     }
 
-    /// The same for actions that are cancelled.
+    /// Records the cancellation of actions. The world receives the commands before anything else is
+    /// done.
     pub(crate) fn cancel(&mut self, tickets: Vec<Ticket>) {
         let mut commands = Vec::with_capacity(tickets.len());
         for ticket in tickets {
@@ -408,7 +413,7 @@ impl<'a> Run<'a> {
         self.send(commands);
     }
 
-    /// Has the world told these, which are on record.
+    /// Sends recorded commands to the world.
     fn send(&mut self, commands: Vec<Command>) {
         self.ports.recorder.commit();
         self.agenda
@@ -418,7 +423,7 @@ impl<'a> Run<'a> {
     /// Waits until the executor's next decision time, or until a warning or a time-out is due.
     fn wait(&mut self, until: Option<Rational>) -> Result<(), Stop> {
         let timeout = self.next_timeout();
-        // More of what happens now may still come in; if not, some condition has failed.
+        // More reports on the present moment may arrive; if none do, a condition has failed.
         let breaking = self.belief.is_breaking();
         let breaking = breaking.then(|| &self.now + self.task.epsilon());
         let warning = self.warn();
@@ -435,7 +440,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// The executor takes the goal for reached. The world may look; then it is, or it is not.
+    /// Requests a look at the goal, which the executor considers reached. The world's answer
+    /// decides.
     fn goal_reached(&mut self) {
         let task = self.belief.task();
         let mut footprint = Footprint::of_condition(task, task.goal());
@@ -449,23 +455,23 @@ impl<'a> Run<'a> {
         self.needs_no_plan() == Some(Outlook::Reached)
     }
 
-    /// Whether the goal is reached, or will be, without any more doing.
+    /// Returns the outlook if the goal holds, or will hold, without further actions.
     fn needs_no_plan(&self) -> Option<Outlook> {
         let is_idle = self.account.open_tickets().next().is_none();
         let outlook = is_idle.then(|| self.belief.outlook());
         outlook.filter(|outlook| *outlook != Outlook::Unmet)
     }
 
-    /// Returns the next time at which timed initials may achieve a goal, which is `time` if all goals are to stay true: one
-    /// with a deadline may hold for a moment before.
+    /// Returns the next time at which timed initials may achieve a goal. If all goals must stay
+    /// true, that is `time`; a goal with a deadline may already be achieved for a moment before.
     fn moment_until(&self, time: Rational) -> Rational {
         let next = self.belief.next_timed().cloned();
         let next = next.filter(|_| self.next_deadline_of_a_goal().is_some());
         next.unwrap_or(time)
     }
 
-    /// What to do instead of planning, if no plan is needed: take the goal for reached, or wait for
-    /// the timed initials that it depends on, and ask again.
+    /// If no plan is needed, accepts the goal as reached, or waits for the timed initials that it
+    /// depends on and then checks again. Returns `false` if a plan is needed.
     fn go_without_plan(&mut self, reason: &Reason) -> bool {
         match self.needs_no_plan() {
             None | Some(Outlook::Unmet) => return false,
@@ -480,9 +486,9 @@ impl<'a> Run<'a> {
         true
     }
 
-    /// Plans from here; see [`RunningRule`] for what becomes of what is running.
+    /// Requests a plan from the present situation; see [`RunningRule`] for the running actions.
     fn replan(&mut self, reason: &Reason) -> Result<(), Stop> {
-        // What deviated may have been the last thing to do.
+        // The deviation may have been the end of the last step.
         if self.go_without_plan(reason) || self.has_patience(reason) {
             return Ok(());
         }
@@ -495,7 +501,7 @@ impl<'a> Run<'a> {
                 if overdue.is_empty() || self.settings.most_replans == 0 {
                     return self.carry_on_or_stop(Verdict::ReplanLimit);
                 }
-                // Their ends may reach the goal.
+                // Their ends may achieve the goal.
                 self.reasons.pop();
                 self.agenda.push(Todo::Replan(reason.clone()));
                 let doubts = self.belief.doubt_count();
@@ -506,7 +512,7 @@ impl<'a> Run<'a> {
         self.lost.plan = true;
         self.agenda.push(Todo::Plan(reason.clone()));
         if self.replans == self.settings.most_replans {
-            // The last plan is not spent on expecting overdue actions to take longer still.
+            // The last permitted plan is not requested while overdue actions are running.
             let overdue = self.longer_than_planned();
             let doubts = self.belief.doubt_count();
             self.agenda.push(Todo::Linger(overdue, doubts));

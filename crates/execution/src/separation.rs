@@ -1,4 +1,4 @@
-//! The least separation of happenings that interfere, for executors whose networks do not order them.
+//! Minimum separation of interfering happenings, for executors whose networks do not order them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,12 +10,14 @@ use elbowroom_probability::Likelihoods;
 
 /// Recent and expected happenings, on the plan's clock.
 ///
-/// An executor that knows only orderings starts an action as soon as possible. [`separated`](Self::separated)
-/// delays it until neither its start nor its planned end is less than ε from something that interferes.
+/// An executor that knows only orderings starts an action as soon as possible.
+/// [`separated`](Self::separated) delays the start until neither it nor the planned end is less
+/// than ε from an interfering happening.
 #[derive(Clone, Debug)]
 pub(crate) struct Separation {
     epsilon: Rational,
-    /// Changes of the last ε, each with the first time at which something that interferes may happen.
+    /// Changes of the last ε, each with the first time at which an interfering happening is
+    /// permitted.
     recent: Vec<(Footprint, Rational)>,
     /// The planned ends of running actions, by a number that the executor chooses.
     expected: BTreeMap<u32, Expected>,
@@ -36,7 +38,7 @@ struct Expected {
 }
 
 impl Separation {
-    /// Creates it for a plan whose clock reads 0 at `origin`.
+    /// Creates the separation for a plan whose clock reads 0 at `origin`.
     pub(crate) fn new(task: &Task, origin: &Rational) -> Self {
         let timed = task.timed().iter();
         let timed = timed.map(|it| (Footprint::of_timed(it), &it.time - origin));
@@ -55,12 +57,12 @@ impl Separation {
         self
     }
 
-    /// Notes a change at `time`.
+    /// Records a change at `time`.
     pub(crate) fn note(&mut self, change: Footprint, time: &Rational) {
         self.recent.push((change, time + &self.epsilon));
     }
 
-    /// Notes that an action starts at `time` and is expected to take `duration`.
+    /// Records that an action starts at `time` and is expected to take `duration`.
     pub(crate) fn start(
         &mut self,
         number: u32,
@@ -74,7 +76,7 @@ impl Separation {
         }
     }
 
-    /// Notes that a running action is expected to end at `end`.
+    /// Records that a running action is expected to end at `end`.
     pub(crate) fn expect(&mut self, number: u32, (task, action): (&Task, &Action), end: Rational) {
         let expected = Expected {
             time: end,
@@ -84,8 +86,8 @@ impl Separation {
         self.expected.insert(number, expected);
     }
 
-    /// Notes that an action has ended at `time`; `succeeded` if its end effects took place. The changes of a failure are
-    /// noted when they are reported.
+    /// Records that an action has ended at `time`; `succeeded` if its end effects took place. The
+    /// changes of a failure are recorded when they are reported.
     pub(crate) fn end(&mut self, number: u32, succeeded: bool, time: &Rational) {
         let ended = self.expected.remove(&number);
         if let Some(ended) = ended.filter(|_| succeeded) {
@@ -103,7 +105,8 @@ impl Separation {
         footprint
     }
 
-    /// Returns a time after `now` before which the action must not start, or `None` if it may start now.
+    /// Returns the time after `now` until which the action has to wait, or `None` if it may start
+    /// now.
     pub(crate) fn separated(
         &mut self,
         (task, action): (&Task, &Action),
@@ -124,7 +127,7 @@ impl Separation {
         recent.chain(soon).chain(ends).max()
     }
 
-    /// Returns, for each expected happening that interferes and is less than ε from `time`, the first time that is
+    /// Returns, for each interfering happening less than ε from `time`, the first time that is
     /// separated from it.
     fn near<'s>(
         &'s self,

@@ -1,40 +1,40 @@
-//! Where plans are executed: a port.
+//! Port: worlds that execute plans.
 
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
 
 use crate::event::{Command, Observation};
 
-/// A world in which actions are started and things are observed: a simulation, a robot, a stored
-/// trace.
+/// A world that executes actions and reports observations: a simulation, a robot, a stored trace.
 ///
 /// The contract:
 ///
-/// - Each [`Command::Start`] is answered by a `Started`, and, if it takes time, later by one
-///   `Ended`. An instantaneous action is answered by `Started` alone, or by `Ended` with a failure.
-/// - A start that is refused is an `Ended` with a failure, at once.
+/// - Each [`Command::Start`] is answered by a `Started` and, if the action has a duration, later by
+///   one `Ended`. An instantaneous action is answered by `Started` alone, or by `Ended` with a
+///   failure.
+/// - A start that is refused is answered by an `Ended` with a failure, at once.
 /// - Each [`Command::Cancel`] of a running action is answered by an `Ended`; if the action had
 ///   ended before the command came, that `Ended` is the answer.
-/// - Time never goes back, and it goes on: a wait in which nothing happens ends at the time that
-///   was asked for. Many answers without time passing are the sign of a broken world.
+/// - Time advances and never goes back: a wait without events ends at the requested time. Many
+///   answers without progress of time indicate a broken world.
 ///
-/// Worlds break contracts. What happens then is defined in [`Run`](crate::run::Run): nothing
-/// hangs, and no report is believed twice.
+/// Worlds can violate the contract. The handling is defined in [`Run`](crate::run::Run): the run
+/// never hangs, and no report is processed twice.
 pub trait World: Send {
-    /// Gives a command. Returns at once; what comes of it is observed later.
+    /// Sends a command. Returns at once; the outcome is observed later.
     ///
     /// # Errors
-    /// When the world is gone, or does not understand.
+    /// If the world is gone, or does not understand the command.
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError>;
 
-    /// Lets time pass until something is observed, but not beyond `until`.
+    /// Waits until an event is observed, or until `until`.
     ///
     /// # Errors
-    /// When the world is gone, or says what cannot be understood.
+    /// If the world is gone, or its answer cannot be read.
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError>;
 
-    /// Looks at facts and fluents on purpose, before the goal is taken as reached. A world that
-    /// cannot look, says nothing.
+    /// Looks at facts and fluents, before the goal is accepted as reached. A world that cannot look
+    /// returns no observations.
     ///
     /// # Errors
     /// As [`World::wait`].
@@ -47,12 +47,12 @@ pub trait World: Send {
     }
 }
 
-/// Time that has passed.
+/// Answer to a wait.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Passage {
     /// The present time.
     pub now: Rational,
-    /// The observations since the last call, in the order in which they were reported.
+    /// The observations since the last call, in the order of their reports.
     pub observations: Vec<Observation>,
 }
 

@@ -3,9 +3,11 @@
 use elbowroom::execution::{Passage, Ticket, World, WorldError};
 use elbowroom::num::Rational;
 
-/// World that is an object in the process of its executive, instead of a simulation or a process of its own.
+/// World that is an object in the process of its executive, instead of a simulation or a process of
+/// its own.
 ///
-/// After a crash, a new object takes its place. It is asked for the outcome of the actions that were running.
+/// After a crash, a new object takes its place and reports the outcomes of the actions that were
+/// running.
 pub trait EmbeddedWorld: World {
     /// Returns the present time, and `started` or `ended` for each of these actions whose outcome is known. Called once,
     /// before anything else, when a run is resumed from its journal. `now` is the time of the last record.

@@ -11,7 +11,7 @@ pub struct Error {
 }
 
 impl Error {
-    /// Creates an error. `message` names the object and what is wrong with it, in lower case; `advice` says
+    /// Creates an error. `message` names the object and the problem, in lower case; `advice` says
     /// what the user can do, and may be empty.
     pub fn new(message: impl fmt::Display, advice: impl fmt::Display) -> Self {
         Self {

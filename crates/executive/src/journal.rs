@@ -44,7 +44,7 @@ pub struct JournalFile {
     length: u64,
     /// Rotation settings; `None` for a journal that is not rotated.
     segments: Option<Segments>,
-    /// Length from which the next rotation is attempted, in bytes.
+    /// Minimum length at the next rotation, in bytes.
     least: u64,
     warnings: WarningSink,
 }

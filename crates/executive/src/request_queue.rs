@@ -13,7 +13,7 @@ use crate::clock::Clock;
 /// Limit on pending requests.
 const MOST_PENDING: usize = 1000;
 
-/// Answer time of the world from which the state reports it as unanswered.
+/// Answer time of the world after which the state reports it as unanswered.
 const SILENCE_THRESHOLD: Duration = Duration::from_secs(1);
 
 /// Request or observation from outside the run. Facts and fluents are names. They are resolved when the run

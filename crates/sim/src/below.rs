@@ -1,15 +1,14 @@
-//! How likely what a world draws is to be less than something: the same rules as for drawing it,
-//! as probabilities.
+//! Cumulative probabilities of the values that a world draws, with the same rules as for drawing.
 //!
-//! Floating point to some 1e-15 each; values are rounded to the world's resolution as they are when
-//! they are drawn.
+//! Results are floating-point numbers, accurate to about 1e-15. Values are rounded to the world's
+//! resolution, as in draws.
 
 use elbowroom_num::Rational;
 
 use crate::draw::Distribution;
 use crate::model::{Rule, WorldModel};
 
-/// Which side of a value is meant: what is less, or also the value itself.
+/// Interval of values: less than a value, or up to and including it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Less than the value.
@@ -19,8 +18,8 @@ pub enum Side {
 }
 
 impl Distribution {
-    /// P(a drawn number < `value`), before it is cut, scaled and rounded; `None` for a gamma
-    /// distribution, for which this is not known in closed form.
+    /// Returns P(a drawn number < `value`), before it is clamped, scaled and rounded; `None` for a
+    /// gamma distribution, which has no closed form.
     pub fn below(&self, value: f64) -> Option<f64> {
         let step = |at: f64| f64::from(u8::from(at < value));
         Some(match self {
@@ -70,13 +69,13 @@ impl Distribution {
     }
 }
 
-/// Φ.
+/// Returns Φ(`value`).
 fn standard_normal_below(value: f64) -> f64 {
     0.5 * libm::erfc(-value / std::f64::consts::SQRT_2)
 }
 
-/// What is drawn becomes the nearest multiple of the resolution: the number below which what is
-/// drawn comes out on that side of `value`.
+/// Returns the number below which a drawn number is rounded to that side of `value`. Drawn numbers
+/// are rounded to the nearest multiple of the resolution.
 pub fn rounding_edge(value: f64, side: Side, resolution: f64) -> f64 {
     let steps = value / resolution;
     let whole = steps.round();
@@ -93,7 +92,8 @@ pub fn rounding_edge(value: f64, side: Side, resolution: f64) -> f64 {
 }
 
 impl Rule {
-    /// How likely a value drawn for something planned to be `planned` is on that side of `value`.
+    /// Returns the probability that a value drawn for the planned value `planned` is on that side
+    /// of `value`.
     pub fn share(&self, value: f64, side: Side, planned: f64, resolution: f64) -> Option<f64> {
         let edge = rounding_edge(value, side, resolution);
         let scale = if self.is_relative { planned } else { 1.0 };
@@ -112,8 +112,8 @@ impl Rule {
 }
 
 impl WorldModel {
-    /// How likely [`duration`](Self::duration) is to be on that side of `value`, in seconds; `None`
-    /// where that is not known.
+    /// Returns the probability that [`duration`](Self::duration) is on that side of `value`, in
+    /// seconds; `None` if it cannot be computed.
     pub fn duration_share(
         &self,
         action: &str,
@@ -145,7 +145,7 @@ mod tests {
     use crate::draw::{Distribution, Purpose, keyed};
     use crate::model::Rule;
 
-    /// Each distribution, drawn often, is as often below as it says.
+    /// For each distribution, the frequencies of draws match the probabilities.
     #[test]
     fn shares_are_those_of_what_is_drawn() {
         let distributions = [

@@ -1,4 +1,4 @@
-//! Random numbers with a key, and the distributions they follow.
+//! Keyed random numbers, and distributions.
 
 use elbowroom_num::Rational;
 use rand::{Rng, SeedableRng};
@@ -7,33 +7,34 @@ use rand_distr::{Distribution as _, Exp1, Gamma, LogNormal, Normal, Triangular};
 
 /// The purpose of a random number.
 ///
-/// Part of its key; the numbers must never change, or else old seeds mean new worlds.
+/// It is part of the key. The numbers must never change, because old seeds would then yield other
+/// worlds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
     /// The duration of an action.
     Duration = 1,
-    /// How long after the command an action starts.
+    /// The delay between the command and the start of an action.
     Delay = 2,
-    /// Whether an action fails.
+    /// The failure of an action.
     Failure = 3,
-    /// When something happens by itself.
+    /// The time of an exogenous event.
     Exogenous = 4,
-    /// The fate of a report.
+    /// The reliability of a report.
     Report = 5,
-    /// By how much an action changes a fluent; the fluent is part of the instance.
+    /// The amount by which an action changes a fluent; the fluent is part of the instance.
     Amount = 6,
-    /// Whether effects of actions take place.
+    /// The effects of an action.
     Effect = 7,
-    /// A change by itself from one step to the next.
+    /// A spontaneous change from one step to the next.
     Change = 8,
-    /// When a fact changes by itself that does so at a rate.
+    /// The time of a spontaneous change at a rate.
     Hazard = 9,
-    /// What a failure leaves behind.
+    /// The outcome of a failure.
     Outcome = 10,
 }
 
-/// A source of random numbers that depends on these four and on nothing else.
+/// Returns a random number generator that is determined by these four values.
 ///
 /// `instance` is the name of an action, fact or fluent, and `occurrence` counts from 0.
 pub fn keyed(seed: u64, instance: &str, occurrence: u64, purpose: Purpose) -> ChaCha8Rng {
@@ -45,8 +46,8 @@ pub fn keyed(seed: u64, instance: &str, occurrence: u64, purpose: Purpose) -> Ch
     ChaCha8Rng::from_seed(key)
 }
 
-/// FNV-1a, 64 bits: the same on every machine and in every version, which a hasher of the
-/// standard library does not promise.
+/// Returns the 64-bit FNV-1a hash. It is the same on every machine and in every version, unlike the
+/// hashers of the standard library.
 fn stable_hash(text: &str) -> u64 {
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte.to_ascii_lowercase())).wrapping_mul(0x0100_0000_01b3)
@@ -56,46 +57,46 @@ fn stable_hash(text: &str) -> u64 {
 /// The distribution of a quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Distribution {
-    /// Always the same.
+    /// A single value.
     Constant(f64),
-    /// Bell-shaped.
+    /// Normal distribution.
     Normal {
-        /// Before it is cut.
+        /// The mean, before values are clamped.
         mean: f64,
-        /// Standard deviation, before it is cut.
+        /// The standard deviation, before values are clamped.
         deviation: f64,
     },
-    /// The logarithm is normal. Mean and deviation are those of the quantity itself.
+    /// Log-normal distribution. Mean and deviation are those of the quantity itself.
     LogNormal {
         /// The mean.
         mean: f64,
         /// The standard deviation.
         deviation: f64,
     },
-    /// All values alike.
+    /// Uniform distribution.
     Uniform {
-        /// From here.
+        /// The least value.
         from: f64,
-        /// To here.
+        /// The greatest value.
         to: f64,
     },
-    /// Rises to the mode and falls after it.
+    /// Triangular distribution.
     Triangular {
-        /// From here.
+        /// The least value.
         from: f64,
         /// The likeliest value.
         mode: f64,
-        /// To here.
+        /// The greatest value.
         to: f64,
     },
-    /// `from`, and what an exponential distribution adds.
+    /// `from`, plus an exponentially distributed value.
     Exponential {
         /// The least value.
         from: f64,
-        /// The mean of what is added.
+        /// The mean of the part above `from`.
         mean: f64,
     },
-    /// `from`, and what a gamma distribution adds.
+    /// `from`, plus a gamma-distributed value.
     Gamma {
         /// The least value.
         from: f64,
@@ -104,12 +105,12 @@ pub enum Distribution {
         /// The scale.
         scale: f64,
     },
-    /// One of these, all alike: values that were measured.
+    /// Measured values, all with the same probability.
     Empirical(Vec<f64>),
 }
 
 impl Distribution {
-    /// The mistake in its numbers, if there is one.
+    /// Returns the error in the parameters, if there is one.
     pub fn problem(&self) -> Option<String> {
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         let problem = match self {
@@ -149,7 +150,7 @@ impl Distribution {
         Some(problem.to_owned())
     }
 
-    /// A value. The numbers of the distribution make sense ([`Distribution::problem`]).
+    /// Draws a value. The parameters must be valid ([`Distribution::problem`]).
     pub fn draw(&self, rng: &mut impl Rng) -> f64 {
         match self {
             Self::Constant(value) => *value,
@@ -177,8 +178,8 @@ impl Distribution {
     }
 }
 
-/// The nearest multiple of `resolution`; the value itself where the resolution is so fine that
-/// the value has more steps than a float can count one by one.
+/// Returns the nearest multiple of `resolution`, or the value itself if it has too many steps for a
+/// float to represent each of them.
 pub fn rounded(value: f64, resolution: &Rational) -> Rational {
     let steps = (value / resolution.to_f64()).round();
     if steps.abs() > MOST_STEPS
@@ -186,14 +187,14 @@ pub fn rounded(value: f64, resolution: &Rational) -> Rational {
     {
         return exact;
     }
-    // Only what is no number at all is left to be bounded.
+    // After this, only NaN is not bounded.
     let bounded = steps.clamp(-MOST_STEPS, MOST_STEPS);
     #[allow(clippy::cast_possible_truncation, reason = "just bounded, and whole")]
     let steps = bounded as i64;
     Rational::from(steps) * resolution
 }
 
-/// Beyond that, floats no longer count single steps (2⁵³ is a little more).
+/// Beyond this number, floats do not represent all integers (the exact limit is 2⁵³).
 const MOST_STEPS: f64 = 9e15;
 
 #[cfg(test)]
@@ -300,7 +301,7 @@ mod tests {
         assert_eq!(rounded(-1.5, &thousandth), Rational::new(-3, 2));
         assert!(rounded(1e300, &thousandth).is_positive());
         assert!(rounded(f64::INFINITY, &thousandth).is_positive());
-        // A resolution finer than a float can count once made nine seconds of twelve.
+        // Regression: with a resolution too fine for a float, twelve seconds became nine.
         let fine = Rational::new(1, 1_000_000_000_000_000);
         assert_eq!(rounded(12.0, &fine), Rational::from(12));
         assert_eq!(rounded(-12.5, &fine), Rational::new(-25, 2));

@@ -1,4 +1,4 @@
-//! What a world file says: `docs/formats/world.md`.
+//! Contents of a world file: `docs/formats/world.md`.
 
 mod hazard;
 mod outcome;
@@ -15,46 +15,45 @@ use crate::pattern::ActionPattern;
 pub use hazard::Hazard;
 pub use outcome::{Becoming, Outcome, OutcomeChange, Template};
 
-/// A world, before it has a seed.
+/// A world without a seed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorldModel {
     /// Times and amounts are multiples of this.
     pub resolution: Rational,
-    /// The durations of actions. The last rule that matches counts; without any, as long as
-    /// planned.
+    /// The durations of actions. The last rule that matches counts; without a rule, the planned
+    /// duration.
     pub durations: Vec<(ActionPattern, Rule)>,
-    /// How long after its command an action starts; without a rule, at once.
+    /// Delays between the commands and the starts of actions; without a rule, 0.
     pub delays: Vec<(ActionPattern, Rule)>,
-    /// By how much actions change fluents; without a rule, as the domain says.
+    /// The amounts of numeric effects; without a rule, those of the domain.
     pub amounts: Vec<Amount>,
-    /// How often actions fail; without a rule, never.
+    /// Failure probabilities of actions; without a rule, 0.
     pub failures: Vec<Failing>,
     /// The exogenous events, apart from the problem's timed initials.
     pub exogenous: Vec<Exogenous>,
-    /// How often facts change by themselves; without a rule, never. The last rule that matches
-    /// counts.
+    /// Rates of spontaneous changes of facts; without a rule, 0. The last rule that matches counts.
     pub hazards: Vec<Hazard>,
-    /// How well the world reports.
+    /// The reliability of the world's reports.
     pub reports: Reports,
 }
 
-/// A distribution, cut and scaled.
+/// A distribution, clamped and scaled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
-    /// How the quantity is distributed.
+    /// The distribution of the quantity.
     pub distribution: Distribution,
-    /// Lower amounts become this.
+    /// Lower values are replaced by this one.
     pub minimum: Option<f64>,
-    /// Higher amounts become this.
+    /// Greater values are replaced by this one.
     pub maximum: Option<f64>,
-    /// Whether it is a multiple of the planned value, rather than the value itself.
+    /// `true` if it is a multiple of the planned value, rather than the value itself.
     pub is_relative: bool,
 }
 
-/// By how much an action changes a fluent.
+/// The amount of an action's effect on a fluent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Amount {
-    /// Which actions.
+    /// The actions.
     pub action: ActionPattern,
     /// The fluents.
     pub fluent: ActionPattern,
@@ -71,12 +70,12 @@ pub struct Failing {
     pub probability: f64,
     /// The time.
     pub when: Failure,
-    /// Whether a failure after the start undoes what the start did: the facts that it made false
-    /// become true again, and those that it made true, false. If not, they stay as the start left
-    /// them.
+    /// `true` if a failure after the start undoes the start effects on facts: facts that it made
+    /// false become true again, and facts that it made true become false. If `false`, the start
+    /// effects remain.
     pub is_undone: bool,
-    /// What a failure may leave behind, after what is undone. They add up to 1 at most; the rest is
-    /// a failure that changes nothing more.
+    /// Possible outcomes of a failure, applied after the undoing. Their probabilities add up to at
+    /// most 1; in the remaining cases the failure changes nothing more.
     pub outcomes: Vec<Outcome>,
 }
 
@@ -85,27 +84,27 @@ pub struct Failing {
 pub enum Failure {
     /// It does not start at all.
     AtStart,
-    /// At a moment of its duration, all alike.
+    /// At a uniformly distributed time in its duration.
     Midway,
-    /// When it would have ended.
+    /// At the time of its end.
     AtEnd,
 }
 
-/// Something that happens by itself.
+/// An exogenous event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exogenous {
     /// The time.
     pub time: Rule,
-    /// How likely it happens at all.
+    /// The probability that it happens at all.
     pub probability: f64,
     /// The change.
     pub change: ExogenousChange,
-    /// Whether the world reports it. If not, it is noticed only when the world is asked to look, or
-    /// when an action fails because of it.
+    /// `true` if the world reports it. If `false`, it is only noticed when the world is asked to
+    /// look, or when an action fails because of it.
     pub is_reported: bool,
 }
 
-/// A change that no action causes.
+/// The change by an exogenous event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ExogenousChange {
     /// The fact, `(predicate object …)`, becomes true or false.
@@ -117,15 +116,15 @@ pub enum ExogenousChange {
 /// The reliability of the world's reports. Each probability is that of a single report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reports {
-    /// It never comes.
+    /// It never arrives.
     pub lost: f64,
-    /// It comes twice.
+    /// It arrives twice.
     pub duplicated: f64,
-    /// It comes late.
+    /// It arrives late.
     pub late: f64,
     /// The distribution of the delay.
     pub lateness: Rule,
-    /// Before or after it comes one that says the opposite.
+    /// A contradicting report is sent as well.
     pub contradicted: f64,
 }
 
@@ -136,7 +135,7 @@ impl Default for WorldModel {
 }
 
 impl WorldModel {
-    /// The world in which everything happens as planned.
+    /// Creates the model of a world without deviations from the plan.
     pub fn as_planned() -> Self {
         Self {
             resolution: Rational::new(1, 1000),
@@ -158,34 +157,35 @@ impl WorldModel {
         text::read(&source.into(), problem).map_err(Diagnostics::from)
     }
 
-    /// The duration of an action whose planned duration is `planned`.
+    /// Draws the duration of an action with the planned duration `planned`.
     pub fn duration(&self, action: &str, planned: &Rational, rng: &mut impl Rng) -> Rational {
         let duration = match last(&self.durations, action) {
             Some(rule) => rule.draw(planned, &self.resolution, rng),
             None => planned.clone(),
         };
-        // An action that is planned to take time takes some.
+        // A planned duration that is positive stays positive.
         duration.max(planned.min(&self.resolution).clone())
     }
 
-    /// The rule for how long an action takes; `None`: as long as planned.
+    /// Returns the rule for the duration of an action; `None` for the planned duration.
     pub fn duration_rule(&self, action: &str) -> Option<&Rule> {
         last(&self.durations, action)
     }
 
-    /// The rule for how long after its command an action starts; `None`: at once.
+    /// Returns the rule for the delay between the command and the start of an action; `None` for no
+    /// delay.
     pub fn delay_rule(&self, action: &str) -> Option<&Rule> {
         last(&self.delays, action)
     }
 
-    /// How long after its command an action starts.
+    /// Draws the delay between the command and the start of an action.
     pub fn delay(&self, action: &str, rng: &mut impl Rng) -> Rational {
         let rule = last(&self.delays, action);
         let delay = rule.map(|rule| rule.draw(&Rational::ZERO, &self.resolution, rng));
         delay.unwrap_or_default().max(Rational::ZERO)
     }
 
-    /// How the amount by which an action changes a fluent is distributed.
+    /// Returns the rule for the amount by which an action changes a fluent.
     pub fn amount(&self, action: &str, fluent: &str) -> Option<&Rule> {
         let matching =
             |amount: &&Amount| amount.action.matches(action) && amount.fluent.matches(fluent);
@@ -196,13 +196,13 @@ impl WorldModel {
             .map(|amount| &amount.rule)
     }
 
-    /// Whether an action fails.
+    /// Draws whether an action fails.
     pub fn fails(&self, action: &str, rng: &mut impl Rng) -> bool {
         let failing = self.failing(action);
         failing.is_some_and(|failing| rng.random::<f64>() < failing.probability)
     }
 
-    /// How often an action fails.
+    /// Returns the failure rule of an action.
     pub fn failing(&self, action: &str) -> Option<&Failing> {
         let mut rules = self.failures.iter().rev();
         rules.find(|rule| rule.action.matches(action))
@@ -210,12 +210,12 @@ impl WorldModel {
 }
 
 impl Rule {
-    /// Whether it always gives the same value.
+    /// Returns `true` if it always gives the same value.
     pub fn is_certain(&self) -> bool {
         matches!(self.distribution, Distribution::Constant(_))
     }
 
-    /// A value, when the planned one is `planned`.
+    /// Draws a value, if the planned one is `planned`.
     pub fn draw(&self, planned: &Rational, resolution: &Rational, rng: &mut impl Rng) -> Rational {
         let mut value = self.distribution.draw(rng);
         if let Some(minimum) = self.minimum {
@@ -230,8 +230,9 @@ impl Rule {
         rounded(value, resolution)
     }
 
-    /// Whether a number that somebody wrote down is negative, or all that can be drawn is. A
-    /// distribution that reaches below 0 is none of these: there, 0 is meant.
+    /// Returns `true` if a value written in the file is negative, or if all values that can be
+    /// drawn are. A distribution that merely extends below 0 is permitted; draws below 0 count as
+    /// 0.
     fn means_negative(&self) -> bool {
         let cut = |value: f64| {
             let value = self.minimum.map_or(value, |minimum| value.max(minimum));
@@ -252,7 +253,7 @@ impl Rule {
 }
 
 impl From<Distribution> for Rule {
-    /// Neither cut nor scaled.
+    /// Creates a rule without limits and scaling.
     fn from(distribution: Distribution) -> Self {
         Self {
             distribution,
@@ -264,7 +265,7 @@ impl From<Distribution> for Rule {
 }
 
 impl Default for Reports {
-    /// Every report comes at once, once, and is true.
+    /// Perfect reports: each arrives at once, once, and is true.
     fn default() -> Self {
         Self {
             lost: 0.0,
@@ -277,7 +278,7 @@ impl Default for Reports {
 }
 
 impl Reports {
-    /// Whether every report comes at once, once, and is true.
+    /// Returns `true` if all reports come at once, once, and are true.
     pub fn is_perfect(&self) -> bool {
         let all = [self.lost, self.duplicated, self.late, self.contradicted];
         all.iter().all(|probability| *probability <= 0.0)

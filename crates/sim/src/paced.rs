@@ -1,4 +1,4 @@
-//! Worlds in which somebody else decides how long actions take, as they go.
+//! Worlds whose action durations are decided from outside, during execution.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,47 +9,48 @@ use elbowroom_num::Rational;
 
 use crate::sim::SimWorld;
 
-/// Decides when actions end that are under way.
+/// Decides when running actions end.
 pub trait Pace: Send {
-    /// An action has started.
+    /// Called when an action has started.
     fn begun(&mut self, now: &Rational, begun: &Begun<'_>);
 
-    /// An action has ended, whether it was told to or has failed or been cancelled.
+    /// Called when an action has ended: because of [`ends_now`](Self::ends_now), by a failure, or
+    /// by a cancellation.
     fn over(&mut self, now: &Rational, ticket: Ticket);
 
-    /// Which actions end now. It is asked each time that something has happened, and at each
+    /// Returns the actions that end now. Called after each event, and at each
     /// [look](Self::next_look).
     fn ends_now(&mut self, now: &Rational) -> Vec<Ticket>;
 
-    /// When to ask again if nothing happens before; later than `now`.
+    /// Returns the time of the next look if no event comes before; later than `now`.
     fn next_look(&self, now: &Rational) -> Option<Rational>;
 }
 
 /// An action that has started.
 #[derive(Clone, Copy, Debug)]
 pub struct Begun<'a> {
-    /// Which start it is.
+    /// The ticket of the start.
     pub ticket: Ticket,
     /// The action.
     pub action: &'a Action,
-    /// How many of that name had been told to start before.
+    /// Number of earlier commands to start an action of that name.
     pub occurrence: u64,
-    /// The planned duration; `None` if it takes no time.
+    /// The planned duration; `None` if it is instantaneous.
     pub planned: Option<&'a Rational>,
-    /// Whether it ends when the [`Pace`] says; if not, it takes no time or is going to fail.
+    /// `true` if it ends when the [`Pace`] says; if `false`, it is instantaneous or is going to
+    /// fail.
     pub is_open: bool,
 }
 
-/// A simulated world whose actions take as long as a [`Pace`] says.
+/// A simulated world whose action durations are decided by a [`Pace`].
 ///
-/// All else is the world's: conditions, failures, delays, reports.
+/// The world decides everything else: conditions, failures, delays, reports.
 #[derive(Debug)]
 pub struct Paced<'a, P> {
     world: SimWorld<'a>,
     pace: P,
     now: Rational,
-    /// The actions that were told to start and have not, with their number among those of the same
-    /// name.
+    /// Commanded actions that have not started, with their number among those of the same name.
     ordered: BTreeMap<Ticket, Ordered>,
     occurrences: BTreeMap<String, u64>,
 }
@@ -62,7 +63,7 @@ struct Ordered {
 }
 
 impl<'a, P: Pace> Paced<'a, P> {
-    /// That world at that pace.
+    /// Combines a world and a pace.
     pub fn new(world: SimWorld<'a>, pace: P) -> Self {
         Self {
             world,
@@ -73,17 +74,17 @@ impl<'a, P: Pace> Paced<'a, P> {
         }
     }
 
-    /// The world.
+    /// Returns the world.
     pub fn world(&self) -> &SimWorld<'a> {
         &self.world
     }
 
-    /// Its pace.
+    /// Returns the pace.
     pub fn pace(&self) -> &P {
         &self.pace
     }
 
-    /// An action that was told to start has started.
+    /// Notifies the pace that a commanded action has started.
     fn begin(&mut self, ticket: Ticket, time: &Rational, is_open: bool) {
         if let Some(ordered) = self.ordered.remove(&ticket) {
             let begun = Begun {
@@ -131,7 +132,7 @@ impl<P: Pace> World for Paced<'_, P> {
         *count += 1;
         self.ordered.insert(*ticket, ordered);
         self.world.command(now, command)?;
-        // Before time passes: it might have been planned to take none.
+        // Before time passes, because the planned duration may be 0.
         if self.world.hold(*ticket) {
             self.begin(*ticket, now, true);
         }
@@ -166,15 +167,15 @@ impl<P: Pace> World for Paced<'_, P> {
 /// A pace with durations that are fixed in advance, for each start of an action.
 #[derive(Clone, Debug, Default)]
 pub struct Durations {
-    /// For each action's name, how long it takes the first time, the second time, …
+    /// For each action's name, its durations in order of its starts.
     durations: BTreeMap<String, Vec<Rational>>,
-    /// The time at which each action under way ends.
+    /// The end of each running action.
     ends: BTreeMap<Ticket, Rational>,
 }
 
 impl Durations {
-    /// For each action's name, how long it takes the first time, the second time, …; after
-    /// that, as long as planned.
+    /// Creates a pace. `durations` has, for each action's name, its durations in order of its
+    /// starts; further starts take the planned duration.
     pub fn new(durations: BTreeMap<String, Vec<Rational>>) -> Self {
         let ends = BTreeMap::new();
         Self { durations, ends }

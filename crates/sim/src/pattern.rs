@@ -1,20 +1,20 @@
-//! Which actions, or which fluents, a rule is about.
+//! Patterns for the actions, fluents and facts to which a rule applies.
 
 use std::fmt;
 
 use elbowroom_model::Problem;
 
-/// `*`, a name, or `(name object _ …)`, where `_` stands for any object.
+/// `*`, a name, or `(name object _ …)`; `_` matches any object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ActionPattern {
-    /// `None`: any.
+    /// `None` matches any name.
     name: Option<String>,
-    /// `None`: any arguments at all.
+    /// `None` matches any arguments.
     arguments: Option<Vec<Option<String>>>,
 }
 
 impl fmt::Display for ActionPattern {
-    /// As it is written.
+    /// Writes the pattern in the syntax of world files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = self.name.as_deref().unwrap_or("*");
         let Some(arguments) = &self.arguments else {
@@ -37,7 +37,7 @@ pub(crate) enum Names {
 }
 
 impl ActionPattern {
-    /// Reads a pattern, and checks that what it names is there.
+    /// Reads a pattern, and checks that its names exist.
     pub(crate) fn read(text: &str, names: Names, problem: &Problem) -> Result<Self, String> {
         let text = text.trim();
         if text == "*" {
@@ -80,18 +80,18 @@ impl ActionPattern {
         })
     }
 
-    /// The name; `None`: any.
+    /// Returns the name; `None` if it matches any name.
     pub(crate) fn name(&self) -> Option<&str> {
         self.name.as_deref()
     }
 
-    /// Whether something of that name may be meant, whatever its objects.
+    /// Returns `true` if the pattern may match something of that name, for some objects.
     pub(crate) fn may_match(&self, name: &str) -> bool {
         let mine = self.name.as_deref();
         mine.is_none_or(|mine| mine.eq_ignore_ascii_case(name))
     }
 
-    /// Whether a ground name, `(name object …)`, is meant.
+    /// Returns `true` if the pattern matches a ground name, `(name object …)`.
     pub fn matches(&self, ground: &str) -> bool {
         let Some(name) = &self.name else {
             return true;

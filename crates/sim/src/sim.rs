@@ -20,33 +20,34 @@ use crate::model::{ExogenousChange, Failure, Outcome, WorldModel};
 pub use amid::Seen;
 use hazards::Chance;
 
-/// A simulated world: true state, and what is going to happen.
+/// A simulated world: the true state, and the coming events.
 ///
-/// It is PDDL that happens, as the judge sees it: all that happens at one time is a group, whose
-/// conditions and amounts are read in the state on arrival. What is started at a moment belongs to
-/// its group, as long as the world has not been told to go on.
+/// It follows the semantics of PDDL, as the validator does. All happenings at one time form a
+/// group, whose conditions and amounts are read in the state on arrival. An action that is started
+/// at a moment belongs to its group until the world is asked to wait.
 ///
-/// An action whose start condition does not hold does not start; one whose end condition does not
-/// hold fails when it would have ended; one whose over-all condition does not hold at some moment
-/// strictly between start and end, fails at once, or, where numbers move, at the next multiple of
-/// the world's resolution, unless something happens before that.
+/// An action whose start condition does not hold does not start. An action whose end condition does
+/// not hold fails when it would have ended. An action whose over-all condition does not hold at
+/// some moment strictly between start and end fails at once. If the condition fails because numbers
+/// change continuously, the action fails at the next multiple of the world's resolution, unless an
+/// event comes before that.
 #[derive(Debug)]
 pub struct SimWorld<'a> {
     model: &'a WorldModel,
     seed: u64,
     truth: Progression,
     now: Rational,
-    /// The coming happenings, by time, and then in the order in which they were decided.
+    /// The coming happenings, by time and then in the order of their insertion.
     agenda: BTreeMap<(Rational, u64), Coming>,
-    /// The number of things put on the agenda.
+    /// Number of entries put on the agenda so far.
     decided: u64,
-    /// The happenings that have not been reported.
+    /// Observations that have not been reported.
     untold: Vec<Observation>,
-    /// How often each action was started.
+    /// Number of starts, by action.
     occurrences: BTreeMap<String, u64>,
-    /// The actions that were started, until they have ended.
+    /// Commanded actions that have not ended.
     actions: BTreeMap<Ticket, Commanded<'a>>,
-    /// The facts that change by themselves at a rate.
+    /// Spontaneous changes at a rate.
     chances: Vec<Chance>,
 }
 
@@ -56,9 +57,9 @@ struct Commanded<'a> {
     planned: Option<Rational>,
     occurrence: u64,
     has_started: bool,
-    /// What its failure leaves behind, if it is one that leaves something.
+    /// The outcome of its failure, if it has one.
     outcome: Option<&'a Outcome>,
-    /// Whether it can only fail any more, and holds things up until it does.
+    /// `true` if it can only fail any more, and delays the failure.
     is_broken: bool,
 }
 
@@ -73,7 +74,7 @@ enum Coming {
 }
 
 impl<'a> SimWorld<'a> {
-    /// The world of that seed, at time 0.
+    /// Creates the world of that seed, at time 0.
     pub fn new(task: Arc<Task>, model: &'a WorldModel, seed: u64) -> Self {
         let mut world = Self::empty(Progression::new(task), model, seed);
         for (index, exogenous) in model.exogenous.iter().enumerate() {
@@ -93,7 +94,7 @@ impl<'a> SimWorld<'a> {
         world
     }
 
-    /// In which nothing is to happen.
+    /// Creates a world without coming events.
     fn empty(truth: Progression, model: &'a WorldModel, seed: u64) -> Self {
         Self {
             truth,
@@ -109,7 +110,7 @@ impl<'a> SimWorld<'a> {
         }
     }
 
-    /// The true state.
+    /// Returns the true state.
     pub fn truth(&self) -> &Progression {
         &self.truth
     }
@@ -126,7 +127,7 @@ impl<'a> SimWorld<'a> {
         });
     }
 
-    /// Time passes until `until`, or until something is told, if that `is_enough`.
+    /// Lets time pass until `until`, or until something is reported, if that `is_enough`.
     fn proceed(&mut self, until: &Rational, is_enough: bool) {
         loop {
             self.happen_now();
@@ -134,7 +135,7 @@ impl<'a> SimWorld<'a> {
             if is_told(self) || self.now >= *until {
                 return;
             }
-            // Nothing more happens at this moment.
+            // All happenings of this moment have been processed.
             while let Some((ticket, why)) = self.first_broken() {
                 self.fail(ticket, &why);
             }
@@ -142,18 +143,18 @@ impl<'a> SimWorld<'a> {
                 return;
             }
             let coming = self.agenda.keys().next().map(|(time, _)| time);
-            // Timed initials can break what is under way.
+            // Timed initials can make running actions fail.
             let next = coming.into_iter().chain(self.truth.next_timed());
             let next = next.chain([until]).min().unwrap_or(until).clone();
             let broken = self.truth.next_break(&next, &self.model.resolution);
             let next = broken.into_iter().chain([next]).min().unwrap_or_default();
-            // A fluent without a value that should move stays without.
+            // A moving fluent without a value does not get one.
             let _ = self.truth.advance(&next);
             self.now = next;
         }
     }
 
-    /// All that is due by now happens.
+    /// Processes all happenings that are due by now.
     fn happen_now(&mut self) {
         let _ = self.truth.advance(&self.now);
         while let Some(entry) = self.agenda.first_entry() {
@@ -171,7 +172,8 @@ impl<'a> SimWorld<'a> {
         }
     }
 
-    /// An action whose over-all condition has failed, or fails from now on.
+    /// Returns an action whose over-all condition has failed, or fails from now on, with the
+    /// reason.
     fn first_broken(&self) -> Option<(Ticket, String)> {
         if let Some((ticket, underway)) = self.truth.broken() {
             return Some((ticket, self.no_longer(&underway.broken_parts())));
@@ -302,8 +304,8 @@ impl<'a> SimWorld<'a> {
         }
     }
 
-    /// The amounts that the world file has for a happening; the others are the domain's. `?duration` is
-    /// the planned duration at the start, and the real one at the end.
+    /// Draws the amounts that the world file has for a happening; the others are the domain's.
+    /// `?duration` is the planned duration at the start, and the real one at the end.
     fn measured(
         &self,
         commanded: &Commanded<'_>,
@@ -344,7 +346,7 @@ impl<'a> SimWorld<'a> {
         let task = Arc::clone(self.truth.task());
         let event = match &exogenous.change {
             ExogenousChange::Fact(name, truth) => {
-                // What the problem does not have cannot matter.
+                // Names that the problem does not have are ignored.
                 let Some(fact) = task.fact_named(name) else {
                     return;
                 };

@@ -1,4 +1,4 @@
-//! A world whose reports cannot be relied on.
+//! A world with unreliable reports.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,8 +16,8 @@ use crate::draw::{Purpose, keyed};
 use crate::model::{Reports, WorldModel};
 use crate::sim::{Seen, SimWorld};
 
-/// Loses, repeats, delays and contradicts the reports of another world. What is looked at on
-/// purpose ([`World::look`]) is seen as it is.
+/// Decorator that loses, repeats, delays and contradicts the reports of another world. Answers to
+/// [`World::look`] are not changed.
 #[derive(Debug)]
 pub struct Unreliable<W> {
     inner: W,
@@ -25,13 +25,13 @@ pub struct Unreliable<W> {
     rng: ChaCha8Rng,
     resolution: Rational,
     now: Rational,
-    /// Reports on their way, by the time of their arrival.
+    /// Reports in transit, by the time of their arrival.
     coming: BTreeMap<(Rational, u64), Observation>,
     count: u64,
 }
 
 impl WorldModel {
-    /// One trajectory of the world, which reports as well or badly as the model says.
+    /// Creates the world of that seed, with the model's reliability of reports.
     pub fn world(&self, task: &Arc<Task>, seed: u64) -> Box<dyn World + '_> {
         let sim = SimWorld::new(Arc::clone(task), self, seed);
         if self.reports.is_perfect() {
@@ -43,8 +43,8 @@ impl WorldModel {
 }
 
 impl WorldModel {
-    /// One way in which the world may go on from what is believed: [`SimWorld::amid`], which
-    /// reports as well or badly as the model says.
+    /// Creates a sample of the world that continues from a belief: [`SimWorld::amid`], with the
+    /// model's reliability of reports.
     pub fn world_amid(&self, belief: &Progression, seed: u64, past: &Seen) -> Box<dyn World + '_> {
         let sim = SimWorld::amid(belief, self, seed, past);
         if self.reports.is_perfect() {
@@ -56,7 +56,7 @@ impl WorldModel {
 }
 
 impl<W: World> Unreliable<W> {
-    /// The world `inner`, seen through `reports`.
+    /// Wraps the world `inner`. `reports` is the reliability of its reports.
     pub fn new(inner: W, reports: Reports, seed: u64, resolution: Rational) -> Self {
         Self {
             inner,
@@ -69,7 +69,7 @@ impl<W: World> Unreliable<W> {
         }
     }
 
-    /// The world as it is.
+    /// Returns the wrapped world.
     pub fn inner(&self) -> &W {
         &self.inner
     }
@@ -78,7 +78,7 @@ impl<W: World> Unreliable<W> {
         self.rng.random::<f64>() < probability
     }
 
-    /// Sends a report on its way.
+    /// Sends a report, which may arrive late.
     fn send(&mut self, observation: Observation) {
         let mut arrival = self.now.clone();
         if self.chance(self.reports.late) {
@@ -152,7 +152,7 @@ impl<W: World> World for Unreliable<W> {
     }
 }
 
-/// A report that cannot be true together with this one.
+/// Returns a report that contradicts this one.
 fn opposite(event: &Event) -> Event {
     let failed = |ticket: Ticket| Event::Ended {
         ticket,

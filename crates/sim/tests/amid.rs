@@ -1,5 +1,5 @@
-//! Worlds that begin in the middle of things, beside a plain twin: of many worlds from the
-//! beginning, those in which the same has been seen until then.
+//! Worlds that begin in the middle of an execution, compared with rejection sampling: of many
+//! worlds that are run from the beginning, those with the same observations until then.
 
 use std::sync::Arc;
 
@@ -20,8 +20,8 @@ const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions)
 
 const PROBLEM: &str = "(define (problem p) (:domain d) (:init (open) (lit)) (:goal (done)))";
 
-/// It takes 2 to 8, and fails midway three times in ten; the door shuts once, early or late, and the
-/// light goes out half of the time.
+/// The work takes 2 to 8 and fails midway with probability 0.3. The door shuts once, early or late,
+/// and the light goes out with probability 0.5.
 const WORLD: &str = "format = \"elbowroom-world\"\nversion = 1\n
     [[duration]]\naction = \"work\"\nuniform = { from = 2, to = 8 }\n
     [[failure]]\naction = \"work\"\nprobability = 0.3\nwhen = \"midway\"\n
@@ -39,10 +39,10 @@ fn work(task: &Task) -> Action {
     task.instantiate(SchemaId::from(0), &[]).expect("it works")
 }
 
-/// What is seen of a world from now until 20.
+/// Events of a world from now until 20.
 #[derive(Debug, Default, PartialEq)]
 struct Course {
-    /// When the action has ended, and whether as it should.
+    /// The time of the action's end, and `true` if it succeeded.
     ended: Option<(f64, bool)>,
     door_shut: Option<f64>,
     light_out: Option<f64>,
@@ -72,7 +72,7 @@ fn course(task: &Task, world: &mut dyn World) -> Course {
     }
 }
 
-/// Worlds from the beginning, in which the work is begun at 0.
+/// Runs a world from the beginning, with the work started at 0.
 fn from_the_beginning(task: &Arc<Task>, model: &WorldModel, seed: u64) -> Course {
     let mut world = model.world(task, seed);
     let action = work(task);
@@ -85,7 +85,8 @@ fn from_the_beginning(task: &Arc<Task>, model: &WorldModel, seed: u64) -> Course
     course(task, world.as_mut())
 }
 
-/// By 4 the work goes on, the light is on, and the door is shut since 3.5 or open.
+/// Returns the shares of worlds in which the work succeeds, the work ends after 6, the light goes
+/// out, and the door shuts after 4.
 #[allow(clippy::cast_precision_loss, reason = "there are few worlds")]
 fn shares(courses: &[Course]) -> [f64; 4] {
     let share = |is_so: &dyn Fn(&Course) -> bool| {
@@ -130,7 +131,7 @@ fn what_is_to_come_is_drawn_given_what_was_seen() {
     }
 }
 
-/// The door was seen to shut at 3.5: nothing more shuts it.
+/// The door was observed to shut at 3.5, so the same event does not come again.
 #[test]
 fn what_was_seen_does_not_come_again() {
     let task = task();
@@ -151,12 +152,12 @@ fn what_was_seen_does_not_come_again() {
         let mut world = model.world_amid(&belief, *seed, &seen);
         course(&task, world.as_mut()).door_shut.is_some()
     });
-    // The other event, with the door shut already, is told and changes nothing.
+    // The other event finds the door shut already. It is reported and changes nothing.
     let again = again.count();
     assert!((40..=180).contains(&again), "{again}");
 }
 
-/// Two who go on from here meet the same world as far as they do the same.
+/// Two runs that continue from here meet the same world as long as they do the same.
 #[test]
 fn the_same_seed_goes_on_in_the_same_way() {
     let task = task();

@@ -1,4 +1,4 @@
-//! What an action leaves behind when it fails.
+//! Facts and fluents after the failure of an action.
 
 use std::sync::Arc;
 
@@ -17,7 +17,8 @@ const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions)
 
 const PROBLEM: &str = "(define (problem p) (:domain d) (:init (lies) (free)) (:goal (holds)))";
 
-/// What is told of a pick that fails at its end, in words, and what is true afterwards.
+/// Returns the reports on a pick that fails at its end, in words, and the facts that are true
+/// afterwards.
 fn after_a_failure(undone: &str) -> (Vec<String>, Vec<String>) {
     let source = |text: &str| Source::new("test", text);
     let (problem, _) = read_problem(&source(DOMAIN), &source(PROBLEM)).expect("correct");

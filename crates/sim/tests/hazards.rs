@@ -1,4 +1,4 @@
-//! Facts that change by themselves at a rate.
+//! Spontaneous changes of facts at a rate.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ fn task() -> Arc<Task> {
     Arc::new(Task::new(problem))
 }
 
-/// All changes that a world tells of until then: when, which fact, and what it became.
+/// Returns all changes that a world reports until then: time, fact, and new truth.
 fn changes(task: &Arc<Task>, hazards: &str, seed: u64, until: i64) -> Vec<(f64, String, bool)> {
     let text = format!("format = \"elbowroom-world\"\nversion = 1\n{hazards}");
     let model = WorldModel::read(text.as_str(), task.problem()).expect("a correct world");
@@ -66,7 +66,7 @@ fn a_fact_changes_again_and_again_after_exponential_times() {
                 (mean * rate - 1.0).abs() < 4.0 / count.sqrt(),
                 "{mean} at {rate}"
             );
-            // Without a memory: of those that last so long, as many last as long again.
+            // Exponentially distributed: the share that lasts longer than a span is exp(−rate · span).
             for span in [0.5 / rate, 1.0 / rate, 2.0 / rate] {
                 let longer = times.iter().filter(|time| **time > span).count() as f64 / count;
                 let expected = (-rate * span).exp();

@@ -1,4 +1,4 @@
-//! What happens at one time is told as one answer, and counts as one group.
+//! Events at one time are reported in one answer, and form one group.
 
 use std::sync::Arc;
 
@@ -61,8 +61,8 @@ fn ended(observation: &Observation) -> Option<(u64, &str)> {
     }
 }
 
-/// Gives the commands at their times, and lets a hundred seconds pass: the ends that are told, with
-/// their times, answer by answer.
+/// Sends the commands at their times, and lets 100 s pass. Returns the reported ends with their
+/// times, by answer.
 fn played(stage: &Stage, commands: &[(Rational, Command)]) -> Vec<(Rational, Vec<String>)> {
     let model = WorldModel::as_planned();
     let mut world = SimWorld::new(Arc::new(stage.task.clone()), &model, 0);
@@ -121,7 +121,7 @@ fn an_action_of_duration_0_ends_in_the_answer_in_which_it_starts() {
     assert_eq!(played(&stage, &commands), [(seconds(2000), ends)]);
 }
 
-/// An action that was planned to take less than the resolution takes as long as planned.
+/// An action with a planned duration below the resolution takes the planned duration.
 #[test]
 fn the_resolution_does_not_stretch_what_goes_as_planned() {
     let mut stage = Stage::new(1);

@@ -1,4 +1,4 @@
-//! What failures leave behind by chance, and how long they hold things up.
+//! Random outcomes of failures, and their delays.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -32,8 +32,8 @@ fn model(task: &Task, failure: &str) -> WorldModel {
     WorldModel::read(text.as_str(), task.problem()).expect("a correct world")
 }
 
-/// What is told of a pick of box a, with the times, and the world afterwards. It is cancelled at
-/// that time.
+/// Returns the reports on a pick of box a, with their times, and the world afterwards. The pick is
+/// cancelled at that time.
 fn picked<'a>(
     task: &Arc<Task>,
     model: &'a WorldModel,

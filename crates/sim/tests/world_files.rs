@@ -1,4 +1,4 @@
-//! World files: what they may say, and where their mistakes are.
+//! World files: valid contents, and the positions of mistakes.
 
 use elbowroom_model::Problem;
 use elbowroom_pddl::{Source, read_problem};
@@ -20,7 +20,7 @@ fn problem() -> Problem {
     read.expect("a correct problem").0
 }
 
-/// The mistake in a file whose third line and those after it are `sections`.
+/// Returns the error in a file whose third and later lines are `sections`.
 fn mistake(sections: &str) -> (usize, String) {
     let text = format!("format = \"elbowroom-world\"\nversion = 1\n{sections}");
     let error = WorldModel::read(&text, &problem()).expect_err(sections);
@@ -122,7 +122,7 @@ fn every_mistake_has_its_line_and_says_what_to_do() {
     }
 }
 
-/// What a section has and cannot use was once ignored: each line is the one that says too much.
+/// Regression: superfluous keys were once ignored. Each line is the one with the superfluous key.
 #[test]
 fn nothing_in_a_file_is_ignored() {
     let cases = [

@@ -1,6 +1,6 @@
-//! A plan of 20 robots, one action after the other on each; every tenth waits for one of another
-//! robot; every hundredth has a deadline. Every action ends half a second later than planned, so
-//! that all windows behind it move.
+//! A plan of 20 robots, each with a sequence of actions. Every tenth action waits for one of
+//! another robot, and every hundredth has a deadline. Every action ends half a second later than
+//! planned, so all later windows move.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use elbowroom_plan::{
     ParameterKind, ParametrizedPlan, Reason, Schedule, StnPlan, Valuation,
 };
 
-/// An executor that goes by the plan.
+/// Creates an executor that has adopted the plan of `mission`.
 pub(crate) fn ready(spec: &str, mission: &Mission) -> Box<dyn Executor> {
     let spec: ExecutorSpec = spec.parse().expect("a known executor");
     let mut executor = spec.build(Box::new(Everywhere));
@@ -26,7 +26,7 @@ pub(crate) fn ready(spec: &str, mission: &Mission) -> Box<dyn Executor> {
     executor
 }
 
-/// A world in which one action ends after the other.
+/// World in which the actions end one after the other.
 pub(crate) struct Events {
     running: BTreeSet<(Rational, StepId)>,
     now: Rational,
@@ -44,8 +44,8 @@ impl Events {
         }
     }
 
-    /// Tells the executor what has happened, does what it says, and lets the next action end;
-    /// whether there was one.
+    /// Passes the news to the executor, carries out its decisions, and ends the next action.
+    /// Returns `false` if no action is running.
     pub(crate) fn next(&mut self, executor: &mut dyn Executor) -> bool {
         loop {
             let moment = Moment {
@@ -100,7 +100,8 @@ impl Region for Everywhere {
     }
 }
 
-/// A plan with so many actions. Open durations may be anything up to twice the planned one.
+/// Creates a plan with `count` actions. If `is_open`, each duration may be up to twice the planned
+/// one.
 pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
     const ROBOTS: usize = 20;
     let task = Arc::new(Task::new(Problem::default()));
@@ -193,7 +194,7 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
     }
 }
 
-/// Makes a parameter of each duration, its shortest one being nominal.
+/// Turns each duration into a parameter whose nominal value is the shortest duration.
 fn leave_durations_open(plan: &mut ParametrizedPlan) {
     for constraint in &mut plan.plan.constraints {
         let (Reason::Duration(instance), Bound::Finite(nominal)) =

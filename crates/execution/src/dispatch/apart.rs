@@ -1,4 +1,5 @@
-//! Separation of starts and planned ends where the network does not order what interferes.
+//! Separation of starts and planned ends from interfering happenings that the network does not
+//! order.
 
 use std::sync::Arc;
 
@@ -11,15 +12,17 @@ use crate::executor::StepId;
 use crate::separation::Separation;
 
 impl Dispatch {
-    /// Keeps ε between starts and planned ends and all that interferes with them, also where the network does not
-    /// order them. Happenings before `now`, on the plan's clock, count from the last ε on.
+    /// Keeps starts and planned ends at least ε away from all interfering happenings, also if the
+    /// network does not order them. Past happenings count if they are less than ε before `now`, on
+    /// the plan's clock.
     pub(crate) fn keeping_apart(mut self, now: &Rational) -> Self {
         let mut separation = Separation::new(&self.task, &self.origin);
         for (index, &[start, end]) in self.ends.iter().enumerate() {
             let id = InstanceId::from(index);
             let action = (&*self.task, &*self.actions[index]);
             let is_recent = |time: &&Rational| *time + &self.epsilon > *now;
-            // What was running when the plan began has not started then.
+            // The plan contains only the remainder of these actions, so their starts do not count
+            // here.
             if let Some(time) = self.happened(start).filter(is_recent)
                 && !self.resumed.contains(&id)
             {
@@ -31,7 +34,7 @@ impl Dispatch {
                 separation.note(Footprint::of_end(action.0, action.1), time);
             }
             if self.progress.running.contains(&id) {
-                // With the plan, the rest of a running action begins.
+                // The remainder of a running action begins with the plan.
                 let begun = self.happened(start).cloned().unwrap_or_default();
                 let end = begun + self.nominal_duration(id);
                 separation.expect(StepId::from(id).0, action, end);
@@ -41,8 +44,8 @@ impl Dispatch {
         self
     }
 
-    /// Returns a time after `now` before which a start has to wait for the sake of separation, or `None` if it may
-    /// happen now. In that case it is taken as happening now.
+    /// Returns the time after `now` until which a start has to wait to keep its separation, or
+    /// `None` if it may happen now. In that case it is recorded as happening now.
     pub(super) fn separated(&mut self, start: NodeId, now: &Rational) -> Option<Rational> {
         let (Node::Start(id) | Node::Instant(id)) = self.plan.nodes[start.index()] else {
             return None;

@@ -1,4 +1,4 @@
-//! Which of a plan's constraints stand behind something.
+//! Explanations: the plan's constraints that cause a bound or a conflict.
 
 use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
@@ -9,10 +9,10 @@ use super::{Bounds, Dispatch};
 use crate::horizon::NetworkLimit;
 use crate::reason::{Behind, Changed};
 
-/// How many constraints of a long chain are named.
+/// Number of constraints of a long chain that are named.
 const MOST_NAMED: usize = 4;
 
-/// A constraint of a plan; of timed initials, without their time.
+/// Describes a constraint of a plan; a timed initial without its time.
 pub(super) fn named(task: &Task, plan: &StnPlan, index: usize) -> Behind {
     let constraint = &plan.constraints[index];
     if let elbowroom_plan::Reason::Timed(timed) = constraint.reason {
@@ -32,8 +32,9 @@ pub(super) fn named(task: &Task, plan: &StnPlan, index: usize) -> Behind {
 }
 
 impl Dispatch {
-    /// The plan's constraints behind one end of a node's window. Of a long chain only the ends are
-    /// named: the deadline, or whatever it begins with, and what is next to the node.
+    /// Returns the plan's constraints that cause one end of a node's window. Of a long chain, only
+    /// both ends are returned: the origin, for example a deadline, and the constraints next to the
+    /// node.
     pub(super) fn behind(&self, node: NodeId, end: WindowEnd) -> Vec<Behind> {
         let limits = self.horizon.grounds(network_node(node), end);
         let named = |limit: &NetworkLimit| {
@@ -57,7 +58,8 @@ impl Dispatch {
         chain
     }
 
-    /// Whether what limits an end is the duration of its own action.
+    /// Returns `true` if this end of the window of an instance's end is limited by the instance's
+    /// own duration.
     pub(super) fn is_limited_by_duration(&self, id: InstanceId, end: WindowEnd) -> bool {
         let node = network_node(self.ends[id.index()][1]);
         let behind = self.horizon.grounds(node, end);
@@ -66,7 +68,7 @@ impl Dispatch {
     }
 }
 
-/// Bounds as an interval.
+/// Converts bounds to an interval.
 pub(super) fn interval(bounds: &Bounds) -> Interval {
     let end = |bound: &Option<Rational>| bound.clone().map_or(End::Infinite, End::Closed);
     Interval {

@@ -1,4 +1,4 @@
-//! Holding what was observed against the network.
+//! Observations: fixes executed time points in the network and detects violations.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, network_node};
@@ -12,7 +12,7 @@ use crate::horizon::{Horizon, Missed};
 use crate::reason::{About, Behind, Cause, Reason};
 
 impl Dispatch {
-    /// Takes note of what is new. The first thing that the plan does not survive, if there is one.
+    /// Processes the news. Returns the first one that makes the plan infeasible, if any.
     pub(crate) fn take(&mut self, moment: &Moment<'_>) -> Option<Box<Reason>> {
         let mut trouble = None;
         let mut is_surprised = None;
@@ -45,8 +45,8 @@ impl Dispatch {
             .map(Box::new)
     }
 
-    /// Whether the rest of the plan works in the state that is believed now, if nothing deviates
-    /// any more; if not, why not. `what` was not as expected.
+    /// Returns the reason if the remaining plan fails in the current belief state when it is
+    /// executed nominally. `what` is the unexpected fact or value.
     pub(crate) fn surprise(&self, moment: &Moment<'_>, what: &str) -> Option<Reason> {
         let failure = projection::failure(self, moment)?;
         let mut reason = Reason::new(Cause::Surprise).about(About::Seen(what.to_owned()));
@@ -67,7 +67,7 @@ impl Dispatch {
         if start == end {
             self.finish(id);
         } else if self.happened(end).is_none() {
-            // Also what began before the plan was taken up.
+            // Includes actions that began before the plan was adopted.
             self.progress.running.insert(id);
         }
         let missed = fixed.err()?;
@@ -108,7 +108,7 @@ impl Dispatch {
         if let Some(told) = self.told.remove(&id)
             && let Horizon::Dispatchable(_) = self.horizon
         {
-            // Nobody has said when it began, but it was told to.
+            // Its start was not reported, so the time of the command is used.
             if let Err(missed) = self.horizon.fix(network_node(start), &told) {
                 self.strain.missed(start, &missed);
             }
@@ -159,12 +159,12 @@ impl Dispatch {
         reason
     }
 
-    /// An action has started, in time or not.
+    /// Records the start of an action, whether in time or not.
     pub(crate) fn note_start(&mut self, id: InstanceId, time: &Rational) {
         let _ = self.started(id, time);
     }
 
-    /// An action has ended as the domain says, in time or not.
+    /// Records the successful end of an action, whether in time or not.
     pub(crate) fn note_end(&mut self, id: InstanceId, time: &Rational) {
         let _ = self.ended(id, time, &Ending::Succeeded);
     }

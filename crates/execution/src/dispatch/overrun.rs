@@ -1,4 +1,4 @@
-//! Going on by the same network where something happened outside its bounds, or is overdue.
+//! Continuation with the present network after violations of its bounds, and with overdue actions.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId, network_node};
@@ -6,17 +6,17 @@ use elbowroom_plan::{InstanceId, NodeId, network_node};
 use super::Dispatch;
 use crate::horizon::Missed;
 
-/// What has happened outside the bounds of a network since it was last known to work.
+/// Violations of a network's bounds since the network was last known to be executable.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Strain {
-    /// Ends outside the bounds of nothing but their own links.
+    /// Ends that violate only the bounds of their own links.
     ends: Vec<NodeId>,
-    /// Whether something else was missed.
+    /// `true` if any other bound was violated.
     is_broken: bool,
 }
 
 impl Strain {
-    /// A node happened at a time that its window does not allow.
+    /// Records a node that was executed outside its window.
     pub(super) fn missed(&mut self, node: NodeId, missed: &Missed) {
         if missed.is_only_link {
             self.ends.push(node);
@@ -29,29 +29,31 @@ impl Strain {
 /// An action that should have ended by now.
 pub(crate) struct Overdue {
     pub(crate) instance: InstanceId,
-    /// When it began, on the plan's clock.
+    /// Its start, on the plan's clock.
     pub(crate) begun: Rational,
-    /// How long it was planned to take.
+    /// The planned duration.
     pub(crate) planned: Rational,
 }
 
-/// A time by which an action that is overdue may be taken to end, on the plan's clock.
+/// Assumption about the end of an overdue action, on the plan's clock.
 #[derive(Clone, Debug)]
 pub(crate) enum Until {
-    /// Whenever it likes.
+    /// It ends at any time.
     ForEver,
-    /// By then.
+    /// It ends by this time.
     At(Rational),
-    /// By then, or as much earlier as it takes.
+    /// It ends by this time, or as much earlier as the network requires.
     AtMost(Rational),
 }
 
 impl Dispatch {
-    /// Goes on by the network as it is, if that works: with what has happened outside its bounds, and with each action
-    /// that is overdue taken for one that ends by the first of these times that does.
+    /// Continues with the present network if it is still executable, despite the violations so far.
+    /// Returns `true` if it is. For each overdue action, `until` lists assumptions about its end,
+    /// and the first one with which the network works is adopted.
     ///
-    /// The time it takes does not depend on the length of the plan, but on what is next to what has happened. Where it
-    /// says no, a look at the whole rest may still find that it works.
+    /// The run time depends on the neighbours of the executed time points, not on the length of the
+    /// plan. The check is incomplete: if it returns `false`, the remaining plan may still be
+    /// feasible.
     pub(crate) fn bear(&mut self, now: &Rational, until: &dyn Fn(&Overdue) -> Vec<Until>) -> bool {
         if self.strain.is_broken {
             return false;
@@ -93,15 +95,15 @@ impl Dispatch {
             return false;
         }
         if self.missing(now).is_some() {
-            // Nobody was in time to decide on it.
+            // The executor has missed a time point.
             return false;
         }
         self.strain.ends.clear();
         true
     }
 
-    /// The latest time, `most` at most, by which an action under way may end so that the network as it is still works; on
-    /// the world's clock.
+    /// Returns the latest end of a running action, at most `most`, for which the present network
+    /// remains executable, on the world's clock.
     pub(crate) fn prolongable(
         &self,
         id: InstanceId,

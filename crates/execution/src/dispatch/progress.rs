@@ -1,4 +1,4 @@
-//! What has happened of a plan, and what is ready to be started.
+//! Execution progress of a plan: the executed time points and the starts that are ready.
 
 use std::collections::BTreeSet;
 
@@ -6,25 +6,26 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan, network_node};
 use elbowroom_stn::Network;
 
-/// The executed part of a plan.
+/// Execution progress of a plan.
 #[derive(Clone, Debug)]
 pub(super) struct Progress {
-    /// The time at which each node happened, on the plan's clock.
+    /// The time at which each node was executed, on the plan's clock.
     pub(super) happened: Vec<Option<Rational>>,
-    /// For each node, how many of those that come before it have not happened.
+    /// For each node, the number of its predecessors that have not been executed.
     pub(super) missing: Vec<u32>,
-    /// For each node, those that come after it.
+    /// For each node, its successors.
     pub(super) successors: Vec<Vec<NodeId>>,
-    /// Starts that have everything behind them that must come before.
+    /// Starts whose predecessors have all been executed.
     pub(super) ready: BTreeSet<NodeId>,
-    /// Instances that were told to start and have not ended.
+    /// Instances that were commanded to start and have not ended.
     pub(super) running: BTreeSet<InstanceId>,
-    /// Instances that have not ended.
+    /// Number of instances that have not ended.
     pub(super) left: usize,
 }
 
 impl Progress {
-    /// Nothing has happened. `constraints` are the plan's, without parameters.
+    /// Creates the progress of a plan without any executed node. `constraints` are the plan's,
+    /// without parameters.
     pub(super) fn new(plan: &StnPlan, constraints: &[Constraint]) -> Self {
         let count = plan.nodes.len();
         let mut progress = Self {
@@ -40,7 +41,7 @@ impl Progress {
         let mut order = |earlier: NodeId, later: NodeId, least: &Rational| {
             let is_end = is_end_to_wait_for(plan, &together, earlier, later);
             let is_timed = matches!(plan.nodes[earlier.index()], Node::Timed(_));
-            // Starts that have to fall together do not wait for each other.
+            // Simultaneous starts do not wait for each other.
             let follows = is_end || together[earlier.index()] != together[later.index()];
             let waits = least.is_positive() || (least.is_zero() && follows);
             if waits && !is_timed && earlier != NodeId::ZERO {
@@ -78,7 +79,7 @@ impl Progress {
         progress
     }
 
-    /// Notes that a node has happened.
+    /// Records the execution of a node.
     pub(super) fn happen(&mut self, plan: &StnPlan, node: NodeId, time: &Rational) {
         if self.happened[node.index()].replace(time.clone()).is_some() {
             return;
@@ -94,9 +95,9 @@ impl Progress {
     }
 }
 
-/// Returns `true` if `node` is an end that `later` has to wait for, even if both have to fall together.
-/// `later` does not wait for the end of an action without duration at the same moment: its own end, for
-/// example.
+/// Returns `true` if `node` is an end that `later` has to wait for, even if both must happen at the
+/// same time. `later` does not wait for the end of an action without duration at the same moment,
+/// for example its own end.
 fn is_end_to_wait_for(plan: &StnPlan, together: &[usize], node: NodeId, later: NodeId) -> bool {
     match plan.nodes[node.index()] {
         Node::End(id) => together[plan.start(id).index()] != together[later.index()],
@@ -104,7 +105,8 @@ fn is_end_to_wait_for(plan: &StnPlan, together: &[usize], node: NodeId, later: N
     }
 }
 
-/// For each node, a number that it shares with those that have to happen at the same time.
+/// Returns, for each node, a number that it shares with the nodes that must happen at the same
+/// time.
 fn falling_together(count: usize, constraints: &[Constraint]) -> Vec<usize> {
     let mut network = Network::with_nodes(count);
     let node = |id: NodeId| network_node(id);
@@ -125,10 +127,11 @@ fn falling_together(count: usize, constraints: &[Constraint]) -> Vec<usize> {
     network.components()
 }
 
-/// What a start waits for: what comes before it, and the ends that come before ends among these.
+/// Returns the nodes that a start waits for: its predecessors, and the ends that precede ends among
+/// these.
 ///
-/// Ends may fall together and are reported one after the other; the plan then orders only one of
-/// them before the start.
+/// Ends at the same time are reported one after the other, and the plan may order only one of them
+/// before the start.
 fn with_ends_before(
     plan: &StnPlan,
     before: &[BTreeSet<NodeId>],

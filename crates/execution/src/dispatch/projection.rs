@@ -1,4 +1,4 @@
-//! The rest of a plan played through in the state that is believed.
+//! Simulation of the remaining plan from the believed state.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::event::Ticket;
 use crate::executor::Moment;
 use crate::progression::Progression;
 
-/// Something that would go wrong.
+/// First failure in the simulation of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Failure {
     /// The action that needs it; `None` for the goal.
@@ -20,16 +20,16 @@ pub(crate) struct Failure {
     pub(crate) condition: String,
 }
 
-/// Tickets of actions that are only imagined to start.
+/// First ticket of simulated starts.
 const IMAGINED: u64 = 1 << 63;
 
-/// Plays the rest of the plan through, everything as planned from now on. The first condition
-/// that would not hold.
+/// Simulates the remaining plan without further deviations. Returns the first condition that does
+/// not hold.
 pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failure> {
     let mut state = moment.belief.clone();
     let mut running: Vec<(InstanceId, Ticket)> = Vec::new();
     for (time, node) in expected(dispatch, moment.now) {
-        // What cannot be computed shows as a condition that says nothing.
+        // A value that cannot be computed shows up as a condition without a value.
         let _ = state.advance(&time.max(state.time().clone()));
         if let Some(failure) = broken(&state) {
             return Some(failure);
@@ -69,7 +69,7 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
     })
 }
 
-/// The happenings to come, with the times at which they are expected, in order.
+/// Returns the coming happenings with their expected times, in order.
 fn expected(dispatch: &Dispatch, now: &Rational) -> Vec<(Rational, NodeId)> {
     let plan = dispatch.plan();
     let is_open = |node: &NodeId| {

@@ -1,4 +1,4 @@
-//! Starts that have failed and are tried again.
+//! Retries of failed starts.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId};
@@ -11,18 +11,17 @@ use crate::reason::About;
 pub(super) struct Retry {
     /// The time at which it may be tried again, on the plan's clock.
     pub(super) not_before: Rational,
-    /// How often it has failed in a row.
+    /// Number of failures in a row.
     pub(super) failures: u32,
 }
 
-/// The number of failures in a row after which the wait does not grow any more: ε · 2⁴⁰ is 35
-/// years.
+/// Number of failures in a row after which the wait does not grow any more: ε · 2⁴⁰ is 35 years.
 const MOST_DOUBLINGS: u32 = 40;
 
 impl Dispatch {
-    /// A start has failed: it is ready again, ε later after its first failure, and after each
-    /// further one in a row twice as late as before. So a start that always fails is tried a few
-    /// dozen times in the longest of runs, and one that fails now and then loses next to no time.
+    /// Makes a failed start ready again, ε after its first failure; the wait doubles with each
+    /// further failure in a row. So a start that always fails is tried a few dozen times in the
+    /// longest of runs, and one that fails occasionally loses almost no time.
     pub(crate) fn try_again(&mut self, id: InstanceId, failed: &Rational) {
         let [start, _] = self.nodes_of(id);
         let known = self.retries.get(&start);
@@ -38,14 +37,15 @@ impl Dispatch {
         self.progress.ready.insert(start);
     }
 
-    /// The time at which a start may be tried again, if it has failed.
+    /// Returns the time at which a failed start may be retried.
     pub(super) fn held_until(&self, start: NodeId) -> Option<Rational> {
         self.retries
             .get(&start)
             .map(|retry| retry.not_before.clone())
     }
 
-    /// How often a start has failed in a row; `of` describes it where it is still to come.
+    /// Returns the number of failures in a row of a start; `of` describes the start if it is still
+    /// to come.
     pub(super) fn failures(&self, start: NodeId, of: Option<String>) -> Option<About> {
         let failures = self.retries.get(&start)?.failures;
         Some(About::Retry { of, failures })

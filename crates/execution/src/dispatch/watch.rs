@@ -1,4 +1,4 @@
-//! What to do now, and when to look again.
+//! Decisions: the starts that are due, and the time of the next decision.
 
 use std::collections::BTreeMap;
 
@@ -13,14 +13,15 @@ use crate::horizon::Horizon;
 use crate::progression::{Outlook, Progression, conditions_on_duration};
 use crate::reason::{About, Cause, Reason};
 
-/// An instance that may be under way, although nobody has said so.
+/// Instance that was commanded and may be running, although its start was not reported.
 struct Silent {
-    /// Until when it may be, on the plan's clock; `None` if there is no such time.
+    /// The latest time at which it may be running, on the plan's clock; `None` if there is no
+    /// limit.
     until: Option<Rational>,
 }
 
 impl Dispatch {
-    /// The decision at this moment, after all news have been taken in.
+    /// Returns the decision at this moment. All news must have been processed.
     pub(crate) fn next(&mut self, moment: &Moment<'_>) -> Decided {
         if self.progress.left == 0 {
             return at_the_end(moment);
@@ -31,7 +32,7 @@ impl Dispatch {
         self.go_on(moment)
     }
 
-    /// The same without looking at what should have ended by now, and at over-all conditions.
+    /// Returns the decision without checks for overdue time points and broken over-all conditions.
     pub(crate) fn go_on(&mut self, moment: &Moment<'_>) -> Decided {
         if self.progress.left == 0 {
             return at_the_end(moment);
@@ -53,7 +54,7 @@ impl Dispatch {
                 continue;
             }
             let (_, latest) = self.horizon.window(network_node(node));
-            // Who waits for something that the world does is woken up by it.
+            // A start that waits for an event of the world needs no wake-up time.
             if let Ok(earliest) = self.horizon.earliest(network_node(node)) {
                 let earliest = earliest.max(self.held_until(node));
                 match earliest.filter(|earliest| *earliest > now) {
@@ -80,7 +81,7 @@ impl Dispatch {
                 }
                 continue;
             }
-            // One that is past has been noticed, or does not matter to the executor.
+            // A window that has closed was reported before, or does not matter to the executor.
             let latest = self.horizon.window(network_node(node)).1;
             if let Some(latest) = latest.filter(|latest| *latest >= now) {
                 wake_at(latest + &self.epsilon, node);
@@ -106,7 +107,8 @@ impl Dispatch {
         }
     }
 
-    /// Starts these, unless one of them lacks what it needs.
+    /// Starts these actions, except from the first one on whose conditions do not hold. If that is
+    /// the very first, a new plan is requested.
     fn order(&mut self, nodes: &[NodeId], now: &Rational, belief: &Progression) -> Decided {
         let mut orders = Vec::new();
         for &node in nodes {
@@ -144,8 +146,8 @@ impl Dispatch {
         }
     }
 
-    /// How long an action that starts now is told to take: as long as planned, or as near to that
-    /// as what is known allows.
+    /// Returns the duration that is commanded for an action that starts now: the planned one, or
+    /// the nearest value that its bounds and its window allow.
     pub(super) fn told_duration(&self, id: InstanceId, now: &Rational) -> Rational {
         let planned = self.nominal_duration(id);
         let (least, most) = &self.durations[id.index()];
@@ -169,7 +171,7 @@ impl Dispatch {
             .max(Rational::ZERO)
     }
 
-    /// The node of a running instance that is to be observed next: its end, or still its start.
+    /// Returns the node of a running instance that is to be observed next: its start or its end.
     fn awaited(&self, id: InstanceId) -> NodeId {
         let [start, end] = self.ends[id.index()];
         if self.happened(start).is_some() {
@@ -179,9 +181,10 @@ impl Dispatch {
         }
     }
 
-    /// Whether an instance was told to start in time, and nobody has said that it did: reports can
-    /// be lost, and when it did start is known from its end at the latest, or from the silence. Once it
-    /// would be over by now if it had started, it has not: its start is late.
+    /// Returns a value if an instance was commanded in time, its start was not reported, and it may
+    /// still be running. Reports can be lost; the end, or the lack of one, shows when the action
+    /// started. When its longest duration has passed since the command, it is assumed not to have
+    /// started, and its start is late.
     fn silent(&self, id: InstanceId, now: &Rational) -> Option<Silent> {
         let start = network_node(self.ends[id.index()][0]);
         let Horizon::Dispatchable(_) = self.horizon else {
@@ -196,7 +199,7 @@ impl Dispatch {
         (is_in_time && may_run).then_some(Silent { until })
     }
 
-    /// What should have happened by now and has not.
+    /// Returns the reason if a time point is overdue.
     pub(crate) fn overdue(&self, moment: &Moment<'_>) -> Option<Reason> {
         let now = self.local(moment.now);
         let (node, latest) = self.missing(&now)?;
@@ -228,11 +231,12 @@ impl Dispatch {
         Some(reason)
     }
 
-    /// The first time point that should have happened by then, on the plan's clock, and has not, with the time by which.
+    /// Returns the first time point whose window has closed by `now`, on the plan's clock, with its
+    /// latest time.
     ///
-    /// The windows are exact, so comparing each time point that is awaited with its own window
-    /// finds out whether all of them can still happen now or later. They are not moved on by the
-    /// mere passing of time, because something that has happened may be reported later.
+    /// The windows are exact, so it suffices to compare each awaited time point with its own
+    /// window. Windows are not updated merely because time passes, since an event may be reported
+    /// later than it happened.
     pub(super) fn missing(&self, now: &Rational) -> Option<(NodeId, Rational)> {
         let running = self.progress.running.iter();
         let awaited = running
@@ -248,7 +252,8 @@ impl Dispatch {
     }
 }
 
-/// The plan is done: is the goal reached, or will it be without any more doing?
+/// Decides when the plan is done: the goal is reached, it will be reached without further actions,
+/// or a new plan is needed.
 fn at_the_end(moment: &Moment<'_>) -> Decided {
     let belief = moment.belief;
     match belief.outlook() {
@@ -267,7 +272,7 @@ fn at_the_end(moment: &Moment<'_>) -> Decided {
     }
 }
 
-/// An over-all condition of something running that does not hold.
+/// Returns the reason if an over-all condition of a running action does not hold.
 fn broken(moment: &Moment<'_>) -> Option<Reason> {
     let (_, underway) = moment.belief.broken()?;
     let unmet = underway.broken_parts();
@@ -277,7 +282,8 @@ fn broken(moment: &Moment<'_>) -> Option<Reason> {
 }
 
 impl Dispatch {
-    /// Returns the condition of an action's start, or the bound on its duration, that does not hold.
+    /// Returns the reason if an action's start condition, or a bound on its duration, does not
+    /// hold.
     pub(super) fn unmet(
         &self,
         id: InstanceId,
@@ -302,8 +308,8 @@ impl Dispatch {
     }
 }
 
-/// Returns the bounds on durations that read numbers, of the instances whose durations are parameters of the plan and
-/// have no bounds there. The numbers may have changed since the plan was made.
+/// Returns the numeric bounds on durations, for instances whose durations are parameters of the
+/// plan without bounds there. The numbers may have changed since the plan was made.
 pub(super) fn numbers_of_durations(
     mission: &Mission,
 ) -> BTreeMap<InstanceId, Vec<DurationConstraint>> {
@@ -318,7 +324,7 @@ pub(super) fn numbers_of_durations(
     steps.collect()
 }
 
-/// Returns `true` if the bound reads fluents, and nothing but fluents and constants.
+/// Returns `true` if the bound reads fluents, and only fluents and constants.
 fn reads_numbers(bound: &DurationConstraint) -> bool {
     let (mut reads, mut is_known) = (false, true);
     bound.bound.visit_leaves(&mut |leaf| match leaf {

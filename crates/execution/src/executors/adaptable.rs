@@ -45,20 +45,21 @@ pub(super) const REGISTERED: Registered = Registered {
     },
 };
 
-/// A plan whose orders have at most so many happenings is searched to the end before each start,
-/// by who looks ahead.
+/// For `lookahead`: greatest number of happenings of a plan whose orders are searched completely
+/// before each start.
 const SHORT: usize = 20;
 
 /// See [`REGISTERED`]. With foresight it is `lookahead`.
 #[derive(Clone)]
 pub(super) struct Adaptable {
     likelihoods: Arc<Likelihoods>,
-    /// What is not certain of the beginning; a new plan does not change that.
+    /// Uncertain initial facts. A new plan does not change them.
     initial: Initial,
-    /// Of plans that were taken up before.
+    /// Searches of plans that were adopted earlier.
     orders: Option<Orders>,
     foresight: Option<Foresight>,
-    /// `true` if the table of a small world has led to the same state repeatedly: then orders are executed.
+    /// `true` if the table of a small world has led to the same state repeatedly. Orders are
+    /// executed then.
     is_table_circling: bool,
     state: Option<Rest>,
 }
@@ -105,7 +106,7 @@ impl Executor for Adaptable {
 }
 
 impl Adaptable {
-    /// Looks ahead.
+    /// Creates `lookahead`.
     pub(super) fn with_foresight(likelihoods: Arc<Likelihoods>, foresight: Foresight) -> Self {
         Self {
             initial: Initial::of(&likelihoods),
@@ -117,18 +118,18 @@ impl Adaptable {
         }
     }
 
-    /// All that can be done in a small world, where nothing is under way and everything is known;
-    /// with the actions.
+    /// Returns the table of a small world, with its actions. `None` if an action is running or the
+    /// state is uncertain.
     fn tabulated(&self, mission: &Mission) -> Option<(Chooser, Vec<Step>)> {
         let foresight = self.foresight.as_ref()?;
-        // A table is for who sees the state as it is.
+        // A table requires a fully known state.
         if !mission.running.is_empty() || !self.initial.is_empty() || self.is_table_circling {
             return None;
         }
         let table = foresight.table(&mission.task, &self.likelihoods)?;
         let steps = table.steps().to_vec();
-        // The world may have gone where, by the likelihoods, it cannot: the plan then needs actions that the
-        // table left out.
+        // The world may have left the states that the likelihoods permit. The plan then needs
+        // actions that the table does not have.
         let is_known = |planned: &Step| {
             let mut actions = steps.iter().map(|step| &step.action);
             let planned = &planned.action;
@@ -146,14 +147,14 @@ impl Adaptable {
         Some((chooser, steps))
     }
 
-    /// The orders of a plan, with its steps.
+    /// Returns the search for orders of a plan, with its steps.
     fn orders(&self, mission: &Mission) -> Result<(Chooser, Vec<Step>), Box<Reason>> {
         let looks_ahead = self.foresight.is_some();
         let Some(plan) = mission.order.clone() else {
             let reason = Reason::new(Cause::NoOrder).about(About::NoPartialOrder);
             return Err(Box::new(reason));
         };
-        // What is running comes first in both.
+        // In both, running actions come first.
         let by_instance = plan
             .instance_of_step
             .iter()
@@ -176,7 +177,8 @@ impl Adaptable {
             let about = About::Said(missing.to_string());
             Box::new(Reason::new(Cause::NoOrder).about(about))
         })?;
-        // On a clock facts do not change with steps: an order that counts on that would repeat steps in vain.
+        // On a clock, facts do not change from step to step. An order that relies on such changes
+        // would repeat steps in vain.
         let model = if looks_ahead {
             model.without_luck()
         } else {

@@ -1,4 +1,4 @@
-//! Who chooses the next happening of a plan, or of everything that can be done: [`Chooser`].
+//! Choice of the next happening, by orders of a plan or by the table of a small world: [`Chooser`].
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -20,13 +20,13 @@ pub(super) enum Chooser {
     Table {
         table: Arc<Table>,
         search: Box<OrderSearch>,
-        /// The value of the state in which was chosen last.
+        /// Value of the state at the last choice.
         value: f64,
     },
 }
 
 impl Chooser {
-    /// The model whose happenings are chosen, with its times.
+    /// Returns the search with its model of happenings and times.
     pub(super) fn search(&self) -> &OrderSearch {
         match self {
             Self::Orders(dispatch) => dispatch.search(),
@@ -34,7 +34,7 @@ impl Chooser {
         }
     }
 
-    /// The next choice. `watch` can interrupt a search.
+    /// Returns the next choice. `watch` can interrupt a search.
     pub(super) fn choose(
         &mut self,
         circumstances: &Circumstances,
@@ -53,12 +53,12 @@ impl Chooser {
         }
     }
 
-    /// Returns `true` if a table chooses.
+    /// Returns `true` if the policy is a table.
     pub(super) fn is_table(&self) -> bool {
         matches!(self, Self::Table { .. })
     }
 
-    /// From now on keeps an order for as long as it fits. Returns `false` if that was so before.
+    /// Keeps an order for as long as it fits, from now on. Returns `false` if that was so before.
     pub(super) fn keep_order(&mut self) -> bool {
         match self {
             Self::Orders(dispatch) => dispatch.keep_order(),
@@ -66,13 +66,13 @@ impl Chooser {
         }
     }
 
-    /// Drops the order that is being executed, so that the next choice is that of a new search. Returns `false` if there
-    /// is none, if it is new, or if it has to be kept. With `has_happened`,
-    /// the next happening has already happened at this moment.
+    /// Drops the present order, so that the next choice searches again. Returns `false` if there is
+    /// no order, if it is new, or if it has to be kept. With `has_happened`, the next happening has
+    /// already happened at this moment.
     pub(super) fn drop_order(&mut self, next: &NextHappening, has_happened: bool) -> bool {
         match self {
             Self::Orders(dispatch) if !next.is_new_order => {
-                // Between happenings of one moment nothing else can be done.
+                // Between happenings of one moment, nothing else can be started.
                 let order = dispatch.order();
                 let is_joined = order.is_some_and(|order| order.joined[next.position]);
                 let can_be_dropped = has_happened || !is_joined;
@@ -85,7 +85,7 @@ impl Chooser {
         }
     }
 
-    /// Why this is next.
+    /// Returns the reason for this choice.
     pub(super) fn about(&self, next: &NextHappening) -> About {
         match self {
             Self::Table { value, .. } => About::BestOfAll(*value),

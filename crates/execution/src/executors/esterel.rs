@@ -25,7 +25,8 @@ pub(super) const REGISTERED: Registered = Registered {
     make: |_, _| Box::new(Esterel { dispatch: None }),
 };
 
-/// See [`REGISTERED`]. Without time it is [`untimed::Esterel`](crate::untimed::Esterel).
+/// See [`REGISTERED`]. The variant for worlds without time is `untimed::Esterel` in
+/// `elbowroom-laboratory`.
 #[derive(Clone, Debug)]
 struct Esterel {
     dispatch: Option<Dispatch>,
@@ -40,12 +41,13 @@ impl Executor for Esterel {
         let plan = &mission.plan.plan;
         let bounds = |constraint: &Constraint| -> Bounds {
             if plan.duration_of(constraint).is_some() {
-                // An end comes when it comes.
+                // Ends are awaited without bounds.
                 return (None, None);
             }
             orderings(constraint)
         };
-        // Its orderings hold for planned durations; the world's may bring an end close to a start.
+        // The orderings hold for planned durations; real durations may bring an end close to a
+        // start.
         let dispatch =
             Dispatch::new(mission, Sight::Whole, &bounds)?.keeping_apart(&Rational::ZERO);
         self.dispatch = Some(dispatch);
@@ -76,14 +78,15 @@ impl Executor for Esterel {
     }
 }
 
-/// Continues with a plan by its orderings alone; `None` if they contradict each other after what has happened.
+/// Continues with a plan by its orderings alone. Returns `None` if they contradict each other after
+/// the events so far.
 pub(super) fn carry_on(mut dispatch: Dispatch, now: &Rational) -> Option<Box<dyn Executor>> {
     let local = dispatch.local(now);
     let plan = dispatch.plan().clone();
     let is_timed = |node: NodeId| matches!(plan.nodes[node.index()], Node::Timed(_));
     let reading = |constraint: &Constraint| {
         let (lower, upper) = orderings(constraint);
-        // What has to come before a timed initial has a deadline.
+        // An ordering before a timed initial is a deadline.
         Reading::Requirement {
             lower: lower.filter(|_| !is_timed(constraint.to)),
             upper: upper.filter(|_| !is_timed(constraint.from)),
@@ -95,7 +98,7 @@ pub(super) fn carry_on(mut dispatch: Dispatch, now: &Rational) -> Option<Box<dyn
     }))
 }
 
-/// Takes note of what is new; why the plan has to be given up, if it has to.
+/// Processes a news item. Returns the reason if the plan has to be abandoned.
 fn learn(dispatch: &mut Dispatch, news: &News) -> Option<Reason> {
     match news {
         News::Started { step, time, .. } => {
@@ -123,7 +126,7 @@ fn learn(dispatch: &mut Dispatch, news: &News) -> Option<Reason> {
             let reason = Reason::new(Cause::Failed).of(name).about(why);
             Some(reason.since(time.clone()))
         }
-        // What holds is looked at when something needs it.
+        // Conditions are only checked when an action is started.
         News::Fact(_) | News::Value(_) => None,
         News::Contradiction { action } => Some(Reason::new(Cause::Contradiction).of(action)),
         News::Silence { action, since } => {
@@ -132,8 +135,8 @@ fn learn(dispatch: &mut Dispatch, news: &News) -> Option<Reason> {
     }
 }
 
-/// What a constraint says about which of its time points comes first, and by how much; not how
-/// much later the other may be.
+/// Returns the bounds by which a constraint orders its time points. They contain the minimum
+/// distance, but not the maximum distance.
 fn orderings(constraint: &Constraint) -> Bounds {
     let value = |bound: &Bound| match bound {
         Bound::Finite(value) => Some(value.clone()),

@@ -38,15 +38,15 @@ impl Fixed {
         }
     }
 
-    /// The values that are close enough to a nominal one.
+    /// Returns the tolerated values around a nominal one.
     fn around(&self, nominal: &Rational) -> Interval {
         let room = nominal.abs() * &self.share;
         Interval::closed(nominal - &room, nominal + &room)
     }
 }
 
-/// When timed initials happen is known from the beginning: what keeps its distance from one of
-/// them, keeps it from time 0, which is one hop away.
+/// Replaces constraints relative to timed initials by constraints relative to time 0, which is one
+/// hop away. The times of timed initials are known from the beginning.
 fn place_timed(plan: &mut StnPlan, nominal: &Schedule) {
     let is_timed = |node: NodeId| matches!(plan.nodes[node.index()], Node::Timed(_));
     let shifted = |bound: &Bound, by: &Rational| match bound {
@@ -60,7 +60,7 @@ fn place_timed(plan: &mut StnPlan, nominal: &Schedule) {
     };
     let placed = plan.constraints.iter().map(|constraint| {
         let (from, to) = (constraint.from, constraint.to);
-        // In either direction: as bounds on what is not timed, counted from what is.
+        // In both directions: bounds on the untimed node, counted from the timed one.
         let (timed, other, lower, upper) = match (is_timed(from), is_timed(to)) {
             (true, false) => (from, to, constraint.lower.clone(), constraint.upper.clone()),
             (false, true) => (
@@ -102,7 +102,7 @@ impl Executor for Fixed {
             };
             let time = |node: elbowroom_plan::NodeId| &mission.nominal[node];
             let room = self.around(&(time(constraint.to) - time(constraint.from)));
-            // What is left of a running action is a guess; it may well end sooner.
+            // The remaining duration of a running action is an estimate; the action may end sooner.
             let is_rest = mission.running.contains_key(&StepId::from(instance));
             let lower = if is_rest {
                 Some(Rational::ZERO)
@@ -111,7 +111,8 @@ impl Executor for Fixed {
             };
             (lower, room.upper.value().cloned())
         };
-        // Its orderings are those of facts alone, so numbers may be written and read at one time.
+        // The orderings are those of facts alone, so numbers could be written and read at the same
+        // time.
         let dispatch =
             Dispatch::new(mission, Sight::OneHop, &bounds)?.keeping_apart(&Rational::ZERO);
         self.state = Some((dispatch, mission.clone()));

@@ -34,14 +34,14 @@ struct Guard {
     dispatch: Dispatch,
     mission: Mission,
     envelope: DecoupledEnvelope,
-    /// The box that dispatching keeps: smaller than the envelope, if that requires knowing values
-    /// in advance.
+    /// The guarantee that dispatching maintains. It covers less than the envelope if the whole
+    /// envelope would require knowing values in advance.
     promise: Promise,
-    /// Whether the plan needs more than facts, one by one.
+    /// `true` if the plan's conditions are more than single facts, for example numeric.
     reads_more_than_facts: bool,
-    /// The weakest promise with which it goes on.
+    /// The weakest promise with which the plan is continued.
     least: Promise,
-    /// The values observed, and the nominal ones of the rest.
+    /// The observed values, and nominal ones for the rest.
     values: Valuation,
 }
 
@@ -127,8 +127,9 @@ impl Executor for Guarded {
 }
 
 impl Guard {
-    /// Until when an action under way may go on beyond what dispatching reckons with now: within its interval, if the
-    /// plan was taken up with all of its envelope.
+    /// Returns the latest end of a running action, beyond its present window, that does not require
+    /// a new plan. It lies within the action's interval if the plan was adopted with its whole
+    /// envelope.
     fn bears_until(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
         let [start, _] = self.dispatch.nodes_of(instance);
         let begun = self.dispatch.happened(start)?;
@@ -144,11 +145,11 @@ impl Guard {
         Some(latest.min(self.dispatch.world(&most)))
     }
 
-    /// Why the plan is to be given up, if something happened at another time than dispatching
-    /// reckoned with. It may go on with the rest where every quantity is still inside the envelope: if
-    /// dispatching never reckoned with all of that, or if a start is late, as on any clock, which takes
-    /// room from what comes after. Envelopes take all the room that there is, so that there may be none
-    /// to spare for that.
+    /// Returns the reason to abandon the plan if an event happened outside its window. The plan is
+    /// continued if every quantity is still inside the envelope and one of two conditions holds:
+    /// the dispatched network never covered the whole envelope, or a start is late. On a real clock
+    /// all starts are a little late, which reduces the slack of later steps, and an envelope may
+    /// use up all the slack there is.
     fn outlast(&mut self, now: &Rational, reason: Reason) -> Option<Box<Reason>> {
         let local = self.dispatch.local(now);
         let mut has_outlived = false;
@@ -194,7 +195,7 @@ impl Guard {
         }
     }
 
-    /// Why an amount that was measured is not guaranteed to do.
+    /// Returns the reason if a measured amount is outside its guaranteed interval.
     fn outside(&self, reading: &Reading, now: &Rational) -> Option<Reason> {
         let (about, observed, allowed) = if let Some((parameter, value)) = reading.value() {
             let name = self.mission.plan.parameter(parameter).name.clone();
@@ -220,8 +221,9 @@ impl Guard {
         Some(reason.since(now.clone()))
     }
 
-    /// The amounts that come about while each of several parameters is in its interval. Which
-    /// values they had is not known, but that they had some of these is all the guarantee asks.
+    /// Returns the amounts that are possible while all of their parameters lie in their intervals.
+    /// The values of the individual parameters are unknown, but the guarantee only requires that
+    /// such values exist.
     fn guaranteed(&self, reading: &Reading) -> Interval {
         let mut amounts = Interval::point(reading.constant.clone());
         for (parameter, slope) in &reading.slopes {
@@ -239,7 +241,7 @@ impl Guard {
     }
 }
 
-/// The end of an interval moved by `slope` times another one.
+/// Returns the end of an interval, moved by `slope` times another end.
 fn moved(end: &End, by: &End, slope: &Rational) -> End {
     match (end.value(), by.value()) {
         (Some(value), Some(by_value)) => {

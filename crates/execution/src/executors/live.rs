@@ -1,4 +1,4 @@
-//! `live`: the envelope after each observation, with what was observed fixed.
+//! `live`: the envelope is recomputed after each observation, with the observed values fixed.
 
 mod alternative;
 mod carrying_on;
@@ -58,41 +58,42 @@ pub(super) const REGISTERED: Registered = Registered {
 /// See [`REGISTERED`].
 struct Live {
     region: Box<dyn Region>,
-    /// The source of likelier plans, and by how much one must be likelier.
+    /// The comparison of plans, and the advantage that another plan must have.
     odds: Option<(Box<dyn Odds>, Rational)>,
     state: Option<Rest>,
-    /// The hope for the plan for which another one was requested.
+    /// The hope for the plan that was abandoned last.
     hope: Hope,
     /// A plan that is executed without a guarantee.
     carried_on: Option<CarriedOn>,
     repetition: Repetition,
 }
 
-/// A plan, and what is known of its open quantities.
+/// A plan being executed, with the knowledge about its open parameters.
 #[derive(Clone)]
 struct Rest {
     dispatch: Dispatch,
-    /// The guarantee of the rest of the plan.
+    /// The guarantee of the remaining plan.
     promise: Promise,
     /// The guarantee when a better plan was last searched for, or when the plan began.
     sought_at: Promise,
     mission: Arc<Mission>,
-    /// The values observed, and the nominal ones of the rest.
+    /// The observed values, and nominal ones for the rest.
     values: Valuation,
-    /// The parameters that are durations, by instance, and those that stand in constraints.
+    /// Duration parameters by instance, and the parameters that occur in constraints.
     durations: BTreeMap<InstanceId, ParameterId>,
     in_constraints: BTreeSet<ParameterId>,
-    /// What was observed, as long as it lies within the envelope.
+    /// Observations, compared with the envelope.
     inside: Inside,
-    /// The amounts that were observed: by which instance, at its end or its start.
+    /// Measured amounts: the instance, `true` for its end or `false` for its start, and the amount.
     amounts: Vec<(InstanceId, bool, Measured)>,
-    /// Whether the plan needs more than facts, one by one, and whether durations move any number.
+    /// `true` if the plan's conditions are more than single facts, and if any number depends on a
+    /// duration.
     reads_more_than_facts: bool,
     durations_move_numbers: bool,
-    /// How long the actions under way may take of which that has been found out; `None` where numbers do not limit
-    /// it. Of the others it is known that they may take as long as the envelope has it.
+    /// Longest durations of running actions, as far as they were computed; `None` if numbers do not
+    /// limit the duration. An action without an entry may take as long as the envelope permits.
     limits: BTreeMap<InstanceId, Option<Rational>>,
-    /// `true` if the rest is continued although it is too late for a deadline.
+    /// `true` if the remaining plan is continued although it is too late for a deadline.
     ignores_deadlines: bool,
 }
 
@@ -180,7 +181,7 @@ impl Executor for Live {
         rest.bears_until(step.instance(), now)
     }
 
-    /// Without anybody to compare plans.
+    /// The copy does not compare plans.
     fn fork(&self) -> Option<Box<dyn Executor>> {
         let carried_on = match &self.carried_on {
             Some(carried_on) => Some(carried_on.fork()?),
@@ -260,7 +261,8 @@ impl Rest {
         Ok(rest)
     }
 
-    /// Something was not as promised, or other times follow from what was observed: makes the most of what is left.
+    /// Continues with the strongest promise for the remaining plan that still holds, after a
+    /// deviation or after an observation that changes the plan's times (`moves_times`).
     fn weaken(
         &mut self,
         now: &Rational,
@@ -280,8 +282,9 @@ impl Rest {
         Ok(())
     }
 
-    /// Until when an action under way may go on beyond what dispatching reckons with now, if nothing else deviates any
-    /// more. Where numbers depend on how long it takes, so long as that has been found out.
+    /// Returns the latest end of a running action, beyond its present window, if nothing else
+    /// deviates any more. If numbers depend on durations, the result is `None` unless the limit of
+    /// this duration was computed.
     fn bears_until(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
         let limit = if self.durations_move_numbers {
             self.limits.get(&instance)?.as_ref()
@@ -295,7 +298,7 @@ impl Rest {
         latest.into_iter().chain(limit).min()
     }
 
-    /// Takes note of what is new, and asks whether the rest is still guaranteed.
+    /// Processes the news, and checks whether the remaining plan is still guaranteed.
     fn learn(&mut self, moment: &Moment<'_>, region: &mut dyn Region) -> Option<Box<Reason>> {
         let trouble = self.dispatch.take(moment);
         let moves_times = self.observe(moment);
@@ -319,8 +322,9 @@ impl Rest {
         if self.is_covered(moment.now, region) {
             return None;
         }
-        // Only ends and amounts can move the rest out of what is known of it; and what begins while something takes
-        // longer than that needs the room that is left.
+        // Only ends and measured amounts can move the remaining plan out of the known box. While an
+        // action takes longer than the box permits, starts can too, because they need the slack
+        // that the delay uses up.
         let is_beyond = self.is_beyond(moment.now);
         let mut instances = moment
             .news
@@ -340,8 +344,8 @@ impl Rest {
         None
     }
 
-    /// Looks for a box within which the rest works; if it does not even if nothing deviates any more, why not. What has
-    /// happened to an action is why it is asked.
+    /// Computes a box of values for the remaining plan. Returns the reason if the plan fails even
+    /// when executed nominally. The reason names `instance`, whose news led to the query.
     fn ask(
         &mut self,
         instance: InstanceId,
@@ -367,8 +371,8 @@ impl Rest {
         }
     }
 
-    /// Why another plan is to be preferred. Asked when an action has ended and nothing is under
-    /// way: a new plan costs nothing then that had been begun.
+    /// Returns the reason to prefer another plan, if there is one. Only evaluated when an action
+    /// has ended and none is running, because a new plan does not interrupt anything then.
     fn likelier(
         &self,
         moment: &Moment<'_>,
@@ -407,8 +411,8 @@ impl Rest {
         Some(reason.since(moment.now.clone()))
     }
 
-    /// Puts observed values in place of planned ones. Whether other times follow from them than
-    /// from what has happened.
+    /// Replaces planned values by observed ones. Returns `true` if an observed amount changes a
+    /// constraint of the plan.
     fn observe(&mut self, moment: &Moment<'_>) -> bool {
         for instance in moment.news.iter().filter_map(instance_of) {
             self.observe_duration(instance);
@@ -429,7 +433,7 @@ impl Rest {
             self.inside.leave();
         }
         for reading in readings {
-            // Of one amount in which several stand nobody knows which it was.
+            // An amount that depends on several parameters does not determine their values.
             if let Some((parameter, value)) = reading.value() {
                 self.observe_amount(parameter, &value);
                 moves_times |=
@@ -440,8 +444,8 @@ impl Rest {
         moves_times
     }
 
-    /// The plan with what has happened fixed and the rest not before now, and the values at which
-    /// nothing deviates any more.
+    /// Returns the remaining plan, in which executed time points are fixed and others cannot happen
+    /// before `now`, with the values if nothing deviates any more.
     fn remainder(&self, now: &Rational) -> (ParametrizedPlan, Valuation) {
         let mut plan = self.mission.plan.clone();
         let values = self.values_at(now);
@@ -459,7 +463,7 @@ impl Rest {
             if self.dispatch.happened(end).is_some() {
                 *range = Interval::point(values[parameter].clone());
             } else {
-                // What is under way has taken so long already.
+                // A running action takes at least the time that has elapsed.
                 *range = range.intersection(&Interval::at_least(&now - start));
             }
         }
@@ -472,7 +476,7 @@ impl Rest {
         (plan, values)
     }
 
-    /// The values at which nothing deviates any more.
+    /// Returns the values if nothing deviates any more.
     fn values_at(&self, now: &Rational) -> Valuation {
         let mut values = self.values.clone();
         let now = self.dispatch.local(now);
@@ -489,7 +493,7 @@ impl Rest {
     }
 }
 
-/// The parameters that stand in constraints of the plan.
+/// Returns the parameters that occur in constraints of the plan.
 fn in_constraints(plan: &ParametrizedPlan) -> BTreeSet<ParameterId> {
     let constraints = plan.plan.constraints.iter();
     let bounds = constraints.flat_map(|constraint| [&constraint.lower, &constraint.upper]);
@@ -500,13 +504,13 @@ fn in_constraints(plan: &ParametrizedPlan) -> BTreeSet<ParameterId> {
     parameters.collect()
 }
 
-/// The bounds of a parameter's values.
+/// Returns the bounds of a parameter's values.
 fn range(plan: &ParametrizedPlan, parameter: ParameterId) -> Bounds {
     let range = &plan.parameter(parameter).range;
     (range.lower.value().cloned(), range.upper.value().cloned())
 }
 
-/// The instance whose start or end is told of.
+/// Returns the instance whose start or end is reported.
 fn instance_of(news: &News) -> Option<InstanceId> {
     match news {
         News::Started { step, .. } | News::Ended { step, .. } => Some(step.instance()),
@@ -514,7 +518,7 @@ fn instance_of(news: &News) -> Option<InstanceId> {
     }
 }
 
-/// The step whose news can move the rest of a plan out of its envelope.
+/// Returns the step of a news item that can move the remaining plan out of its envelope.
 fn may_matter(news: &News) -> Option<StepId> {
     match news {
         News::Ended { step, .. } => Some(*step),
@@ -523,7 +527,7 @@ fn may_matter(news: &News) -> Option<StepId> {
     }
 }
 
-/// Puts the amount that was measured in place of what the domain says.
+/// Replaces the amount of the domain by the measured one.
 fn set_amount(action: &mut Action, is_end: bool, measured: &Measured) {
     let effects: &mut [Effect] = match &mut action.body {
         Body::Instantaneous(snap) => &mut snap.effects,

@@ -1,4 +1,4 @@
-//! `lookahead`: what is best in the world of the likelihoods, on a clock.
+//! `lookahead`: the best action in the world of the likelihoods, on a clock.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -30,8 +30,9 @@ pub(super) const REGISTERED: Registered = Registered {
     },
 };
 
-/// The policy table of `lookahead` for a problem and its likelihoods, shared by clones. It changes no decision: it
-/// saves computing the same table in every run. When the goal changes, the table is replaced.
+/// Cache of `lookahead`'s policy table for a problem and its likelihoods, shared by clones. It does
+/// not change decisions; it avoids computing the same table in every run. When the goal changes,
+/// the table is replaced.
 #[derive(Clone, Debug, Default)]
 pub struct Foresight(Arc<Mutex<Option<GoalTable>>>);
 

@@ -1,5 +1,5 @@
-//! `policy`: the plan while its guarantee costs no probability, then the likeliest move, on a
-//! clock.
+//! `policy`, on a clock: follows the plan while its guarantee costs no success probability, then
+//! makes the most likely move.
 
 mod moves;
 mod rehearsed;
@@ -43,7 +43,7 @@ pub(super) const REGISTERED: Registered = Registered {
             return Box::new(Rehearsed::new(rehearsal, keeper));
         }
         let outlook = means.outlook.clone();
-        // Whoever weighs moves needs nobody to compare plans.
+        // An executor that evaluates moves does not need to compare plans.
         let compares = means.odds.is_some() && outlook.is_none();
         let advantage = compares.then(|| Rational::from(5));
         Box::new(Policy {
@@ -62,36 +62,35 @@ pub(super) const REGISTERED: Registered = Registered {
     },
 };
 
-/// How much probability is given away at most, all in all, for keeping to a plan with its
-/// guarantee.
+/// Total loss of success probability that is accepted for following a plan with a guarantee.
 const MOST_FORGONE: f64 = 0.005;
 
-/// So often at one time something is started or let go; then the next period is waited for.
+/// Number of decisions to start or cancel actions at one time, after which the next period is
+/// awaited.
 const MOST_AT_ONCE: u32 = 50;
 
 /// See [`REGISTERED`].
 struct Policy {
     outlook: Option<Arc<dyn Outlook>>,
-    /// Who executes the plan.
+    /// Executor of the plan.
     plan: Box<dyn Executor>,
-    /// Whether the plan is being followed.
+    /// `true` while the plan is followed.
     follows: bool,
-    /// How much probability has been given away for that.
+    /// Loss of success probability by following the plan, in total.
     forgone: f64,
-    /// What was ordered and has not ended: its name, whether the plan ordered it, whether it has
-    /// started.
+    /// Commanded actions that have not ended.
     steps: BTreeMap<StepId, Ordered>,
-    /// The facts that the world has changed by itself.
+    /// Spontaneous changes of facts.
     changed: Vec<(FactId, bool)>,
-    /// When something happened last.
+    /// The time of the last happening.
     last: Option<Rational>,
-    /// The last period at whose beginning it was decided to wait.
+    /// The last period at whose beginning the decision was to wait.
     waited: Option<usize>,
-    /// When something was ordered last, and how often at that time.
+    /// The time of the last command, and the number of decisions with commands at that time.
     ordered: Option<(Rational, u32)>,
     /// The number of the next order.
     next_step: u32,
-    /// Why the plan is not followed any more.
+    /// Reason for which the plan is no longer followed.
     lost: Option<Reason>,
 }
 
@@ -100,15 +99,15 @@ struct Ordered {
     name: String,
     is_of_plan: bool,
     has_started: bool,
-    /// Whether it was told to stop.
+    /// `true` if it was cancelled.
     is_let_go: bool,
 }
 
-/// When moves are weighed.
+/// Time of the next evaluation of moves.
 enum Turn {
     /// Now, in this period.
     Now(usize),
-    /// At the beginning of this one.
+    /// At the beginning of this period.
     At(usize),
 }
 
@@ -173,8 +172,8 @@ impl Executor for Policy {
 }
 
 impl Policy {
-    /// Takes note of what is new; what of it is about the plan, and why nobody knows how things
-    /// stand, if that is so.
+    /// Processes the news. Returns the news that concern the plan, and the reason if the state has
+    /// become uncertain.
     fn learn(&mut self, moment: &Moment<'_>) -> (Vec<News>, Option<Reason>) {
         let (mut own, mut doubt) = (Vec::new(), None);
         for news in moment.news {
@@ -222,7 +221,7 @@ impl Policy {
         (own, doubt)
     }
 
-    /// Takes note of what is ordered.
+    /// Records the commanded and cancelled actions.
     fn note(&mut self, decided: &Decided, now: &Rational) {
         let orders: &[Order] = match &decided.decision {
             Decision::Start(orders) => orders,
@@ -250,7 +249,8 @@ impl Policy {
         });
     }
 
-    /// The decision, if moves can be weighed; `kept` is what the plan says.
+    /// Returns the decision by the values of the moves. `kept` is the decision of the plan's
+    /// executor.
     fn weigh(
         &mut self,
         moment: &Moment<'_>,
@@ -258,7 +258,7 @@ impl Policy {
         outlook: &dyn Outlook,
     ) -> Decided {
         let kept = self.still_kept(kept);
-        // What counts is that the goal holds, whatever the plan would still do.
+        // The goal holds, so the remaining steps of the plan are not needed.
         if moment.belief.outlook() == Prospect::Reached {
             self.follows = false;
             return self.finish();
@@ -290,7 +290,7 @@ impl Policy {
             return match (kept, turn) {
                 (Some(kept), _) => kept,
                 (None, Turn::Now(_)) => self.hopeless(moment.now),
-                // Before it begins, something may happen still.
+                // Until it begins, an event may still help.
                 (None, Turn::At(period)) => {
                     let until = begins(period, outlook.period());
                     wait(Some(until), About::NextDecision(0.0))
@@ -319,7 +319,8 @@ impl Policy {
         }
     }
 
-    /// The goal holds, and is not taken as reached while anything is under way.
+    /// Ends the run when the goal holds. Running actions are cancelled first, because the goal does
+    /// not count as reached while an action is running.
     fn finish(&self) -> Decided {
         let open = self.steps.iter();
         let open: Vec<StepId> = open
@@ -340,7 +341,7 @@ impl Policy {
         }
     }
 
-    /// What the plan says, unless it is to be given up.
+    /// Returns the decision of the plan's executor, or `None` if it requests a new plan.
     fn still_kept(&mut self, kept: Option<Decided>) -> Option<Decided> {
         let kept = kept?;
         if kept.decision == Decision::Replan {
@@ -351,7 +352,7 @@ impl Policy {
         Some(kept)
     }
 
-    /// Nobody knows a way from here: another plan may.
+    /// Requests a new plan, because no move is known to lead to the goal.
     fn hopeless(&self, now: &Rational) -> Decided {
         let reason = self.lost.clone();
         replan(reason.unwrap_or_else(|| Reason::new(Cause::NoOrder).since(now.clone())))

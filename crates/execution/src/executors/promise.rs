@@ -1,4 +1,4 @@
-//! What can be promised of the rest of a plan: the most that still holds.
+//! The strongest promise that still holds for the remaining plan.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::Reading;
@@ -13,31 +13,32 @@ use crate::executor::{Mission, StepId};
 use crate::quantities::duration_parameters;
 use crate::reason::{About, Cause, Promise, Reason};
 
-/// How much of the room around what is planned is tried, in sixteenths. On a clock each start is a little late, and where
-/// ends of the room lie on their limits, that takes as little from it.
+/// Shares of the envelope around the planned values that are tried, in sixteenths. On a real clock
+/// each start is a little late; where the envelope has no slack to spare, a slightly smaller share
+/// makes up for that.
 const SHARES: [i64; 7] = [16, 15, 12, 8, 4, 2, 1];
 
 /// A reading of each constraint of a plan.
 type Readings<'a> = dyn Fn(&Constraint) -> Reading + 'a;
 
-/// Possible values of [`slack`], the greatest first, in sixteenths.
+/// Possible values of [`slack`] in sixteenths, the greatest first.
 const SLACKS: [i64; 5] = [16, 8, 4, 2, 1];
 
 /// The assumption about the remaining duration of overdue actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Overrun {
-    /// However long.
+    /// Unlimited.
     ForEver,
-    /// Another quarter of what was planned.
+    /// A quarter of the planned duration.
     Quarter,
-    /// They are taken to end when it suits.
+    /// They are assumed to end at the most favourable time.
     Suitable,
 }
 
-/// Takes up a plan with the most that can be promised of it.
+/// Creates the dispatch of a plan with the strongest promise.
 ///
 /// # Errors
-/// When no times satisfy the plan's constraints.
+/// If no times satisfy the plan's constraints.
 pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason>> {
     let values = mission.plan.nominal();
     let runs = |instance: InstanceId| mission.running.contains_key(&StepId::from(instance));
@@ -54,13 +55,13 @@ pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason
         let reading = |constraint: &Constraint| room.reading(constraint);
         Dispatch::controlled(mission, &reading)
     };
-    // Without an envelope nothing is known of numbers but what the plan says.
+    // Without an envelope, numeric conditions are only known to hold for the planned values.
     let reads_more_than_facts = mission.plan.reads_more_than_facts(&mission.task);
     let knows_room = mission.envelope.is_some() || !reads_more_than_facts;
     most(reads_more_than_facts, knows_room, &mut attempt)
 }
 
-/// Whether a reason says that something happened at another time than the plan allows.
+/// Returns `true` if the reason is that something happened outside the times that the plan permits.
 pub(super) fn is_about_time(reason: &Reason) -> bool {
     matches!(
         reason.cause,
@@ -68,31 +69,33 @@ pub(super) fn is_about_time(reason: &Reason) -> bool {
     )
 }
 
-/// Returns whether a reason to abandon a plan says that time is lacking, so that the plan works if something takes less.
+/// Returns `true` if a plan was abandoned because time is too short, so that it works if something
+/// takes less time.
 pub(super) fn lacks_time(reason: &Reason) -> bool {
     is_about_time(reason) || matches!(reason.about, Some(About::TooLittleTime))
 }
 
-/// What is left of a plan.
+/// The remaining plan.
 pub(super) struct Rest<'a> {
     pub(super) mission: &'a Mission,
-    /// The values observed, and for the rest the planned ones.
+    /// The observed values, and planned ones for the rest.
     pub(super) values: &'a Valuation,
-    /// Whether nothing has left the envelope, what is under way included: what numbers bear is known
-    /// of all of it then.
+    /// `true` if no quantity has left the envelope, including the durations of running actions.
+    /// Then the numeric conditions are guaranteed in all of the envelope.
     pub(super) is_inside: bool,
-    /// Whether the plan needs more than facts, one by one.
+    /// `true` if the plan's conditions are more than single facts, for example numeric.
     pub(super) reads_more_than_facts: bool,
-    /// What was promised of it before.
+    /// The promise so far.
     pub(super) promise: Promise,
-    /// Whether its constraints are not what they were, with what was observed.
+    /// `true` if an observation has changed the plan's constraints.
     pub(super) has_other_constraints: bool,
 }
 
-/// Something was not as promised: makes the most of what is left.
+/// Returns the strongest promise for the remaining plan that still holds after a deviation, and
+/// dispatches accordingly.
 ///
 /// # Errors
-/// When the rest does not work even if nothing deviates any more.
+/// If the remaining plan fails even when executed nominally.
 pub(super) fn weaken(
     dispatch: &mut Dispatch,
     rest: &Rest<'_>,
@@ -108,7 +111,7 @@ pub(super) fn weaken(
         has_other_constraints,
     } = *rest;
     let local = dispatch.local(now);
-    // What numbers bear is known only where nothing has left the envelope.
+    // Numeric conditions are only guaranteed while no quantity has left the envelope.
     let is_unknown = !is_inside && reads_more_than_facts;
     if !has_other_constraints && dispatch.bear(&local, &|overdue| ends(rest, overdue, &local)) {
         return Ok(if is_unknown {
@@ -140,7 +143,7 @@ pub(super) fn weaken(
         return Ok(promise);
     }
     if reason.cause == Cause::Unreachable {
-        // What cannot happen in time any more says more than what stands against each other.
+        // A missed time point explains more than the conflicting constraints.
         return Err(Box::new(reason));
     }
     let mut lost = Reason {
@@ -152,8 +155,9 @@ pub(super) fn weaken(
     Err(Box::new(lost.since(now.clone())))
 }
 
-/// The last moment, in the world's time, at which an action under way can end so that the rest works if nothing else
-/// deviates any more; `None` if there is none, or no limit. Takes time in proportion to the plan.
+/// Returns the latest end of a running action for which the remaining plan works if nothing else
+/// deviates any more, on the world's clock. `None` if there is none, or no limit. Takes time in
+/// proportion to the plan.
 pub(super) fn bears_until(
     dispatch: &Dispatch,
     (mission, values): (&Mission, &Valuation),
@@ -183,8 +187,8 @@ pub(super) fn bears_until(
     dispatch.latest_end(late, now, &reading)
 }
 
-/// Returns the possible times of the rest of a plan if actions that have not ended take at least this share of their
-/// planned durations.
+/// Returns the schedules of the remaining plan if the actions that have not ended take at least
+/// this share of their planned durations.
 pub(super) fn times_if_faster(
     dispatch: &Dispatch,
     values: &Valuation,
@@ -210,14 +214,15 @@ pub(super) fn times_if_faster(
     dispatch.possible_times(now, &reading)
 }
 
-/// The time for which an action has run, on the plan's clock; `None` if it does not run.
+/// Returns the time for which an action has been running, on the plan's clock; `None` if it is not
+/// running.
 fn elapsed(dispatch: &Dispatch, instance: InstanceId, now: &Rational) -> Option<Rational> {
     let [start, end] = dispatch.nodes_of(instance);
     let begun = dispatch.happened(start)?;
     dispatch.happened(end).is_none().then(|| now - begun)
 }
 
-/// Returns the slack of the rest of a plan: see [`slack`].
+/// Returns the slack of the remaining plan: see [`slack`].
 pub(super) fn slack_of_rest(
     dispatch: &Dispatch,
     plan: (&Mission, &Valuation),
@@ -240,8 +245,9 @@ pub(super) fn slack_of_plan(mission: &Mission) -> Rational {
     })
 }
 
-/// Returns the greatest share of the planned durations with this property: each deadline is still met if every duration
-/// deviates by that share. It is a power of 1/2, at most 1, or 0 below 1/16. Numbers do not count.
+/// Returns the slack: the greatest share of the planned durations by which all durations may
+/// deviate without missing a deadline. It is a power of 1/2, at most 1, or 0 if it is below 1/16.
+/// Numeric conditions are ignored.
 fn slack(
     (mission, values): (&Mission, &Valuation),
     elapsed: &dyn Fn(InstanceId) -> Option<Rational>,
@@ -263,13 +269,14 @@ fn slack(
     greatest.unwrap_or_default()
 }
 
-/// When an action that is overdue may end, on the plan's clock, the most that is asked for first.
+/// Returns the assumptions about the end of an overdue action, on the plan's clock, the most
+/// general one first.
 fn ends(rest: &Rest<'_>, overdue: &Overdue, now: &Rational) -> Vec<Until> {
     let plan = &rest.mission.plan;
     if rest.is_inside
         && let Some(envelope) = &rest.mission.envelope
     {
-        // It may be where it has had its share, and is still inside.
+        // The action may have exceeded its share and still be inside the envelope.
         let mut durations = duration_parameters(plan);
         let own = durations.find(|(_, instance)| *instance == overdue.instance);
         let upper = own.and_then(|(parameter, _)| envelope.interval(parameter).upper.value());
@@ -283,13 +290,14 @@ fn ends(rest: &Rest<'_>, overdue: &Overdue, now: &Rational) -> Vec<Until> {
     vec![Until::ForEver, Until::At(quarter)]
 }
 
-/// How much longer an action is taken to go on that is overdue.
+/// Returns the additional time that an overdue action is assumed to take.
 fn quarter(mission: &Mission, planned: &Rational) -> Rational {
     (planned / Rational::from(4)).max(mission.task.epsilon().clone())
 }
 
-/// The first attempt to succeed, with what it promises. What numbers bear is known of all of the
-/// envelope, or, once something has left it (`knows_room` does not hold), of what is planned.
+/// Returns the result of the first attempt that succeeds, with its promise, from the strongest
+/// assumptions to the weakest. Numeric conditions are guaranteed in all of the envelope or, once a
+/// quantity has left it (`knows_room` is `false`), only for the planned values.
 fn most<T, E>(
     reads_more_than_facts: bool,
     knows_room: bool,
@@ -319,26 +327,28 @@ fn most<T, E>(
     attempt(&Rational::ZERO, Overrun::Suitable).map(|done| (done, Promise::Luck))
 }
 
-/// The room that the rest of a plan is tried with.
+/// Assumptions about the durations of the remaining plan.
 struct Room<'a> {
     mission: &'a Mission,
-    /// The box that gives each duration its room. Without one, it is as much again as the planned duration.
+    /// The box with the intervals of the durations. Without one, each duration may deviate by up to
+    /// its planned value.
     envelope: Option<&'a DecoupledEnvelope>,
-    /// The values observed, and the nominal ones of the rest.
+    /// The observed values, and nominal ones for the rest.
     values: &'a Valuation,
-    /// How much of the room around what is planned; 1 is all of it.
+    /// The share of the envelope around the planned values; 1 is all of it.
     share: &'a Rational,
     overrun: Overrun,
-    /// Whether nothing has left the envelope, what is under way included.
+    /// `true` if no quantity has left the envelope, including the durations of running actions.
     is_inside: bool,
-    /// For how long an instance has been under way.
+    /// The time for which an instance has been running.
     elapsed: &'a dyn Fn(InstanceId) -> Option<Rational>,
 }
 
 impl Room<'_> {
     fn reading(&self, constraint: &Constraint) -> Reading {
         let plan = &self.mission.plan;
-        // What does not reckon with any more deviations may tell actions other durations too.
+        // With share 0, no more deviations are assumed, and the executor may command other
+        // durations.
         if let Some(planned) = plan.told_by(constraint)
             && !self.share.is_zero()
         {
@@ -357,7 +367,8 @@ impl Room<'_> {
         let Some(elapsed) = (self.elapsed)(instance) else {
             return Reading::Contingent { lower, upper };
         };
-        // Inside the envelope it may still be where it has had its share: then its share is one of what is left.
+        // An action may have exceeded its share and still be inside the envelope. Then the share
+        // applies to the rest of its interval.
         let has_had_it = upper.as_ref().is_some_and(|upper| *upper < elapsed);
         let upper = if self.is_inside && has_had_it {
             let all = self.interval(parameter, &Rational::ONE).1;
@@ -385,7 +396,7 @@ impl Room<'_> {
         }
     }
 
-    /// A share of the envelope around what is planned.
+    /// Returns a share of a parameter's interval in the envelope, around the planned value.
     fn interval(&self, id: ParameterId, share: &Rational) -> (Rational, Option<Rational>) {
         let planned = &self.values[id];
         if share.is_zero() {
@@ -400,7 +411,7 @@ impl Room<'_> {
         let lower = interval.lower.value().map_or(Rational::ZERO, within);
         let upper = match interval.upper.value() {
             Some(upper) => Some(within(upper)),
-            // A share of infinitely much room is in proportion to what is planned.
+            // A share of an infinite interval is proportional to the planned value.
             None if *share == Rational::ONE => None,
             None => Some(planned + planned * share * Rational::from(16)),
         };
@@ -408,7 +419,7 @@ impl Room<'_> {
     }
 }
 
-/// The parameter that a constraint says is a duration or the time of a timed initial.
+/// Returns the parameter if the constraint sets a duration or the time of a timed initial to it.
 fn duration(plan: &ParametrizedPlan, constraint: &Constraint) -> Option<ParameterId> {
     match (&constraint.lower, &constraint.upper) {
         (Bound::Parameter(lower), Bound::Parameter(upper))

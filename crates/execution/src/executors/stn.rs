@@ -34,9 +34,9 @@ impl Executor for Stn {
     }
 
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
-        // Where the domain leaves a duration open the world may have its way, if the plan bears
-        // that; if not, the executor goes by the durations that are planned, or by what it can
-        // choose.
+        // If the domain leaves a duration open, it is contingent, provided that the network is then
+        // dynamically controllable. If not, the executor commands the planned durations, or else
+        // chooses durations itself.
         let attempt = |open: Open| {
             let reading = |constraint: &Constraint| reading(mission, constraint, open);
             Dispatch::controlled(mission, &reading)
@@ -81,9 +81,9 @@ fn reads_planned_duration(mission: &Mission) -> bool {
 /// The party that chooses a duration which the domain leaves open.
 #[derive(Clone, Copy, Debug)]
 enum Open {
-    /// The world, as long as the domain allows.
+    /// The world, within the bounds of the domain.
     World,
-    /// The executor, who tells the action at its start to take as long as planned.
+    /// The executor, which commands the planned duration at the start.
     Planned,
     /// The executor.
     Executor,

@@ -1,4 +1,4 @@
-//! Effects: what a happening changes.
+//! Effects of happenings.
 
 use elbowroom_model::ground::{Change, Effect, FluentId, SnapAction};
 use elbowroom_model::problem::UpdateOperator;
@@ -8,7 +8,8 @@ use super::{Progression, Unreadable, reading};
 use crate::event::Measured;
 
 impl Progression {
-    /// The effects of a happening: all read the state on arrival, deletions come before additions.
+    /// Applies the effects of a happening. All of them read the state on arrival; deletions come
+    /// before additions.
     pub(super) fn happen(
         &mut self,
         snap: &SnapAction,
@@ -33,7 +34,7 @@ impl Progression {
         outcome
     }
 
-    /// A change with its amount, read on arrival; 0 for facts.
+    /// Returns a change with its amount, read on arrival; 0 for facts.
     pub(super) fn amount<'c>(
         &self,
         change: &'c Change,

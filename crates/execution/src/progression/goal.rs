@@ -1,4 +1,4 @@
-//! What becomes of the goal if nothing more is done: [`Outlook`].
+//! Forecast for the goal if no more actions are executed: [`Outlook`].
 
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::Condition;
@@ -6,20 +6,21 @@ use elbowroom_num::Rational;
 
 use super::Progression;
 
-/// What becomes of the goal if nothing more is done. It counts after all timed initials, so it is
-/// not decided before the last of those that change what it reads.
+/// Forecast for the goal if no more actions are executed. The goal counts after all timed initials,
+/// so it is not decided before the last one that changes a fact or fluent it reads.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Outlook {
-    /// It holds, and no timed initial changes what it reads any more.
+    /// The goal holds, and no coming timed initial affects it.
     Reached,
-    /// It will hold from then on: timed initials to come change what it reads.
+    /// The goal will hold at this time, after the last timed initial that affects it.
     Awaited(Rational),
-    /// It will not hold, or that cannot be said.
+    /// The goal will not hold, or cannot be evaluated.
     Unmet,
 }
 
 impl Progression {
-    /// What becomes of the goal if nothing more is done, and what is under way has no effect.
+    /// Returns the forecast for the goal if no more actions are executed and the running ones have
+    /// no effect.
     pub(crate) fn outlook(&self) -> Outlook {
         let (last, state) = self.in_the_end();
         if state.is_goal() != Ok(true) {
@@ -28,7 +29,8 @@ impl Progression {
         last.map_or(Outlook::Reached, Outlook::Awaited)
     }
 
-    /// Returns whether the goal holds in the end, but only by the assumptions about doubtful facts and values.
+    /// Returns `true` if the goal holds at the end, but only by the assumptions about doubtful
+    /// facts and values.
     pub(crate) fn is_goal_in_doubt(&self) -> bool {
         let is_in_doubt = !self.doubtful_facts().is_empty() || !self.doubtful_values().is_empty();
         if !is_in_doubt {
@@ -38,7 +40,7 @@ impl Progression {
         state.is_goal() != Ok(true) && state.holds(self.task.goal(), None) == Ok(true)
     }
 
-    /// The parts of the goal that will not hold in the end, or say nothing.
+    /// Returns the conjuncts of the goal that will not hold at the end, or cannot be evaluated.
     pub(crate) fn unmet_in_the_end(&self) -> Vec<&Condition> {
         let goal = self.task.goal();
         let (_, state) = self.in_the_end();
@@ -47,8 +49,7 @@ impl Progression {
         parts
     }
 
-    /// The state after the last timed initial to come that changes what the goal reads, and when
-    /// that is.
+    /// Returns the state after the last coming timed initial that affects the goal, and its time.
     fn in_the_end(&self) -> (Option<Rational>, Self) {
         let goal = Footprint::of_condition(&self.task, self.task.goal());
         let to_come = self.task.timed().get(self.timed..).unwrap_or(&[]);
@@ -58,7 +59,7 @@ impl Progression {
         let last = last.map(|timed| timed.time.clone());
         let mut state = self.clone();
         if let Some(last) = &last {
-            // What cannot be computed shows as a goal that says nothing.
+            // A value that cannot be computed shows up as a goal that cannot be evaluated.
             let _ = state.advance(last);
         }
         (last, state)

@@ -1,4 +1,4 @@
-//! How fluents move between happenings: polynomials in time.
+//! Continuous change of fluents between happenings, as polynomials in time.
 
 use std::collections::BTreeMap;
 
@@ -8,21 +8,21 @@ use elbowroom_num::Rational;
 use super::Unreadable;
 use super::polynomial::Polynomial;
 
-/// A continuous effect at work.
+/// An active continuous effect.
 pub(super) struct Rate<'a> {
     pub(super) fluent: FluentId,
     pub(super) per_time: &'a Expression,
     pub(super) duration: Option<&'a Rational>,
 }
 
-/// The values that move, as functions of the time that passes from now on.
+/// Continuously changing values, as functions of the time from now on.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motion(BTreeMap<FluentId, Polynomial>);
 
 impl Motion {
-    /// What these rates bring about.
+    /// Returns the motion that results from these rates.
     ///
-    /// A rate may read fluents that move themselves, as long as none depends on itself in the end.
+    /// A rate may read fluents that move themselves, as long as there is no cycle.
     pub(super) fn of(
         rates: &[Rate<'_>],
         now: &dyn Fn(FluentId) -> Result<Rational, Unreadable>,
@@ -56,7 +56,7 @@ impl Motion {
         Ok(motion)
     }
 
-    /// Whether nothing moves.
+    /// Returns `true` if no fluent moves.
     pub(super) fn is_still(&self) -> bool {
         self.0.is_empty()
     }
@@ -66,7 +66,8 @@ impl Motion {
         self.0.contains_key(&fluent)
     }
 
-    /// A fluent's value as a function of time; `now` is what it is where it does not move.
+    /// Returns a fluent's value as a function of time. `now` returns the present value of a fluent
+    /// that does not move.
     pub(super) fn value(
         &self,
         fluent: FluentId,
@@ -78,7 +79,7 @@ impl Motion {
         }
     }
 
-    /// The values after `elapsed`.
+    /// Returns the values after `elapsed`.
     pub(super) fn after(&self, elapsed: &Rational) -> Vec<(FluentId, Rational)> {
         let moved = self.0.iter();
         moved
@@ -155,7 +156,7 @@ impl Fraction {
         self.plus(&other)
     }
 
-    /// The same, if nothing that moves divides it.
+    /// Returns the fraction as a polynomial, if its denominator is constant.
     fn as_polynomial(&self) -> Result<Polynomial, Unreadable> {
         let divisor = self.denominator.as_constant().ok_or(Unreadable::Quotient)?;
         let factor = divisor.reciprocal().ok_or(Unreadable::DivisionByZero)?;

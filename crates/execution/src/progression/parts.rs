@@ -1,4 +1,4 @@
-//! What is believed at one moment, in parts that can be written down.
+//! Serializable parts of the believed state.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -10,45 +10,45 @@ use elbowroom_num::{Interval, Rational};
 use super::{Doubt, Progression, Underway, decide_guards};
 use crate::event::Ticket;
 
-/// A [`Progression`], but for its task and the actions under way in it.
+/// A [`Progression`] without its task and without the actions of its running instances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parts {
-    /// The moment.
+    /// The present time.
     pub time: Rational,
     /// The time of the last group of happenings.
     pub group: Rational,
-    /// By fact: whether it is true. What is not listed is false.
+    /// Truth by fact. Facts beyond the end of the list are false.
     pub facts: Vec<bool>,
-    /// By fluent: its value, if it has one. What is not listed has none.
+    /// Value by fluent, if it has one. Fluents beyond the end of the list have none.
     pub values: Vec<Option<Rational>>,
-    /// What the facts that have changed in that group were on arrival.
+    /// The truth on arrival of the facts that have changed in that group.
     pub facts_on_arrival: BTreeMap<FactId, bool>,
-    /// The values on arrival, likewise.
+    /// The same for values.
     pub values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
     /// Facts that are in doubt ([`Progression::doubt`]); `facts` has their truth before.
     pub doubtful_facts: BTreeMap<FactId, Vec<Doubt>>,
     /// Fluents whose values are in doubt.
     pub doubtful_values: BTreeMap<FluentId, Vec<Doubt>>,
-    /// How many groups of timed initials have happened.
+    /// Number of groups of timed initials that have happened.
     pub timed: usize,
-    /// What is under way.
+    /// The running actions.
     pub running: BTreeMap<Ticket, UnderwayParts>,
 }
 
-/// An [`Underway`], but for its action.
+/// An [`Underway`] without its action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnderwayParts {
     /// The time at which it started.
     pub start: Rational,
     /// The planned duration.
     pub planned: Rational,
-    /// What is decided of its guards.
+    /// The decided guards.
     pub guards: Guards,
-    /// The conjuncts of the over-all condition that have not held at some moment since the start.
+    /// Conjuncts of the over-all condition that have failed at some moment since the start.
     pub broken: BTreeSet<usize>,
 }
 
-/// Which conditional effects of an action under way can still take place.
+/// The conditional effects of a running action that can still take place: `true` for these.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Guards {
     /// By end effect.
@@ -58,7 +58,7 @@ pub struct Guards {
 }
 
 impl Progression {
-    /// The parts of what is believed.
+    /// Returns the parts of the state.
     pub fn parts(&self) -> Parts {
         let running = self.running.iter().map(|(ticket, underway)| {
             let parts = UnderwayParts {
@@ -86,8 +86,8 @@ impl Progression {
         }
     }
 
-    /// What is believed, of these parts. `action` says which action a ticket is of; what has none is
-    /// left out.
+    /// Creates the state from its parts. `action` returns the action of a ticket; running instances
+    /// without one are left out.
     pub fn of_parts(
         task: Arc<Task>,
         parts: Parts,
@@ -121,8 +121,8 @@ impl Progression {
 }
 
 impl Guards {
-    /// What was decided of an action's guards where it is this running action. `None` if it is none of
-    /// the action.
+    /// Returns the guards of `action` as they were decided in `running`. `None` if `running` is not
+    /// an instance of `action`.
     pub fn of(action: &Action, running: &RunningAction) -> Option<Self> {
         let (whole, left) = (action.durative()?, running.action.durative()?);
         let at_end = whole.end.effects.iter().cloned().map(|mut effect| {
@@ -139,7 +139,7 @@ impl Guards {
         })
     }
 
-    /// The running action of this action.
+    /// Returns the running action with these guards.
     pub fn running(&self, action: &Action, start: Rational, duration: Interval) -> RunningAction {
         let mut action = action.clone();
         if let Body::Durative(body) = &mut action.body {
@@ -157,7 +157,8 @@ fn undecided(guard: &mut Guard) {
     guard.at_start = Condition::TRUE;
 }
 
-/// Which of all are left, in their order; `None` if there are others.
+/// Returns, for each element of `all`, whether it is in `left`, which has the same order. `None` if
+/// `left` has other elements.
 fn which<T: PartialEq>(all: impl Iterator<Item = T>, left: &[T]) -> Option<Vec<bool>> {
     let mut left = left.iter().peekable();
     let is_left = all.map(|it| left.next_if(|next| **next == it).is_some());

@@ -1,20 +1,20 @@
-//! Polynomials in the time since the last happening, and where their signs change.
+//! Polynomials in the time since the last happening, and their sign changes.
 
 use elbowroom_num::Rational;
 
-/// A polynomial; coefficients by power, the highest not zero.
+/// A polynomial: its coefficients by power, without leading zeros.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polynomial(Vec<Rational>);
 
-/// Part of an open interval in which none of some polynomials changes its sign.
+/// Part of an open interval where each polynomial of a set has one sign.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Cell {
     /// An open piece, by a point in it.
     Piece(Rational),
-    /// A single point at which one of them is zero: the only one from the first time to the second.
-    /// At these two times none of them is, unless both are the point itself.
+    /// A single zero of one of the polynomials, isolated between two times. No polynomial is zero
+    /// at these two times, unless both are the zero itself.
     Zero(Rational, Rational),
-    /// All that comes soon enough after time 0.
+    /// A sufficiently short interval after time 0.
     Soon,
 }
 
@@ -30,7 +30,7 @@ impl Polynomial {
         Self(coefficients)
     }
 
-    /// The value, if it is the same at all times.
+    /// Returns the value if the polynomial is constant.
     pub(super) fn as_constant(&self) -> Option<Rational> {
         match self.0.as_slice() {
             [] => Some(Rational::ZERO),
@@ -64,7 +64,7 @@ impl Polynomial {
         Self::of(self.0.iter().map(|c| c * factor).collect())
     }
 
-    /// The polynomial with this value at 0 whose derivative is `self`.
+    /// Returns the antiderivative with this value at 0.
     pub(super) fn integral(&self, initial: Rational) -> Self {
         let mut power = Rational::ZERO;
         let raised = self.0.iter().map(|c| {
@@ -90,7 +90,7 @@ impl Polynomial {
         self.0.iter().rev().fold(Rational::ZERO, horner)
     }
 
-    /// Quotient and remainder; `divisor` is not zero.
+    /// Returns quotient and remainder. `divisor` must not be zero.
     fn divided(&self, divisor: &Self) -> (Self, Self) {
         let mut rest = self.0.clone();
         let mut quotient = vec![Rational::ZERO; (rest.len() + 1).saturating_sub(divisor.0.len())];
@@ -116,7 +116,7 @@ impl Polynomial {
         a
     }
 
-    /// The polynomial with the same zeros, each of them simple.
+    /// Returns the polynomial with the same zeros, all of them simple.
     fn with_simple_zeros(&self) -> Self {
         if self.is_zero() {
             return self.clone();
@@ -124,7 +124,7 @@ impl Polynomial {
         self.divided(&self.common_divisor(&self.derivative())).0
     }
 
-    /// The sign in a cell of [`cells`] of this and other polynomials.
+    /// Returns the sign in a cell of [`cells`] of this and other polynomials.
     pub(super) fn sign_in(&self, cell: &Cell) -> i32 {
         match cell {
             Cell::Piece(time) => self.at(time).signum(),
@@ -145,8 +145,8 @@ impl Polynomial {
     }
 }
 
-/// Parts the open interval from 0 to `length`: in each cell, each polynomial has one sign. Zeros
-/// are known up to `precision`, if that is asked for.
+/// Splits the open interval from 0 to `length` into cells in which each polynomial has one sign.
+/// With `precision`, zeros are isolated up to it.
 pub(super) fn cells(
     polynomials: &[Polynomial],
     length: &Rational,
@@ -155,7 +155,7 @@ pub(super) fn cells(
     let mut product = Polynomial::constant(Rational::ONE);
     for polynomial in polynomials.iter().filter(|p| p.as_constant().is_none()) {
         let simple = polynomial.with_simple_zeros();
-        // Zeros that two of them share count once.
+        // Common zeros of two polynomials count once.
         let (new, _) = simple.divided(&simple.common_divisor(&product));
         product = product.times(&new);
     }
@@ -177,8 +177,8 @@ fn part(
     if zeros == 0 {
         found.push(Cell::Piece(middle));
     } else if zeros == 1 && is_precise && !sturm.is_zero_at(from) && !sturm.is_zero_at(to) {
-        // The ends are inside the pieces on both sides, or, where the interval begins or ends,
-        // have the sign of the piece.
+        // The ends lie inside the pieces on both sides. At the ends of the interval, they have the
+        // sign of the piece.
         found.push(Cell::Piece(from.clone()));
         found.push(Cell::Zero(from.clone(), to.clone()));
         found.push(Cell::Piece(to.clone()));
@@ -209,14 +209,14 @@ impl Sturm {
         self.0[0].at(time).is_zero()
     }
 
-    /// How often the signs change along the sequence.
+    /// Returns the number of sign changes along the sequence.
     fn changes_at(&self, time: &Rational) -> usize {
         let signs = self.0.iter().map(|p| p.at(time).signum());
         let signs: Vec<i32> = signs.filter(|sign| *sign != 0).collect();
         signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
     }
 
-    /// The number of zeros that lie strictly between two times.
+    /// Returns the number of zeros strictly between two times.
     fn zeros_between(&self, from: &Rational, to: &Rational) -> usize {
         let up_to = self.changes_at(from).saturating_sub(self.changes_at(to));
         up_to.saturating_sub(usize::from(self.is_zero_at(to)))
@@ -232,7 +232,7 @@ mod tests {
         Polynomial::of(coefficients.iter().map(|&c| Rational::from(c)).collect())
     }
 
-    /// The signs of each polynomial from cell to cell, equal neighbours once.
+    /// Returns the signs of each polynomial from cell to cell, without repetitions.
     fn signs(polynomials: &[Polynomial], length: i64) -> Vec<Vec<i32>> {
         let cells = cells(polynomials, &Rational::from(length), None);
         let signs = cells
@@ -251,12 +251,12 @@ mod tests {
             signs(&[line.clone(), parabola.clone()], 3),
             [[-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]]
         );
-        // The interval is open: what is zero at its ends has one sign in it.
+        // The interval is open, so a polynomial that is zero only at its ends has one sign in it.
         assert_eq!(signs(&[line], 2), [[-1]]);
         assert_eq!(signs(&[polynomial(&[0, 1])], 2), [[1]]);
-        // A double zero touches.
+        // A double zero touches the axis.
         assert_eq!(signs(&[polynomial(&[1, -2, 1])], 3), [[1], [0], [1]]);
-        // A zero that two of them share.
+        // A common zero of two polynomials.
         let twice = parabola.times(&parabola).times(&polynomial(&[5, 1]));
         assert_eq!(signs(&[twice, parabola], 3), [[1, -1], [0, 0], [1, 1]]);
     }
@@ -268,7 +268,7 @@ mod tests {
         assert_eq!(polynomial(&[]).sign_in(&Cell::Soon), 0);
     }
 
-    /// The slow twin: many points, and the zeros by construction.
+    /// Comparison with a slow reference: many points, and the zeros by construction.
     #[test]
     fn products_of_lines_have_the_signs_that_their_zeros_say() {
         for seed in 0_i64..200 {

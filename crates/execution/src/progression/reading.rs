@@ -1,4 +1,4 @@
-//! Reading conditions and expressions in a state.
+//! Evaluation of conditions and expressions in a state.
 
 use elbowroom_model::derivation::{Moment, holds};
 use elbowroom_model::ground::{Condition, Expression, FactId, FluentId};
@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 
 use super::Progression;
 
-/// Why a condition or an expression says nothing.
+/// Reason for which a condition or an expression has no value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unreadable {
     /// The fluent has no value.
@@ -16,17 +16,17 @@ pub enum Unreadable {
     DoubtfulFact(FactId),
     /// The value of the fluent is in doubt.
     DoubtfulValue(FluentId),
-    /// Something is divided by zero.
+    /// Division by zero.
     DivisionByZero,
-    /// A rate is divided by something that moves.
+    /// A rate of change is divided by a moving value.
     Quotient,
-    /// The rates of change depend on each other in a circle.
+    /// The rates of change depend on each other in a cycle.
     Circular(FluentId),
-    /// A number is left open.
+    /// A quantity is left open.
     Open,
 }
 
-/// The state, for conditions in which `?duration` may stand.
+/// The state, for conditions that may contain `?duration`.
 struct Reading<'a> {
     state: &'a Progression,
     duration: Option<&'a Rational>,
@@ -36,7 +36,7 @@ struct Reading<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Now,
-    /// On arrival, before anything of the present group.
+    /// On arrival, before the present group.
     OnArrival,
     /// Now, without assumptions about doubtful facts and values.
     Certain,
@@ -80,10 +80,10 @@ impl Moment<Unreadable> for Reading<'_> {
 }
 
 impl Progression {
-    /// Whether a condition holds now; `duration` is what `?duration` stands for.
+    /// Returns `true` if a condition holds now; `duration` is the value of `?duration`.
     ///
     /// # Errors
-    /// When that cannot be said.
+    /// If the condition cannot be evaluated.
     pub fn holds(
         &self,
         condition: &Condition,
@@ -92,11 +92,11 @@ impl Progression {
         self.read(condition, duration, Mode::Now)
     }
 
-    /// Whether a condition held on arrival at the present moment, before anything happened at it:
-    /// what counts for all that happens now.
+    /// Returns `true` if a condition held on arrival at the present moment, before any happening of
+    /// it. All happenings of the moment use this state.
     ///
     /// # Errors
-    /// When that cannot be said.
+    /// If the condition cannot be evaluated.
     pub fn held_on_arrival(
         &self,
         condition: &Condition,
@@ -125,23 +125,24 @@ impl Progression {
         }
     }
 
-    /// Returns whether the task's goal holds now.
+    /// Returns `true` if the task's goal holds now.
     ///
     /// # Errors
-    /// If that cannot be said, for instance because it depends on a doubtful fact.
+    /// If the goal cannot be evaluated, for instance because it depends on a doubtful fact.
     pub fn is_goal(&self) -> Result<bool, Unreadable> {
         self.is_certain(self.task.goal())
     }
 
-    /// Returns whether a condition holds now, without assumptions about doubtful facts and values.
+    /// Returns `true` if a condition holds now, without assumptions about doubtful facts and
+    /// values.
     ///
     /// # Errors
-    /// If that cannot be said.
+    /// If the condition cannot be evaluated.
     pub fn is_certain(&self, condition: &Condition) -> Result<bool, Unreadable> {
         self.read(condition, None, Mode::Certain)
     }
 
-    /// The parts of a condition that do not hold, or say nothing.
+    /// Returns the conjuncts of a condition that do not hold, or cannot be evaluated.
     pub fn unmet<'c>(
         &self,
         condition: &'c Condition,
@@ -152,7 +153,7 @@ impl Progression {
         parts
     }
 
-    /// The parts of a condition that did not hold on arrival, or say nothing.
+    /// Returns the conjuncts of a condition that did not hold on arrival, or cannot be evaluated.
     pub fn unmet_on_arrival<'c>(
         &self,
         condition: &'c Condition,
@@ -176,7 +177,7 @@ impl Progression {
     }
 }
 
-/// The value of an expression.
+/// Returns the value of an expression.
 pub(super) fn evaluate<'v>(
     expression: &Expression,
     duration: Option<&Rational>,

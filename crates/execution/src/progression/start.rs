@@ -1,4 +1,4 @@
-//! Conditions and duration bounds of starts, as far as they read numbers.
+//! Numeric conditions and duration bounds of starts.
 
 use elbowroom_model::ground::{Action, Body, Condition, DurationConstraint, Expression};
 use elbowroom_num::Rational;
@@ -8,7 +8,7 @@ use super::polynomial::{Cell, cells};
 use super::watch::View;
 
 impl Progression {
-    /// The part of an action's start condition that reads numbers, with the bounds on its duration.
+    /// Returns the numeric part of an action's start condition, with the bounds on its duration.
     pub(crate) fn start_on_numbers(&self, action: &Action, duration: &Rational) -> Condition {
         let snap = match &action.body {
             Body::Instantaneous(snap) => snap,
@@ -25,8 +25,8 @@ impl Progression {
         Condition::And(parts.chain(duration_bounds(action, duration)).collect())
     }
 
-    /// The first time after now and not after `until` at which a condition holds, if nothing happens until then: a
-    /// multiple of `grid` if there is one, or the exact time.
+    /// Returns the first time after now, up to `until`, at which a condition holds if nothing
+    /// happens before: a multiple of `grid` if there is one, or the exact time.
     pub(crate) fn next_hold(
         &self,
         condition: &Condition,
@@ -77,13 +77,13 @@ impl Progression {
     }
 }
 
-/// The bounds on an action's duration that count at its start, as conditions.
+/// Returns the bounds on an action's duration that are checked at its start, as conditions.
 fn duration_bounds(action: &Action, duration: &Rational) -> Vec<Condition> {
     let body = action.durative();
     conditions_on_duration(body.into_iter().flat_map(|body| &body.duration), duration)
 }
 
-/// Those of these bounds on a duration that count at the start, as conditions.
+/// Returns those of these bounds that are checked at the start, as conditions.
 pub(crate) fn conditions_on_duration<'a>(
     bounds: impl Iterator<Item = &'a DurationConstraint>,
     duration: &Rational,

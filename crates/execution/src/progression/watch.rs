@@ -1,8 +1,9 @@
-//! Over-all conditions: at every moment strictly between start and end.
+//! Over-all conditions: they must hold at every moment strictly between start and end.
 //!
-//! From one happening group to the next, facts stay and fluents move as polynomials in time. Where
-//! the sides of a comparison cross is found exactly, so that a strict comparison that becomes an
-//! equality just at the end holds, and one that fails for a while between two groups does not.
+//! From one happening group to the next, facts stay the same and fluents change as polynomials in
+//! time. The crossings of the two sides of a comparison are found exactly. So a strict comparison
+//! that becomes an equality exactly at the end holds, and one that fails for a while between two
+//! groups does not.
 
 use elbowroom_model::derivation::{Moment, holds};
 use elbowroom_model::ground::{Condition, Expression, FactId};
@@ -17,24 +18,25 @@ use crate::event::Ticket;
 /// A span of time after the present happening group.
 #[derive(Clone, Copy)]
 enum Span<'a> {
-    /// All that come soon enough.
+    /// A sufficiently short interval.
     Soon,
-    /// All until so much later, which itself is left out.
+    /// All moments before this much later.
     Until(&'a Rational),
 }
 
 /// The conditions that are violated in a span.
 #[derive(Default)]
 struct Lost {
-    /// Parts of over-all conditions.
+    /// Conjuncts of over-all conditions, by index.
     conditions: Vec<(Ticket, Vec<usize>)>,
-    /// Guards: of which action, which effect, and whether it is one of its end.
+    /// Guards: the ticket of the action, the index of the effect, and `true` for an end effect.
     guards: Vec<(Ticket, usize, bool)>,
 }
 
 impl Progression {
-    /// The running actions whose over-all condition fails from now on if nothing else happens at
-    /// this moment (now, for those that did not start now, and soon after), with what of it fails.
+    /// Returns the running actions whose over-all condition fails from now on if nothing else
+    /// happens at this moment, with the conjuncts that fail. For actions that started before, the
+    /// present moment counts as well.
     pub fn breaking(&self) -> Vec<(Ticket, Vec<&Condition>)> {
         let motion = self.motion().unwrap_or_default();
         let lost = self.lost(&motion, Span::Soon).conditions.into_iter();
@@ -47,7 +49,7 @@ impl Progression {
         breaking.collect()
     }
 
-    /// Returns whether an over-all condition fails from now on that has not failed before.
+    /// Returns `true` if an over-all condition fails from now on that has not failed before.
     pub fn is_breaking(&self) -> bool {
         let motion = self.motion().unwrap_or_default();
         let lost = self.lost(&motion, Span::Soon).conditions;
@@ -58,8 +60,8 @@ impl Progression {
         lost.iter().any(is_new)
     }
 
-    /// The time at which an over-all condition that holds now has failed, if nothing happens until
-    /// then, and if that is before `until`: the first multiple of `grid` after that moment.
+    /// Returns the time before `until` at which an over-all condition that holds now has failed, if
+    /// nothing happens before: the first multiple of `grid` after the failure.
     pub fn next_break(&self, until: &Rational, grid: &Rational) -> Option<Rational> {
         let motion = self.motion().ok().filter(|motion| !motion.is_still())?;
         let length = Some(until - &self.time).filter(Rational::is_positive)?;
@@ -88,7 +90,7 @@ impl Progression {
         Some(((moment / grid).floor() + Rational::ONE) * grid)
     }
 
-    /// Notes what will not have held when so much time has passed.
+    /// Records the conditions that fail within the next `elapsed` time.
     pub(super) fn watch(&mut self, motion: &Motion, elapsed: &Rational) {
         let lost = self.lost(motion, Span::Until(elapsed));
         for (ticket, parts) in lost.conditions {
@@ -135,8 +137,8 @@ impl Progression {
         lost
     }
 
-    /// Whether a condition of a running action holds in a span, and now if that lies inside the
-    /// action.
+    /// Returns `true` if a condition of a running action holds throughout a span, and also now
+    /// unless the action starts now.
     fn lasts(
         &self,
         condition: &Condition,
@@ -168,7 +170,7 @@ impl Progression {
     }
 }
 
-/// The state in a part of the time until the next group.
+/// The state in a cell of the time until the next group.
 pub(super) struct View<'a> {
     pub(super) state: &'a Progression,
     pub(super) motion: &'a Motion,
@@ -187,7 +189,7 @@ impl View<'_> {
         }
     }
 
-    /// Where these are zero, comparisons that the condition reads may turn.
+    /// Returns polynomials at whose zeros the comparisons of a condition may change.
     pub(super) fn boundaries(&self, condition: &Condition) -> Vec<super::polynomial::Polynomial> {
         let mut found = Vec::new();
         let mut note = |left: &Expression, right: &Expression| {

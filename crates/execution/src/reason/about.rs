@@ -1,4 +1,4 @@
-//! What a reason is about: [`About`], and its words.
+//! The subject of a reason: [`About`], and its text.
 
 use std::fmt;
 
@@ -6,8 +6,7 @@ use elbowroom_num::Rational;
 
 /// The quantity, condition, moment or state of affairs that a [`Reason`](super::Reason) is about.
 ///
-/// Its [`Display`](fmt::Display) is the one place where it becomes words; what can be told apart is
-/// told apart by its data.
+/// Only its [`Display`](fmt::Display) turns it into text. Cases that differ have different data.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum About {
@@ -15,7 +14,7 @@ pub enum About {
     Duration,
     /// The remaining duration of an action that was running when the plan began.
     RestOfDuration,
-    /// By how much the action changes this fluent.
+    /// The change of this fluent by the action.
     Change(String),
     /// A parameter of the plan, by its name.
     Parameter(String),
@@ -25,46 +24,46 @@ pub enum About {
     End(String),
     /// A time point of the plan, as the plan describes it.
     TimePoint(String),
-    /// The same, of a start that has failed so often in a row and is tried again.
+    /// The same, of a start that has failed `failures` times in a row and is tried again.
     Retry {
         /// The time point, if it is still to come.
         of: Option<String>,
-        /// How often it has failed.
+        /// Number of failures.
         failures: u32,
     },
-    /// These conditions, as the problem writes them.
+    /// These conditions, in the language of the problem.
     Conditions(Vec<String>),
-    /// The same, which are needed throughout an action.
+    /// These conditions, which must hold throughout an action.
     Throughout(Vec<String>),
-    /// This fact or fluent, which was seen.
+    /// This observed fact or fluent.
     Seen(String),
-    /// An observation made when the world was asked to look at the goal.
+    /// An observation from the [look](crate::World::look) at the goal.
     SeenAtTheEnd,
     /// The next observation, of any kind.
     AnyObservation,
-    /// The last timed initial that changes what the goal reads.
+    /// The last timed initial that affects the goal.
     GoalSettled,
-    /// The end of what is under way.
+    /// The end of the running actions.
     EndOfRunning,
-    /// The start of what was told to start.
+    /// The start of the commanded actions.
     StartOfOrdered,
-    /// The end of what was told to stop.
+    /// The end of the cancelled actions.
     EndOfCancelled,
-    /// The next start of the order that is executed.
+    /// The next start of the present order.
     NextStart,
-    /// The next happening of that order, which the world brings about.
+    /// The next happening of that order, which the executor does not start.
     NextHappening,
-    /// The choice is the best of all possible ones; with the probability to succeed from here.
+    /// The choice is the best of all possible ones, with the success probability from here.
     BestOfAll(f64),
-    /// The next moment at which moves are weighed; with the probability to succeed from here.
+    /// The next evaluation of moves, with the success probability from here.
     NextDecision(f64),
-    /// The choice is first in the order most likely to succeed; with that probability.
+    /// The choice is first in the order most likely to succeed, with that probability.
     FirstOfBestOrder(f64),
     /// The choice is next after the lattermost layer that fits.
     NextInOrder,
-    /// Another plan succeeds with the probability `other`, the rest of this one with `present`.
+    /// Another plan succeeds with the probability `other`, the remaining plan with `present`.
     Odds {
-        /// Of the rest of this plan.
+        /// Of the remaining plan.
         present: Rational,
         /// Of another plan.
         other: Rational,
@@ -73,32 +72,32 @@ pub enum About {
     WithoutEndOf(String),
     /// It was cancelled.
     Cancelled,
-    /// It has failed so often in a row that its likelihoods do not explain it.
+    /// It has failed several times in a row, and its likelihoods do not explain that.
     FailedInARow {
         /// The world's explanation of the last failure; `None`: it was cancelled.
         why: Option<String>,
         /// The number of failures.
         failures: i32,
-        /// With which probability it starts.
+        /// The probability of a successful start.
         success: f64,
     },
     /// There is no plan.
     NoPlan,
     /// The plan has no envelope.
     NoEnvelope,
-    /// The plan was made ready without its partial order.
+    /// The plan was prepared without its partial order.
     NoPartialOrder,
     /// No times satisfy the plan's constraints.
     NoTimes,
-    /// A constraint of the plan that nothing satisfies.
+    /// A constraint of the plan that cannot be satisfied.
     EmptyConstraint,
     /// The plan waits, nothing is running, and nothing is due.
     Nothing,
     /// Too little time is left even if nothing deviates any more.
     TooLittleTime,
-    /// The numbers of the rest of the plan fail when the action takes longer.
+    /// Numeric conditions of the remaining plan fail if the action takes longer.
     LaterNumbers,
-    /// A message from outside: of the world, about a failure; of an oracle, about its objection.
+    /// An external message: from the world about a failure, or from an oracle about its objection.
     Said(String),
 }
 

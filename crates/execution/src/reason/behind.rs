@@ -1,4 +1,4 @@
-//! What stands behind a reason: [`Behind`], and its words.
+//! The explanation of a reason: [`Behind`], and its text.
 
 use std::fmt;
 
@@ -8,10 +8,9 @@ use elbowroom_num::Rational;
 
 use crate::event::Ending;
 
-/// A constraint of the plan, a condition or an event that stands behind a
-/// [`Reason`](super::Reason).
+/// A constraint of the plan, a condition or an event that explains a [`Reason`](super::Reason).
 ///
-/// Its [`Display`](fmt::Display) is the one place where it becomes words. Times are the world's.
+/// Only its [`Display`](fmt::Display) turns it into text. Times are on the world's clock.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Behind {
@@ -24,16 +23,16 @@ pub enum Behind {
         /// The later one.
         second: String,
     },
-    /// Timed initials that are to come.
+    /// Coming timed initials.
     Timed {
         /// The changes.
         changes: Vec<Changed>,
-        /// When, where that is told.
+        /// The time, if it is given.
         at: Option<Rational>,
     },
-    /// More constraints, between the one before and the one after.
+    /// Further constraints, between the previous one and the next one.
     Others,
-    /// A condition that would not hold, as the problem writes it.
+    /// A condition that would not hold, in the language of the problem.
     Condition(String),
     /// Timed initials that have happened.
     Past(Vec<Changed>),
@@ -66,18 +65,18 @@ pub enum Behind {
         /// The time.
         at: Rational,
     },
-    /// A fact was seen.
+    /// A fact was observed.
     Fact {
         /// The fact.
         fact: String,
-        /// To be what.
+        /// Its truth.
         truth: bool,
     },
-    /// A fluent was seen.
+    /// A fluent was observed.
     Value {
         /// The fluent.
         fluent: String,
-        /// To have which value, if it has one.
+        /// Its value, if it has one.
         value: Option<Rational>,
     },
 }
@@ -94,7 +93,7 @@ pub enum Changed {
 }
 
 impl Changed {
-    /// The changes, by name.
+    /// Returns the changes by name.
     pub(crate) fn all(task: &Task, changes: &[Change]) -> Vec<Self> {
         let named = changes.iter().map(|change| match change {
             Change::Add(fact) => Self::True(task.fact_name(*fact)),

@@ -1,4 +1,4 @@
-//! What was started in a run, and what became of it.
+//! The starts of a run, and their outcomes.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -14,37 +14,37 @@ use crate::event::{Ending, Measured, Ticket};
 use crate::executor::{Mission, Order, StepId};
 use crate::progression::Progression;
 
-/// So many of the starts before a rest are in the report of a lasting run.
+/// Number of steps in the report of an executive that were executed before it was last idle.
 const MOST_REPORTED: usize = 2000;
 
-/// Late reports on so many of the starts that had ended when a plan was taken up, the last ones, are
-/// understood.
+/// Number of ended starts, the latest ones, on which late reports are still processed after a plan
+/// is adopted.
 const MOST_REMEMBERED: usize = 100;
 
-/// Everything that was started, but for what a lasting run has forgotten.
+/// The starts of a run, except for those that an executive has forgotten.
 #[derive(Clone, Debug, Default)]
 pub struct Account {
     entries: BTreeMap<Ticket, Opened>,
-    /// How many there were: tickets are given out in this order.
+    /// Number of starts. Tickets are issued in this order.
     started: usize,
-    /// How many of them were left when something was last forgotten.
+    /// Number of entries that were left when entries were last forgotten.
     kept: usize,
-    /// What was done before the run last had nothing to do, for its report.
+    /// The steps executed before the run was last idle, for its report.
     closed: VecDeque<ExecutedStep>,
     /// The present plan.
     plan: PlanAccount,
-    /// Those that have not ended.
+    /// Starts that have not ended.
     open: BTreeSet<Ticket>,
 }
 
-/// The part of a plan that has been started.
+/// The executed part of a plan.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PlanAccount {
     /// The starts, by step.
     pub(super) steps: BTreeMap<StepId, Ticket>,
-    /// All steps, on the world's clock, if they were noted.
+    /// All steps, on the world's clock, if they were recorded.
     planned: Vec<(StepId, Step)>,
-    /// What the starts of these wait for.
+    /// The predecessors that the starts of these steps wait for.
     waits: BTreeMap<StepId, Vec<Wait>>,
 }
 
@@ -53,77 +53,77 @@ pub(super) struct PlanAccount {
 pub(super) struct Opened {
     pub(super) action: Arc<Action>,
     pub(super) planned: Option<Rational>,
-    /// The step of the present plan that it is.
+    /// Its step in the present plan, if any.
     pub(super) step: Option<StepId>,
     pub(super) ordered: Rational,
     pub(super) started: Option<Rational>,
-    /// When it last reported progress, after its start, and the part that was done.
+    /// The time and the completion of its last reported progress after its start.
     pub(super) progress: Option<(Rational, Rational)>,
     pub(super) ended: Option<(Rational, Ending)>,
     pub(super) cancelled: Option<Rational>,
     /// Its time-out, if it has reached it.
     pub(super) timed_out: Option<Rational>,
-    /// `true` if it is unknown whether it has come to its end.
+    /// `true` if it is unknown whether its end has happened.
     pub(super) is_in_doubt: bool,
-    /// Until when the plan could bear it when that was warned of.
+    /// The latest tolerable end according to the last warning of it.
     pub(super) warned: Option<Rational>,
-    /// The time-out that the last warning of one was about.
+    /// The time-out according to the last warning of it.
     pub(super) warned_timeout: Option<Rational>,
-    /// The end of its window when that was last looked into, and until when the plan can bear it.
+    /// The end of its window when its slack was last computed, and the latest tolerable end then.
     pub(super) bearable: Option<(Rational, Rational)>,
     pub(super) measured: [Vec<Measured>; 2],
-    /// Whether it had ended long before the present plan: late reports on it count for nothing.
+    /// `true` if it had ended long before the present plan. Late reports on it are ignored.
     is_past: bool,
 }
 
-/// One start, as all that has to be known of it to go on.
+/// A start, with all that is needed to resume the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownStart {
-    /// By which the world's reports refer to it.
+    /// The identifier for reports of the world.
     pub ticket: Ticket,
     /// The action.
     pub action: Arc<Action>,
     /// The planned duration; `None` for an instantaneous action.
     pub planned: Option<Rational>,
-    /// When it was told to start.
+    /// The time of the command.
     pub ordered: Rational,
-    /// When it has started, if it has.
+    /// The time of its start, if it has started.
     pub started: Option<Rational>,
-    /// When it last reported progress, after its start, and the part that was done.
+    /// The time and the completion of its last reported progress after its start.
     pub progress: Option<(Rational, Rational)>,
-    /// When and how it has ended, if it has.
+    /// The time and the outcome of its end, if it has ended.
     pub ended: Option<(Rational, Ending)>,
-    /// When it was told to stop, if it was.
+    /// The time of the cancellation, if it was cancelled.
     pub cancelled: Option<Rational>,
     /// Its time-out, if it has reached it.
     pub timed_out: Option<Rational>,
-    /// `true` if it is unknown whether it has come to its end.
+    /// `true` if it is unknown whether its end has happened.
     pub is_in_doubt: bool,
-    /// Until when the plan could bear it when that was warned of.
+    /// The latest tolerable end according to the last warning of it.
     pub warned: Option<Rational>,
-    /// The time-out that the last warning of one was about.
+    /// The time-out according to the last warning of it.
     pub warned_timeout: Option<Rational>,
-    /// What was measured at its start, and at its end.
+    /// The amounts measured at its start, and at its end.
     pub measured: [Vec<Measured>; 2],
 }
 
-/// Something that was done, as a step of a plan that the judge can look at.
+/// An executed action, as a step of a plan for the validator.
 ///
-/// Its action has the amounts that were measured in place of those that the domain has, and no
-/// duration constraints. Of an action that was stopped only the start is left, and what it changed
-/// meanwhile.
+/// Measured amounts replace those of the domain, and there are no duration constraints. An action
+/// that was stopped has only its start effects and its continuous effects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExecutedStep {
-    /// Which start it was.
+    /// The ticket of the start.
     pub ticket: Ticket,
-    /// How it ended; `None` if it had not.
+    /// The outcome; `None` if it had not ended.
     pub ending: Option<Ending>,
     /// The step.
     pub step: Step,
 }
 
 impl Account {
-    /// That of a run that begins in the middle of things: what is under way, and nothing else.
+    /// Creates the account of a run that begins in the middle of an execution. It contains only the
+    /// running actions.
     pub(super) fn amid(belief: &Progression, running: &BTreeMap<StepId, Ticket>) -> Self {
         let mut account = Self::default();
         for (ticket, underway) in belief.running() {
@@ -145,7 +145,7 @@ impl Account {
                 is_past: false,
             };
             account.entries.insert(*ticket, opened);
-            // Numbers in between were of what has ended.
+            // Tickets in between belong to actions that have ended.
             let number = usize::try_from(ticket.0).unwrap_or(usize::MAX);
             account.started = account.started.max(number.saturating_add(1));
             account.open.insert(*ticket);
@@ -154,12 +154,12 @@ impl Account {
         account
     }
 
-    /// The number of actions started.
+    /// Returns the number of actions started.
     pub fn started(&self) -> usize {
         self.started
     }
 
-    /// So many were started before; what is not among those that are known is long past.
+    /// Restores an account with `started` starts. Starts that are not in `known` are long past.
     pub(super) fn begin_at(&mut self, started: usize, known: Vec<KnownStart>) {
         *self = Self {
             started,
@@ -190,7 +190,7 @@ impl Account {
         }
     }
 
-    /// All that is not long past.
+    /// Returns all starts that are not long past.
     pub(super) fn known(&self) -> Vec<KnownStart> {
         let known = self.entries.iter().filter(|(_, it)| !it.is_past);
         let known = known.map(|(ticket, it)| KnownStart {
@@ -211,8 +211,8 @@ impl Account {
         known.collect()
     }
 
-    /// A plan is taken up, or the run rests: of what has ended, all but the last is long past from now
-    /// on, but for what is named.
+    /// Marks ended starts as long past, except for the latest ones and those in `but_for`. Called
+    /// when a plan is adopted, or when the run is idle.
     pub(super) fn leave_behind(&mut self, but_for: &[Ticket]) {
         let ended = self.entries.iter_mut().rev();
         let ended = ended.filter(|(ticket, it)| it.ended.is_some() && !but_for.contains(ticket));
@@ -221,14 +221,14 @@ impl Account {
         }
     }
 
-    /// Forgets what is long past, for the report, too.
+    /// Forgets starts that are long past, also for the report.
     pub(super) fn forget_what_is_past(&mut self) {
         self.entries.retain(|_, it| !it.is_past);
         self.forget_closed();
     }
 
-    /// Nothing is under way, and no plan: what was done is only of interest for the report, which
-    /// has the last ones.
+    /// Clears the account when no action is running and there is no plan. The latest executed steps
+    /// are kept for the report.
     pub(super) fn close(&mut self, now: &Rational) {
         if self.entries.is_empty() {
             return;
@@ -242,24 +242,24 @@ impl Account {
         self.kept = 0;
     }
 
-    /// What was done before the run last had nothing to do is not reported any more.
+    /// Forgets the steps executed before the run was last idle.
     pub(super) fn forget_closed(&mut self) {
         self.closed.clear();
     }
 
-    /// Whether that was started, and is no longer known.
+    /// Returns `true` if the ticket was issued, and its start is no longer known.
     pub(super) fn is_forgotten(&self, ticket: Ticket) -> bool {
         ticket.0 < self.started as u64 && self.recent(ticket).is_none()
     }
 
-    /// That start, unless it is long past.
+    /// Returns the start of this ticket, unless it is long past.
     pub(super) fn recent(&self, ticket: Ticket) -> Option<&Opened> {
         self.entries.get(&ticket).filter(|it| !it.is_past)
     }
 
-    /// Forgets the first starts that have ended and are not of the present plan, until no more than
-    /// so many are left, if there are as many such. To be called often: it does nothing before
-    /// there are twice as many.
+    /// Forgets the earliest starts that have ended and do not belong to the present plan, until at
+    /// most `most` are left, if there are enough of them. It can be called often: it does nothing
+    /// until there are twice as many.
     pub(super) fn forget(&mut self, most: usize) {
         if self.entries.len() < 2 * most.max(self.kept) {
             return;
@@ -273,7 +273,7 @@ impl Account {
         self.kept = self.entries.len();
     }
 
-    /// The tickets of actions that have not ended.
+    /// Returns the tickets of actions that have not ended.
     pub fn open_tickets(&self) -> impl Iterator<Item = Ticket> + '_ {
         self.open.iter().copied()
     }
@@ -304,7 +304,8 @@ impl Account {
         ticket
     }
 
-    /// The steps of earlier plans no longer mean anything, but for those that go on.
+    /// Begins a plan: starts no longer belong to steps of earlier plans. `running` has the steps of
+    /// the new plan that are running.
     pub(super) fn begin_plan(&mut self, running: &BTreeMap<StepId, Ticket>) {
         self.plan.planned.clear();
         self.plan.waits.clear();
@@ -332,7 +333,8 @@ impl Account {
         self.plan = plan;
     }
 
-    /// When a start of the present plan was told, or the end of a step came that ended well.
+    /// Returns the time at which a step of the present plan started (or was commanded, if no start
+    /// was reported) or ended successfully.
     pub(super) fn time_of(&self, (step, is_end): Moment) -> Option<&Rational> {
         let entry = self.get(self.ticket(step)?)?;
         match &entry.ended {
@@ -342,7 +344,7 @@ impl Account {
         }
     }
 
-    /// Takes note of the steps of the plan that has begun.
+    /// Records the steps of the plan that has begun.
     pub(super) fn note_steps(&mut self, mission: &Mission) {
         let steps = mission.instances.iter().zip(&mission.time_triggered.steps);
         let on_the_worlds_clock = steps.map(|(instance, step)| {
@@ -359,23 +361,23 @@ impl Account {
         self.plan.waits = waits_of(mission);
     }
 
-    /// What the start of a step that was noted waits for.
+    /// Returns the predecessors that the start of a recorded step waits for.
     pub(super) fn waits(&self, step: StepId) -> &[Wait] {
         self.plan.waits.get(&step).map_or(&[], Vec::as_slice)
     }
 
-    /// The steps that were noted.
+    /// Returns the recorded steps.
     pub(super) fn plan_steps(&self) -> &[(StepId, Step)] {
         &self.plan.planned
     }
 
-    /// The actions of the present plan that were started, or went on when it began.
+    /// Returns the actions of the present plan that were started, or were running when it began.
     pub(super) fn of_plan(&self) -> impl Iterator<Item = (Ticket, &Opened)> + '_ {
         let tickets = self.plan.steps.values();
         tickets.filter_map(|ticket| Some((*ticket, self.get(*ticket)?)))
     }
 
-    /// The steps of the present plan that were started, or went on when it began.
+    /// Returns the steps of the present plan that were started, or were running when it began.
     pub(super) fn steps(&self) -> &BTreeMap<StepId, Ticket> {
         &self.plan.steps
     }
@@ -415,7 +417,7 @@ impl Account {
         self.open.remove(&ticket);
     }
 
-    /// Notes the part that is done of an action, if that is more than before.
+    /// Records the completion of an action, if it has grown.
     pub(super) fn note_progress(&mut self, ticket: Ticket, time: &Rational, done: &Rational) {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             let before = entry.progress.as_ref();
@@ -425,21 +427,21 @@ impl Account {
         }
     }
 
-    /// Notes that an action has reached its time-out.
+    /// Records that an action has reached its time-out.
     pub(super) fn note_timeout(&mut self, ticket: Ticket, timeout: &Rational) {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             entry.timed_out = Some(timeout.clone());
         }
     }
 
-    /// Notes whether it is unknown if an action has come to its end.
+    /// Records whether it is unknown if an action's end has happened.
     pub(super) fn note_doubt(&mut self, ticket: Ticket, is_in_doubt: bool) {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             entry.is_in_doubt = is_in_doubt;
         }
     }
 
-    /// Takes note of until when the plan can bear an action, which its window does not show.
+    /// Records the latest tolerable end of an action, which its window does not show.
     pub(super) fn note_bearable(&mut self, ticket: Ticket, window: Rational, until: Rational) {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             entry.bearable = Some((window, until));
@@ -469,7 +471,7 @@ impl Account {
         }
     }
 
-    /// All that was started, did start and is not forgotten, as steps for the judge.
+    /// Returns all actions that have started and are not forgotten, as steps for the validator.
     pub(super) fn executed(&self, now: &Rational) -> Vec<ExecutedStep> {
         self.closed.iter().cloned().chain(self.done(now)).collect()
     }
@@ -533,7 +535,7 @@ fn put_in(snap: &mut SnapAction, measured: &[Measured]) {
     }
 }
 
-/// A cancelled action has no end, and its over-all conditions no longer matter.
+/// Removes the end and the over-all conditions of a cancelled action.
 fn cut_off(body: &mut DurativeBody) {
     body.over_all = Condition::TRUE;
     body.end = Arc::new(SnapAction {

@@ -1,4 +1,4 @@
-//! What a run has to do before its executor is asked again.
+//! Agenda of a run: the tasks before the next decision of its executor.
 
 use std::sync::Arc;
 
@@ -14,60 +14,60 @@ use crate::executor::{Mission, News};
 use crate::preparation::PrepareError;
 use crate::reason::{Cause, Reason};
 
-/// Something to do. Each takes no time in the world, but for [`Todo::Pass`] and [`Todo::Close`].
+/// A task. All tasks are instantaneous in the world, except for [`Todo::Pass`] and [`Todo::Close`].
 pub(super) enum Todo {
     /// Begin with this plan, or make one.
     Begin(Option<TimeTriggeredPlan>),
-    /// Ask the executor.
+    /// Ask the executor for a decision.
     Decide,
     /// Cancel actions.
     Cancel(Vec<Ticket>),
-    /// Tell the world what is on record.
+    /// Send a recorded command to the world.
     Send(Command),
-    /// Let time pass.
+    /// Wait until then.
     Pass(Rational),
     /// Warn of time-outs, and cancel the actions that have reached theirs.
     CheckTimeouts,
-    /// Cancel an action whose time-out was then, or end the wait for one that was cancelled.
+    /// Cancel an action that timed out then, or end the wait for one that was cancelled.
     TimeOut(Ticket, Rational),
-    /// Wait until these have ended; without any named, until all have.
+    /// Wait until these actions have ended; `None` for all actions.
     Settle(Option<Vec<Ticket>>),
-    /// Wait until these actions have ended, unless the goals change or the number of doubts does.
+    /// Wait until these actions have ended, or until the goals or the number of doubts change.
     Linger(Vec<Ticket>, usize),
-    /// See what is to be done instead of the plan.
+    /// Decide how to continue without the plan.
     Replan(Reason),
-    /// Make a plan from here.
+    /// Make a plan from the present situation.
     Plan(Reason),
-    /// Begin with a plan as soon as the time is over that it took to make it.
+    /// Begin with a plan when its planning time has passed.
     Adopt(Box<Made>),
-    /// Begin with a plan that is ready.
+    /// Begin with a prepared plan.
     TakeUp(Box<Mission>),
-    /// Begin with a plan with which another run has begun, of this task.
+    /// Begin with a plan that another run has begun with, for this task.
     TakeUpAgain(Arc<Task>, Box<TakesUp>),
-    /// Events that happened while the plan was made, of which it does not know.
+    /// Report events that happened while the plan was made, and that it does not account for.
     Tell(Vec<News>),
-    /// Wait until then for what was told to stop, and end the run.
+    /// Wait until then for cancelled actions to stop, and end the run.
     Close(Rational),
 }
 
-/// A plan that has been made.
+/// A finished plan.
 pub(super) struct Made {
     pub(super) plan: TimeTriggeredPlan,
-    /// From where.
+    /// The initial situation of the plan.
     pub(super) situation: Situation,
     /// The actions running there.
     pub(super) running: Vec<Ticket>,
-    /// When it is there, by the world's clock.
+    /// The end of its planning time, on the world's clock.
     pub(super) ready: Rational,
 }
 
 impl Run<'_> {
-    /// Does something, which may bring more onto the agenda. What is returned, the world must be
-    /// told before anything else is done.
+    /// Performs a task, which may add more tasks. Returns a command that the world must receive
+    /// before anything else is done.
     pub(super) fn perform(&mut self, todo: Todo) -> Result<Option<Command>, Stop> {
         match todo {
             Todo::Begin(Some(plan)) => {
-                // A plan that is given is not retimed, unlike the rest of one that is late.
+                // A given plan is not shifted, unlike the remaining steps of a late plan.
                 let verdict = validate(&self.task, &plan, &validate::Settings::default());
                 if let Verdict::Invalid(violation) = verdict {
                     return Err(no_plan(&PrepareError::Invalid(Box::new(violation))));

@@ -1,4 +1,4 @@
-//! Runs that begin in the middle of things: to try out what comes of a decision.
+//! Runs that begin in the middle of an execution, for rollouts.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,32 +9,32 @@ use crate::executor::Mission;
 use crate::executor::StepId;
 use crate::reason::Reason;
 
-/// Where such a run begins.
+/// Initial state of such a run.
 #[derive(Clone, Debug)]
 pub struct Amid {
-    /// What is believed, at its time. All that was told to start has started.
+    /// The belief, at its time. All commanded actions have started.
     pub belief: Progression,
-    /// What the executor is to be told first.
+    /// News for the executor's first decision.
     pub news: Vec<News>,
-    /// The executor's steps that are under way.
+    /// The running steps of the executor.
     pub running: BTreeMap<StepId, Ticket>,
-    /// How many new plans have been made so far.
+    /// Number of new plans so far.
     pub replans: usize,
 }
 
-/// What such a run begins with.
+/// The first task of such a run.
 #[derive(Clone, Debug)]
 pub enum Beginning {
-    /// The executor has its plan, and goes on.
+    /// The executor continues its plan.
     GoesOn,
-    /// It takes this one up.
+    /// The executor adopts this plan.
     TakesUp(Box<Mission>),
-    /// A new plan is made, for that reason.
+    /// A new plan is requested for this reason.
     Replans(Reason),
 }
 
 impl<'a> Run<'a> {
-    /// A run that begins in the middle of things, of the task of the belief.
+    /// Creates a run that begins in the middle of an execution. Its task is that of the belief.
     pub fn amid(amid: Amid, beginning: Beginning, settings: RunSettings, ports: Ports<'a>) -> Self {
         let Amid {
             belief,

@@ -1,4 +1,4 @@
-//! Beginning with a plan.
+//! Adoption of a plan.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,19 +15,19 @@ use crate::executor::{Mission, News, StepId};
 use crate::preparation::PrepareError;
 use crate::record::Entry;
 
-/// A plan, and from where.
+/// A plan, with the situation from which it starts.
 #[derive(Clone, Copy)]
 pub(super) struct Course<'p> {
     pub(super) plan: &'p TimeTriggeredPlan,
     pub(super) situation: &'p Situation,
-    /// The tickets of what is under way there.
+    /// The tickets of the actions that are running there.
     pub(super) running: &'p [Ticket],
-    /// What of it has begun since, before it is taken up.
+    /// The steps that have begun between the plan's start and its adoption.
     pub(super) begun: &'p [Ticket],
 }
 
 impl<'p> Course<'p> {
-    /// A plan of which nothing has begun yet.
+    /// Creates the course of a plan with no step begun.
     pub(super) fn of(
         plan: &'p TimeTriggeredPlan,
         situation: &'p Situation,
@@ -49,12 +49,12 @@ impl Run<'_> {
         self.take_up_for(&task, &goals, course);
     }
 
-    /// The same with a plan for these goals, which this task has.
+    /// Has a plan prepared for these goals, which belong to this task, and begins with it.
     pub(super) fn take_up_for(&mut self, task: &Arc<Task>, goals: &Goals, course: Course<'_>) {
         self.await_preparation(task, goals, course, Otherwise::End);
     }
 
-    /// Begins with a plan for these goals that is ready.
+    /// Begins with a prepared plan for these goals.
     pub(super) fn begin_with(
         &mut self,
         course: Course<'_>,
@@ -66,7 +66,7 @@ impl Run<'_> {
         self.begin_mission(mission)
     }
 
-    /// Begins with a plan that is ready.
+    /// Begins with a prepared plan.
     pub(super) fn begin_mission(&mut self, mission: &Mission) -> Result<(), Stop> {
         self.lost = super::Lost::default();
         self.foreseen = None;
@@ -84,13 +84,13 @@ impl Run<'_> {
             self.account.begin_plan(&BTreeMap::new());
             return self.replan(&reason);
         }
-        // What has ended while the plan was made, the plan still waits for.
+        // The plan still waits for actions that ended while it was made.
         let mut missed: Vec<(Rational, News)> = Vec::new();
         for (step, ticket) in mission.running.iter().map(|(step, it)| (*step, *it)) {
             missed.extend(self.ending(step, ticket));
         }
         if !mission.begun.is_empty() {
-            // In the order in which they were told to start.
+            // In the order of their commands.
             let mut begun: Vec<_> = mission
                 .begun
                 .iter()
@@ -107,8 +107,8 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// The steps of a plan that these are: of each action the first ones that are not under way where
-    /// the plan begins. `None` if it does not have one of them.
+    /// Returns the steps of a plan to which these starts belong: of each action, the first ones
+    /// that are not running when the plan begins. `None` if a start belongs to no step.
     pub(super) fn steps_of(
         &self,
         mission: &Mission,
@@ -131,7 +131,7 @@ impl Run<'_> {
         begun.iter().map(step_of).collect()
     }
 
-    /// That it has started, as news.
+    /// Returns the start of a step as news.
     pub(super) fn beginning(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
         let time = self.account.get(ticket)?.started.clone()?;
         let measured = Vec::new();
@@ -143,7 +143,7 @@ impl Run<'_> {
         Some((time, news))
     }
 
-    /// That it has ended, as news. What takes no time has, when it has started.
+    /// Returns the end of a step as news. An instantaneous action ends when it starts.
     pub(super) fn ending(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
         let entry = self.account.get(ticket)?;
         let (time, ending) = entry.ended.clone()?;
@@ -161,7 +161,7 @@ impl Run<'_> {
     }
 }
 
-/// The end of a run whose plan cannot be made ready.
+/// Returns the end of a run whose plan cannot be prepared.
 pub(super) fn no_plan(error: &PrepareError) -> Stop {
     let why = error.to_string();
     let missing = MissingPlan::NotSearched;

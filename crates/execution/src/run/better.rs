@@ -1,4 +1,4 @@
-//! The search for a better plan while the present one is executed.
+//! Search for a better plan while the present one is executed.
 
 use std::sync::Arc;
 
@@ -16,7 +16,8 @@ use crate::reason::{Cause, Reason};
 use crate::record::Entry;
 
 impl Run<'_> {
-    /// Requests a plan if the executor seeks a better one than the present one. Returns whether the run waits for it.
+    /// Requests a plan if the executor seeks a better one than the present one. Returns `true` if
+    /// the run waits for it.
     pub(super) fn seek_better_plan(&mut self) -> bool {
         if !self.may_seek_better_plan() || !self.ports.executor.seeks_better_plan(&self.now) {
             return false;
@@ -43,8 +44,9 @@ impl Run<'_> {
         true
     }
 
-    /// Returns whether another plan could take over: the present one continues meanwhile, or planning takes no time in
-    /// the world; and all that was ordered has started and can continue.
+    /// Returns `true` if another plan could take over: the present one continues meanwhile, or
+    /// planning takes no time in the world; and all commanded actions have started and can
+    /// continue.
     fn may_seek_better_plan(&self) -> bool {
         let takes_no_time = self.settings.planning_time == PlanningTime::Seconds(Rational::ZERO);
         let has_planner = if self.plans_aside() {
@@ -65,12 +67,14 @@ impl Run<'_> {
             && self.belief.breaking().is_empty()
     }
 
-    /// Takes note of an answer without a better plan. It is cheap to search again where it is known that there is none.
+    /// Records that the planner has found no better plan. If there is certainly none, searching
+    /// again is cheap.
     pub(super) fn note_no_better_plan(&mut self, answer: &PlanAnswer) {
         self.lost.sought_in_vain = *answer != PlanAnswer::Unsolvable;
     }
 
-    /// Returns whether a prepared plan takes over from the present one, which is counted then.
+    /// Returns `true` if a prepared plan takes over from the present one, and counts the new plan
+    /// then.
     pub(super) fn takes_over(&mut self, mission: &Mission, reason: &Reason) -> Result<bool, Stop> {
         if self.ports.executor.prefers(mission, &self.now) {
             self.count_replan(reason)?;
@@ -83,7 +87,7 @@ impl Run<'_> {
         Ok(false)
     }
 
-    /// Has a plan prepared that takes over if it is better than the present one.
+    /// Has a plan prepared. It takes over if it is better than the present one.
     pub(super) fn prepare_better_plan(&mut self, attempt: Attempt, plan: &TimeTriggeredPlan) {
         let (task, goals) = (Arc::clone(&self.task), self.goals());
         let course = Course::of(plan, &attempt.situation, &attempt.running);

@@ -1,4 +1,4 @@
-//! Continuing with the present plan where no other one was found.
+//! Continuation of the present plan if no other one was found.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use crate::executor::News;
 use crate::reason::Reason;
 use crate::record::Entry;
 
-/// The state of a plan's actions when the executor abandoned the plan.
+/// State of a plan's actions when the executor abandoned the plan.
 #[derive(Clone, Debug)]
 pub(super) struct Abandoned {
     reason: Reason,
@@ -19,7 +19,7 @@ pub(super) struct Abandoned {
 }
 
 impl Run<'_> {
-    /// Notes that the executor abandons the present plan.
+    /// Records that the executor abandons the present plan.
     pub(super) fn note_abandoned(&mut self, reason: &Reason) {
         let plan = self.account.plan().clone();
         let tickets = || plan.steps.values().copied();
@@ -43,12 +43,13 @@ impl Run<'_> {
         });
     }
 
-    /// Returns whether the executor could continue with the plan that it abandoned.
+    /// Returns `true` if the executor could continue with the plan that it abandoned.
     pub(super) fn may_carry_on(&self) -> bool {
         self.lost.abandoned.is_some() && !self.is_to_turn() && self.ports.executor.may_carry_on()
     }
 
-    /// Ends the run, unless the executor continues with the plan that it abandoned: there is no other one.
+    /// Ends the run, because there is no other plan, unless the executor continues with the plan
+    /// that it abandoned.
     pub(super) fn carry_on_or_stop(&mut self, verdict: Verdict) -> Result<(), Stop> {
         let abandoned = self.lost.abandoned.take();
         let Some(abandoned) = abandoned.filter(|_| !self.is_to_turn()) else {

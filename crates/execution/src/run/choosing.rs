@@ -1,10 +1,11 @@
-//! Pursuit of those goals that can be reached together.
+//! Pursuit of goals that can be reached together.
 //!
-//! All open goals of a lasting run are pursued together at first. If there is no plan for all of them, a part is
-//! selected ([`Selection`]) and the other goals are set aside; they are pursued when the selected ones are achieved, or
-//! when the goals change. Goals that are given while a plan is executed are added to those of the plan; if no
-//! plan reaches all of them, the new goals are set aside and the plan continues. Of several goals, each is closed as soon as
-//! it is achieved.
+//! At first, an executive pursues all open goals together. If there is no plan for all of them,
+//! some are selected ([`Selection`]) and the other goals are set aside. These are pursued when the
+//! selected ones are achieved, or when the goals change. Goals that are added while a plan is
+//! executed are added to those of the plan; if no plan reaches all of them, the new goals are set
+//! aside and the plan continues. If there are several goals, each is closed as soon as it is
+//! achieved.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +19,7 @@ use super::shortfall::Conflict;
 use super::{Run, Verdict};
 use crate::record::{Entry, GoalChange};
 
-/// The greatest number of goals that are listed in a reason.
+/// Maximum number of goals that are listed in a reason.
 const MOST_LISTED: usize = 5;
 
 /// A selection among the open goals.
@@ -26,12 +27,12 @@ pub(super) struct Choosing {
     /// The names of the goals, in order of preference.
     names: Vec<String>,
     selection: Selection,
-    /// The goals that are pursued meanwhile.
+    /// The goals that are pursued during the selection.
     tried: Set,
 }
 
 impl Choosing {
-    /// All these goals are tried.
+    /// Creates a selection that tries all these goals.
     fn all(names: Vec<String>, selection: Selection) -> Self {
         Self {
             selection,
@@ -40,7 +41,8 @@ impl Choosing {
         }
     }
 
-    /// A choice among all these goals, which are tried. Goals of greater value are preferred, and then the earlier ones.
+    /// Creates a selection among these goals that tries all of them. Goals of greater value are
+    /// preferred, then earlier ones.
     fn among(mut goals: Vec<(String, Rational)>) -> Self {
         goals.sort_by(|(_, value), (_, other)| other.cmp(value));
         let (names, values) = goals.into_iter().unzip();
@@ -51,7 +53,7 @@ impl Choosing {
         self.names.iter().position(|it| it == name)
     }
 
-    /// Notes that no plan reaches all goals of a conflict.
+    /// Records that no plan reaches all goals of a conflict.
     fn note_conflicts(&mut self, conflicts: &[Conflict]) {
         for conflict in conflicts {
             let members = conflict.goals.iter().map(|name| self.position(name));
@@ -92,26 +94,26 @@ impl Run<'_> {
         self.continue_without(&achieved);
     }
 
-    /// Continues with the other goals after these, which were achieved.
+    /// Continues with the other goals after these were achieved.
     fn continue_without(&mut self, achieved: &[OpenGoal]) {
         self.lost.has_closed_goals = self.search.is_some();
         self.record_achieved(achieved);
         self.set_goal();
         if self.search.is_none() && self.is_choosing_goals() {
-            // Sets that had no plan because of the closed goals may have one now.
+            // Without the closed goals, more sets may have a plan.
             self.choose_anew(false);
         }
     }
 
-    /// Returns the next deadline of an open goal that is still to come.
+    /// Returns the next coming deadline of an open goal.
     pub(super) fn next_deadline_of_a_goal(&self) -> Option<Rational> {
         let goals = self.lasting.iter().flat_map(|it| &it.goals);
         let deadlines = goals.filter_map(|goal| goal.terms.deadline.as_ref());
         deadlines.filter(|it| **it > self.now).min().cloned()
     }
 
-    /// Closes the goals whose deadlines are before this time, in their order. All that happened up to the deadlines is
-    /// known.
+    /// Closes the goals whose deadlines are before this time, in their order. All events up to the
+    /// deadlines must be known.
     pub(super) fn close_goals_due_before(&mut self, time: &Rational) {
         let goals = self.lasting.iter().flat_map(|it| &it.goals);
         let deadlines = goals.filter_map(|goal| goal.terms.deadline.clone());
@@ -122,8 +124,8 @@ impl Run<'_> {
         }
     }
 
-    /// Closes the goals with deadlines that are achieved, because they need not stay true, and those whose deadlines are
-    /// now.
+    /// Closes achieved goals with deadlines, because they need not stay true, and goals whose
+    /// deadlines are now.
     pub(super) fn close_momentary_goals(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;
@@ -154,7 +156,7 @@ impl Run<'_> {
         let is_due =
             |goal: &mut OpenGoal| goal.terms.deadline.as_ref().is_some_and(|it| it <= time);
         let due: Vec<OpenGoal> = lasting.goals.extract_if(.., is_due).collect();
-        // Some may have been achieved at this very moment.
+        // A goal may have been achieved exactly at its deadline.
         let is_achieved = |goal: &OpenGoal| self.belief.is_certain(&goal.ground) == Ok(true);
         let (achieved, late): (Vec<_>, Vec<_>) = due.into_iter().partition(is_achieved);
         self.record_achieved(&achieved);
@@ -207,7 +209,7 @@ impl Run<'_> {
         }
     }
 
-    /// Goals were given. If a plan is executed and none reaches these as well, the present plan continues.
+    /// Adds new goals to the selection. If no plan also reaches these, the present plan continues.
     pub(super) fn add_to_choice(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;
@@ -235,7 +237,7 @@ impl Run<'_> {
         let least = planned.iter().map(|(_, value)| value).min();
         lasting.choosing = match (least, greatest) {
             (None, _) => None,
-            // Those of the plan may have to give way.
+            // Goals of the plan may be set aside for more valuable ones.
             (Some(least), Some(greatest)) if greatest > least => {
                 Some(Choosing::among([planned, new].concat()))
             }
@@ -249,8 +251,8 @@ impl Run<'_> {
         };
     }
 
-    /// Continues with other goals where the run would otherwise rest with this verdict. Returns `false` if there are
-    /// none.
+    /// Continues with other goals where the run would otherwise become idle with this verdict.
+    /// Returns `false` if there are none.
     pub(super) fn choose_after(&mut self, verdict: &Verdict) -> bool {
         match verdict {
             Verdict::GoalReached => self.pursue_goals_set_aside(),
@@ -264,7 +266,8 @@ impl Run<'_> {
         }
     }
 
-    /// The goals that are pursued are achieved: closes them and turns to those that were set aside.
+    /// Closes the pursued goals, which are achieved, and pursues those that were set aside. Returns
+    /// `false` if there are none.
     fn pursue_goals_set_aside(&mut self) -> bool {
         let Some(lasting) = &mut self.lasting else {
             return false;
@@ -289,7 +292,8 @@ impl Run<'_> {
         true
     }
 
-    /// Tries again if goals were closed since the plan was requested: there may be one for the others.
+    /// Tries again if goals were closed since the plan was requested, because the others may have a
+    /// plan.
     fn choose_after_closing(&mut self) -> bool {
         let has_closed = std::mem::take(&mut self.lost.has_closed_goals);
         if has_closed && !(self.is_choosing_goals() && self.choose_anew(false)) {
@@ -298,8 +302,9 @@ impl Run<'_> {
         has_closed
     }
 
-    /// Begins a choice among all open goals that can become true. `is_tried` is `true` if no plan was found for all of
-    /// them; all of many goals are not tried together. Returns `false` if no goal can become true.
+    /// Begins a selection among all open goals that can become true. `is_tried` is `true` if no
+    /// plan was found for all of them; if there are many goals, all of them are not tried together.
+    /// Returns `false` if no goal can become true.
     fn choose_anew(&mut self, is_tried: bool) -> bool {
         let mut choosing = Choosing::among(self.set_hopeless_goals_aside());
         let all = choosing.tried.clone();
@@ -312,14 +317,14 @@ impl Run<'_> {
         self.follow(choosing, step, true)
     }
 
-    /// No plan was found, and goals were added since the request: chooses among all of them.
+    /// Selects among all goals if no plan was found and goals were added since the request.
     pub(super) fn choose_after_more_goals(&mut self) {
         if self.has_given_up_goals() == Some(false) && !self.is_choosing_goals() {
             self.choose_after_failure();
         }
     }
 
-    /// No plan was found for the goals that are pursued: chooses others.
+    /// Selects other goals after no plan was found for the pursued ones.
     fn choose_after_failure(&mut self) -> bool {
         let Some(lasting) = &mut self.lasting else {
             return false;
@@ -340,14 +345,14 @@ impl Run<'_> {
         let positions = tried.iter().map(|name| choosing.position(name));
         let step = match positions.collect::<Option<Set>>() {
             Some(tried) => choosing.selection.after_failure(tried),
-            // Some were hopeless.
+            // Some goals can never become true.
             None => Step::Try(choosing.tried.clone()),
         };
         self.follow(choosing, step, true)
     }
 
-    /// Sets those open goals aside that can never become true. Returns the names and values of the others: first those
-    /// with deadlines, in their order.
+    /// Sets aside the open goals that can never become true. Returns the names and values of the
+    /// others; those with deadlines come first, in the order of their deadlines.
     fn set_hopeless_goals_aside(&mut self) -> Vec<(String, Rational)> {
         self.pursue_all();
         self.note_hopeless_goals();
@@ -365,7 +370,7 @@ impl Run<'_> {
             .collect()
     }
 
-    /// Notes which of the goals that are pursued can never become true.
+    /// Records the pursued goals that can never become true.
     fn note_hopeless_goals(&mut self) {
         let hopeless = hopeless_conditions(&self.belief);
         let goals = self.lasting.iter_mut().flat_map(|it| &mut it.goals);
@@ -378,7 +383,7 @@ impl Run<'_> {
         }
     }
 
-    /// A plan begins: continues a choice that was waiting for it.
+    /// Continues a selection that was waiting for a plan to begin.
     pub(super) fn choose_after_success(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;
@@ -399,8 +404,8 @@ impl Run<'_> {
         }
     }
 
-    /// No plan was found for new goals in addition to those of the present plan, which continues. Returns `false` if
-    /// the failure was another one.
+    /// Leaves out the new goals if no plan reaches them in addition to those of the present plan,
+    /// which continues. Returns `false` if the failure has another reason.
     pub(super) fn leave_out_new_goals(&mut self) -> bool {
         if self.choose_after_closing() {
             return true;
@@ -417,8 +422,8 @@ impl Run<'_> {
         self.follow(choosing, step, false)
     }
 
-    /// Pursues the goals of the next step. Returns `false` if there is no plan for any goal. A plan is requested or kept
-    /// for goals that are tried, and if `is_to_plan` for the selected ones.
+    /// Pursues the goals of the next step. Returns `false` if there is no plan for any goal. A plan
+    /// is requested or kept if the step tries goals, or if `is_to_plan` for the selected ones.
     fn follow(&mut self, mut choosing: Choosing, mut step: Step, is_to_plan: bool) -> bool {
         let conflicts = self.conflicts();
         let Some(lasting) = &mut self.lasting else {
@@ -433,11 +438,11 @@ impl Run<'_> {
             if is_last || !pursued.is_empty() {
                 break (set, pursued, is_last);
             }
-            // All of these were closed meanwhile.
+            // All of these goals were closed meanwhile.
             step = choosing.selection.after_failure(set);
         };
         if pursued.is_empty() {
-            // Each that can never become true keeps its own reason at the rest.
+            // Goals that can never become true keep their own reasons in the idle state.
             self.set_hopeless_goals_aside();
             return false;
         }
@@ -484,7 +489,7 @@ impl Run<'_> {
         true
     }
 
-    /// Records which goals are set aside, and which are pursued again.
+    /// Records the goals that are set aside, and those that are pursued again.
     pub(super) fn announce_goals(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;
@@ -513,7 +518,7 @@ fn names_of(goals: &[OpenGoal]) -> Option<String> {
     (!names.is_empty()).then(|| names.join(", "))
 }
 
-/// The names of goals, in words.
+/// Formats the names of goals.
 fn list(choosing: &Choosing, set: &Set, open: &BTreeSet<String>) -> String {
     let names = set.iter().map(|it| &choosing.names[*it]);
     let names = names.filter(|name| open.contains(*name));

@@ -1,8 +1,9 @@
-//! Why no plan reaches the goal any more: what can never become true again, and since when.
+//! Explanation of a dead end: the parts of the goal that can never become true again, and since
+//! when.
 //!
-//! What can become true at all is asked of [`reachability`], which ignores deletions and time: what
-//! is out of its reach, no plan reaches. The history of the run is lived through again to find the
-//! event after which part of the goal was out of reach and before which it was not.
+//! [`reachability`] computes an upper bound on the facts that can become true, ignoring deletions
+//! and time. No plan can reach anything else. The history of the run is replayed to find the event
+//! that made part of the goal unreachable.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,10 +17,10 @@ use crate::event::{Ending, Ticket};
 use crate::progression::Progression;
 use crate::reason::{About, Behind, Cause, Changed, Reason};
 
-/// Something observed that was believed.
+/// An observation that was believed.
 #[derive(Clone, Debug)]
 pub(super) struct Happened {
-    /// The time at which it happened.
+    /// The time of the event.
     time: Rational,
     what: What,
 }
@@ -27,9 +28,9 @@ pub(super) struct Happened {
 #[derive(Clone, Debug)]
 pub(super) enum What {
     Started(Ticket),
-    /// As the domain says.
+    /// With its end effects.
     Ended(Ticket),
-    /// Without its end taking place.
+    /// Without its end effects.
     Stopped(Ticket),
     Fact(FactId, bool),
     Value(FluentId, Rational),
@@ -38,14 +39,14 @@ pub(super) enum What {
 /// Limit on the work of reachability for an explanation: about a second.
 const MOST_STEPS: u64 = 10_000_000;
 
-/// The same limit for [`is_goal_unreachable`], which holds up a run: about a tenth of a second.
+/// The same limit for [`is_goal_unreachable`], which delays the run: about a tenth of a second.
 const MOST_STEPS_MEANWHILE: u64 = 1_000_000;
 
 /// Limit on the number of parts of the goal that are explained.
 const MOST_NAMED: usize = 3;
 
 impl Run<'_> {
-    /// Something has happened that was believed: records it, for a later explanation of a dead end.
+    /// Records an observation that was believed, for a later explanation of a dead end.
     pub(super) fn note(&mut self, time: &Rational, what: What) {
         self.lost.in_vain = None;
         if !matches!(what, What::Stopped(_)) {
@@ -59,7 +60,7 @@ impl Run<'_> {
         }
     }
 
-    /// Facts and numbers that can never become true again, and since when.
+    /// Returns the parts of the goal that can never become true again, and since when.
     pub(super) fn dead_end(&self) -> Vec<Reason> {
         let mut past = self.past();
         let mut present = past.after(self.history.len());
@@ -79,7 +80,7 @@ impl Run<'_> {
         explained.collect()
     }
 
-    /// What was believed after so many events of the history.
+    /// Returns the belief after the first `count` events of the history.
     pub(super) fn believed_after(&self, count: usize) -> Progression {
         self.past().after(count)
     }
@@ -96,19 +97,20 @@ impl Run<'_> {
     }
 }
 
-/// The history of a run, to be asked about.
+/// Queries about the history of a run.
 struct Past<'a> {
     task: &'a Arc<Task>,
     beginning: &'a Progression,
     history: &'a [Happened],
     account: &'a Account,
     now: &'a Rational,
-    /// The conditions that were out of reach, by the number of events before.
+    /// The unreachable parts of the goal, by the number of events before.
     known: BTreeMap<usize, Option<Vec<Condition>>>,
 }
 
 impl Past<'_> {
-    /// The parts of the goal that were out of reach after so many events, if that can be said.
+    /// Returns the parts of the goal that were unreachable after the first `count` events, if that
+    /// can be computed.
     fn unreachable_after(&mut self, count: usize) -> Option<Vec<Condition>> {
         if let Some(known) = self.known.get(&count) {
             return known.clone();
@@ -123,11 +125,11 @@ impl Past<'_> {
         lost.is_some_and(|lost| lost.contains(goal))
     }
 
-    /// Since which event a part of the goal has been out of reach.
+    /// Returns the event since when a part of the goal has been unreachable.
     fn explain(&mut self, goal: &Condition) -> Reason {
         let about = About::Conditions(vec![self.task.describe_condition(goal)]);
         let reason = Reason::new(Cause::NeverAgain).about(about);
-        // Back in ever longer strides to where it was in reach, then halving.
+        // Goes back in growing strides until the part is reachable, then bisects.
         let mut lost = self.history.len();
         if !self.is_lost_after(lost, goal) {
             return self.between(lost, reason, goal);
@@ -155,8 +157,8 @@ impl Past<'_> {
         self.between(open, reason, goal)
     }
 
-    /// The goal was in reach after so many events, and after one more it was not; or time has
-    /// passed.
+    /// Explains a part of the goal that was reachable after `count` events, and unreachable after
+    /// one more or because time has passed.
     fn between(&self, count: usize, reason: Reason, goal: &Condition) -> Reason {
         let next = self.history.get(count);
         let until = next.map_or(self.now, |next| &next.time).clone();
@@ -169,7 +171,8 @@ impl Past<'_> {
         }
     }
 
-    /// It was never in reach after an observation: then since a timed initial, or never.
+    /// Explains a part of the goal that was unreachable after each observation: since a timed
+    /// initial, or from the beginning.
     fn at_the_beginning(&self, reason: Reason, goal: &Condition) -> Reason {
         let start = self.after(0);
         if is_lost(&start, goal) {
@@ -181,7 +184,7 @@ impl Past<'_> {
         }
     }
 
-    /// The timed initials until then that take the goal out of reach.
+    /// Returns the first timed initials until then that make the part of the goal unreachable.
     fn timed(
         &self,
         from: &Progression,
@@ -200,7 +203,7 @@ impl Past<'_> {
         None
     }
 
-    /// A happening, by name.
+    /// Describes an event by name.
     fn named(&self, what: &What) -> Behind {
         let task = self.task;
         let entry = |ticket: &Ticket| {
@@ -227,12 +230,12 @@ impl Past<'_> {
         }
     }
 
-    /// The belief after `count` events.
+    /// Returns the belief after `count` events.
     fn after(&self, count: usize) -> Progression {
         let mut state = self.beginning.clone();
         state.pursue(self.task);
         for happened in &self.history[..count] {
-            // What cannot be computed stays as it was, as when it happened.
+            // Values that cannot be computed stay the same, as they did in the run.
             let _ = state.arrive(&happened.time);
             match &happened.what {
                 What::Started(ticket) => {
@@ -271,17 +274,19 @@ fn is_lost(state: &Progression, goal: &Condition) -> bool {
     unreachable(state, MOST_STEPS).is_some_and(|lost| lost.contains(goal))
 }
 
-/// Returns whether part of the goal can never become true any more. `false` if that cannot be said within a small limit.
+/// Returns `true` if part of the goal can never become true any more, and `false` if that cannot be
+/// decided within a small limit.
 pub(super) fn is_goal_unreachable(state: &Progression) -> bool {
     unreachable(state, MOST_STEPS_MEANWHILE).is_some_and(|lost| !lost.is_empty())
 }
 
-/// Returns the parts of the goal that can never become true any more, as far as that can be said within a small limit.
+/// Returns the parts of the goal that can never become true any more, as far as that can be decided
+/// within a small limit.
 pub(super) fn hopeless_conditions(state: &Progression) -> Vec<Condition> {
     unreachable(state, MOST_STEPS_MEANWHILE).unwrap_or_default()
 }
 
-/// The parts of the goal that are out of reach, if that can be said within the limits.
+/// Returns the unreachable parts of the goal, if they can be computed within the limit.
 fn unreachable(state: &Progression, step_limit: u64) -> Option<Vec<Condition>> {
     let running = state.running().values().map(|underway| {
         let duration = Interval::point(underway.planned.clone());

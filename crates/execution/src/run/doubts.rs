@@ -1,8 +1,8 @@
-//! Facts and values that are in doubt, because it is unknown whether an action has come to its end.
+//! Facts and values in doubt, because it is unknown whether an action's end has happened.
 //!
-//! Such a fact counts as false, for planners as for executors, and a fluent keeps its value. The world is asked about them
-//! before a plan is requested. A report on the action's end settles the doubt however late it comes, and so does whatever
-//! the world reports about the facts and values themselves.
+//! Such a fact counts as false, for planners and for executors, and a fluent keeps its value. The
+//! world is asked about them before a plan is requested. A report on the action's end settles the
+//! doubt, however late it comes, and so does any report on the facts and values themselves.
 
 use std::sync::Arc;
 
@@ -19,17 +19,18 @@ use crate::planning::PlanAnswer;
 use crate::progression::Doubt;
 use crate::reason::Reason;
 
-/// The doubts that the world has been asked about.
+/// The last question to the world about doubts.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inquiry {
-    /// Those that arose until then.
+    /// It covers the doubts that arose until then.
     until: Option<Rational>,
     /// `true` until the world has answered.
     pub(super) is_open: bool,
 }
 
 impl Run<'_> {
-    /// It is unknown whether an action has come to its end, or whether it has started at all.
+    /// Marks the effects of an action as doubtful: it is unknown whether it has ended, or whether
+    /// it has started at all.
     pub(super) fn doubt(&mut self, ticket: Ticket, action: &Action, has_started: bool) {
         let doubt = Doubt {
             since: self.now.clone(),
@@ -41,7 +42,7 @@ impl Run<'_> {
         }
     }
 
-    /// The end of an action is reported after it has timed out.
+    /// Processes a report on the end of an action that had timed out.
     pub(super) fn ended_after_all(
         &mut self,
         ticket: Ticket,
@@ -79,8 +80,8 @@ impl Run<'_> {
         Some("it had timed out; its effects are known now")
     }
 
-    /// Asks the world about doubtful facts and values, before a plan is requested, if it has not been asked yet. Returns
-    /// whether it does.
+    /// Asks the world about doubtful facts and values before a plan is requested, unless it was
+    /// asked before. Returns `true` if it asks.
     pub(super) fn inquire(&mut self, reason: &Reason) -> bool {
         let (facts, values) = (self.belief.doubtful_facts(), self.belief.doubtful_values());
         let doubts = facts.values().chain(values.values()).flatten();
@@ -102,7 +103,8 @@ impl Run<'_> {
         true
     }
 
-    /// Ends the run if the goal holds, but only by the assumptions about doubtful facts: a plan would change nothing.
+    /// Ends the run if the goal holds, but only by the assumptions about doubtful facts. A plan
+    /// would not change that.
     pub(super) fn stop_if_goal_is_in_doubt(&mut self) -> Result<(), Stop> {
         let is_idle = self.account.open_tickets().next().is_none();
         if !is_idle || !self.belief.is_goal_in_doubt() {
@@ -118,8 +120,9 @@ impl Run<'_> {
         }))
     }
 
-    /// Continues with the present plan, if the executor does, or ends the run. While actions run, doubts may be settled:
-    /// a plan is requested again when one has been, or when the actions have ended.
+    /// Continues with the present plan if the executor does; otherwise ends the run. While actions
+    /// are running, doubts may be settled; a plan is then requested again when that happens, or
+    /// when the actions have ended.
     pub(super) fn go_on_without_plan(
         &mut self,
         answer: &PlanAnswer,
@@ -136,8 +139,8 @@ impl Run<'_> {
         outcome
     }
 
-    /// Returns the verdict if the planner has answered this, and no plan. If anything is in doubt, the situation that was
-    /// refuted may not be the real one.
+    /// Returns the verdict if the planner has given this answer, which is not a plan. If anything
+    /// is in doubt, the situation of the answer may not be the real one.
     fn verdict_without_plan(&self, answer: &PlanAnswer) -> Verdict {
         let verdict = Verdict::without_plan(answer);
         let doubts = self.doubts_in_words();
@@ -156,7 +159,7 @@ impl Run<'_> {
         }
     }
 
-    /// The facts and fluents that are in doubt, and the reason; empty if there are none.
+    /// Returns the facts and fluents in doubt, with the reasons; empty if there are none.
     fn doubts_in_words(&self) -> String {
         let facts = self.belief.doubtful_facts().iter();
         let facts = facts.map(|(fact, doubts)| (self.task.fact_name(*fact), doubts));
@@ -180,7 +183,7 @@ impl Run<'_> {
     }
 }
 
-/// The effects that may have taken place if nothing is reported on the action's end.
+/// Returns the effects that may have happened if no end was reported.
 fn unknown_effects(action: &Action, has_started: bool) -> Vec<&SnapAction> {
     match &action.body {
         Body::Instantaneous(snap) => vec![snap],

@@ -11,38 +11,39 @@ use crate::record::Entry;
 use crate::request::{PlanRequest, PrepareRequest, RequestId, Workers};
 use crate::world::{Passage, World, WorldError};
 
-/// Work that is counted for each decision.
+/// Work units of each decision.
 const DECISION_WORK: u64 = 5_000;
 
 /// The next request of a run to its driver.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Next {
-    /// To be given this command; then [`Run::next`] again.
+    /// Send this command to the world; then [`Run::next`] again.
     Command(Command),
-    /// Time, until something is observed, but not beyond `until`; then [`Run::observe`].
+    /// Wait for an observation, at most until `until`; then [`Run::observe`].
     Wait {
-        /// By the world's clock.
+        /// On the world's clock.
         until: Rational,
     },
-    /// The world is to look at these, if it can; then [`Run::see`].
+    /// Look at these facts and fluents in the world, if possible; then [`Run::see`].
     Look {
         /// Facts.
         facts: Vec<FactId>,
         /// Fluents.
         fluents: Vec<FluentId>,
     },
-    /// A plan is needed; then [`Run::planned`]. Repeated until then if the run waits for it
-    /// ([`Urgency::Awaited`](crate::Urgency::Awaited)); otherwise [`Run::next`] again.
+    /// Make a plan; then [`Run::planned`]. If the run waits for it
+    /// ([`Urgency::Awaited`](crate::Urgency::Awaited)), the request is repeated until then;
+    /// otherwise [`Run::next`] again.
     Plan(PlanRequest),
-    /// A plan is to be prepared for the executor; then [`Run::prepared`], likewise.
+    /// Prepare a plan for the executor; then [`Run::prepared`], likewise.
     Prepare(PrepareRequest),
-    /// The answer to this request is not needed any more; then [`Run::next`] again.
+    /// Abandon this request, whose answer is not needed any more; then [`Run::next`] again.
     Abandon(RequestId),
-    /// Nothing: the run is over.
+    /// The run is over.
     Over(Report),
 }
 
-/// The run has not asked for that: [`Run::observe`] answers [`Next::Wait`], and [`Run::see`]
+/// Error: the answer was not requested. [`Run::observe`] answers [`Next::Wait`], and [`Run::see`]
 /// answers [`Next::Look`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the run has not asked for {what}; call `Run::next` first")]
@@ -51,7 +52,7 @@ pub struct NotAsked {
 }
 
 impl Run<'_> {
-    /// The whole run in a world that blocks, with workers that plan and prepare.
+    /// Executes the whole run in a blocking world, with workers that plan and prepare.
     pub fn go(mut self, world: &mut dyn World, workers: &mut dyn Workers) -> Report {
         loop {
             let answered = match self.next() {
@@ -84,8 +85,8 @@ impl Run<'_> {
         }
     }
 
-    /// Has the workers answer a request for a plan or a prepared plan, or abandon it. Requests to the world are none of
-    /// theirs, and ignored.
+    /// Lets the workers answer a request for a plan or a prepared plan, or abandon it. Requests to
+    /// the world are ignored.
     pub fn delegate(&mut self, request: Next, workers: &mut dyn Workers) {
         match request {
             Next::Plan(request) => {
@@ -103,8 +104,8 @@ impl Run<'_> {
         }
     }
 
-    /// Returns the next request to the driver. A question for which the run waits is returned again until it is
-    /// answered.
+    /// Returns the next request to the driver. A question that the run waits for is repeated until
+    /// it is answered.
     #[expect(
         clippy::should_implement_trait,
         reason = "a run is no iterator: the next request depends on the answers"
@@ -130,10 +131,10 @@ impl Run<'_> {
         }
     }
 
-    /// Time has passed, as [`Next::Wait`] has asked: until something was observed, or to its end.
+    /// Takes the answer to [`Next::Wait`].
     ///
     /// # Errors
-    /// When the run has not asked for it; then nothing is made of it.
+    /// If the run has not requested it. It is ignored then.
     pub fn observe(&mut self, passage: Passage) -> Result<(), NotAsked> {
         if !matches!(self.asked, Some(Next::Wait { .. })) {
             let what = "time to pass";
@@ -143,10 +144,10 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// What was seen of that which [`Next::Look`] has asked for; nothing, if the world cannot look.
+    /// Takes the observations that [`Next::Look`] has requested; none if the world cannot look.
     ///
     /// # Errors
-    /// When the run has not asked for it; then nothing is made of it.
+    /// If the run has not requested them. They are ignored then.
     pub fn see(&mut self, observations: Vec<Observation>) -> Result<(), NotAsked> {
         if !matches!(self.asked, Some(Next::Look { .. })) {
             let what = "a look";
@@ -156,7 +157,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// The world has failed, and is asked nothing more.
+    /// Records that the world has failed. The run does not ask it anything more.
     pub fn fail(&mut self, error: WorldError) {
         self.asked = None;
         self.pending = None;
@@ -165,12 +166,12 @@ impl Run<'_> {
         }
     }
 
-    /// The present time, by the world's clock.
+    /// Returns the present time, on the world's clock.
     pub fn now(&self) -> &Rational {
         &self.now
     }
 
-    /// Takes in an answer of the world to [`Next::Wait`].
+    /// Processes the world's answer to [`Next::Wait`].
     fn take_passage(&mut self, mut passage: Passage) {
         let Some(Next::Wait { until }) = self.asked.take() else {
             return;
@@ -192,7 +193,7 @@ impl Run<'_> {
         }
     }
 
-    /// The consequences of time having passed, whatever was observed.
+    /// Processes the passage of time, apart from the observations.
     fn after_passage(&mut self) -> Result<(), Stop> {
         if self.closing.is_some() {
             self.go_on_closing();
@@ -206,7 +207,7 @@ impl Run<'_> {
         moves_on.map_err(|why| Stop::World(WorldError::new(why)))
     }
 
-    /// Takes in an answer of the world to [`Next::Look`].
+    /// Processes the world's answer to [`Next::Look`].
     fn take_look(&mut self, observations: Vec<Observation>) {
         self.asked = None;
         self.ports.recorder.record(&Entry::Looked {
@@ -235,8 +236,9 @@ impl Run<'_> {
     }
 }
 
-/// Returns whether a time is less than another one, but equal up to the rounding of a world that computes with doubles.
-/// If it counted as less, such a world could be asked for the same time for ever.
+/// Returns `true` if a time is less than another one, but equal up to the rounding of a world that
+/// computes with doubles. If it counted as less, such a world could be asked for the same time
+/// forever.
 fn is_rounded(time: &Rational, exact: &Rational) -> bool {
     let least_distinct = exact * &Rational::new(1, 1 << 50);
     time < exact && exact - time <= least_distinct

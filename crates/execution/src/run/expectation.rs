@@ -1,9 +1,9 @@
-//! What the present plan is expected to lead to.
+//! Forecast of the present plan's result.
 //!
-//! What is under way ends, and steps start, in the order of the plan's network and as soon after each
-//! other as it allows, but not before they are planned: where something is late, so is what waits for
-//! it, and only that. What could not be started where things stand by then is not expected, nor what
-//! waits for it.
+//! Running actions end, and steps start, in the order of the plan's network and as early as it
+//! permits, but not before their planned times. So a delay affects only the successors of the late
+//! action. A step whose conditions do not hold at its start is left out, with all steps that wait
+//! for it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,10 +19,10 @@ use crate::event::Ticket;
 use crate::executor::{Need, StepId};
 use crate::progression::{Progression, Underway};
 
-/// A start that the present plan is expected to make.
+/// An expected start of the present plan.
 #[derive(Clone, Debug)]
 pub(super) struct Expected {
-    /// By which it is known in the situation that is expected.
+    /// Its ticket in the expected situation.
     pub(super) ticket: Ticket,
     pub(super) step: StepId,
     action: Arc<Action>,
@@ -40,58 +40,59 @@ impl Expected {
     }
 }
 
-/// Where a plan is to begin.
+/// Initial situation of a new plan.
 #[derive(Clone, Debug)]
 pub(super) struct Prospect {
     pub(super) situation: Situation,
-    /// What is under way there. Tickets that were not given out yet are those of what is expected to
-    /// be started.
+    /// The actions running there. Tickets that have not been issued yet are those of expected
+    /// starts.
     pub(super) running: Vec<Ticket>,
-    /// What is expected to be started until then.
+    /// The expected starts until then.
     pub(super) expected: Vec<Expected>,
 }
 
-/// How far ahead to look.
+/// The range of a forecast.
 pub(super) struct Reach {
-    /// Where things will stand then is asked.
+    /// The time of the forecast.
     pub(super) time: Rational,
-    /// What would start then, or later, is not expected.
+    /// Steps that would start at this time or later are not expected to start.
     pub(super) starts_before: Rational,
-    /// What would end later is not expected to have ended.
+    /// Actions that would end later than this are not expected to have ended.
     pub(super) ends_by: Rational,
-    /// What is made of that which is late.
+    /// The assumption about overdue actions.
     pub(super) late: Late,
 }
 
-/// What is expected of an action under way that should have ended.
+/// Assumption about a running action that should have ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Late {
     /// As [`Guess::AQuarterLonger`].
     AQuarterLonger,
-    /// It goes on, but for what is late by no more than [`Run::slack`] and was not warned of: that
-    /// ends now.
+    /// It does not end. Only an action that is late by no more than [`Run::slack`] and has no
+    /// warning ends now.
     GoesOn,
 }
 
-/// What is expected to happen, step by step.
+/// State of a forecast, advanced event by event.
 struct Future {
     belief: Progression,
-    /// When the moments of the plan are expected to happen that have not happened.
+    /// Expected times of the plan's coming starts and ends.
     times: BTreeMap<Moment, Rational>,
-    /// When what is under way ends.
+    /// The ends of the running actions.
     ends: Vec<(Rational, Ticket, Option<StepId>)>,
     to_come: Vec<Expected>,
     expected: Vec<Expected>,
 }
 
 impl Run<'_> {
-    /// How late something may happen as if it was on time, in seconds: on a clock nothing is on time to
-    /// the millisecond.
+    /// Returns the delay that still counts as punctual, in seconds. On a real clock, no event is
+    /// punctual to the millisecond.
     pub(super) fn slack() -> Rational {
         Rational::new(1, 4)
     }
 
-    /// Where the present plan will have led when planning is expected to be over, or at `until`.
+    /// Returns the expected situation when planning ends, or at `until`, if the present plan
+    /// continues.
     pub(super) fn where_the_plan_leads(&self, until: Option<&Rational>) -> Prospect {
         let epsilon = self.task.epsilon();
         let expected_to_be_over = &self.now + &self.allowance + epsilon;
@@ -105,14 +106,14 @@ impl Run<'_> {
         })
     }
 
-    /// What the present plan is expected to lead to.
+    /// Returns the expected situation if the present plan continues.
     pub(super) fn expectation(&self, reach: &Reach) -> Prospect {
         let mut future = self.beginning_of_the_future(reach);
         while self.lets_happen_what_is_next(&mut future, reach) {}
         let time = reach.time.clone();
         let (mut situation, running) = situation_at(&future.belief, time, Guess::AQuarterLonger);
         if reach.late == Late::AQuarterLonger {
-            // From now on it takes a quarter longer, not from then on.
+            // The quarter is measured from now, not from the time of the forecast.
             for (ticket, it) in running.iter().zip(&mut situation.running) {
                 let underway = self.belief.running().get(ticket);
                 let end = underway.filter(|it| self.is_due(it));
@@ -139,7 +140,7 @@ impl Run<'_> {
                 ends.push((end, *ticket, entry.and_then(|entry| entry.step)));
             }
         }
-        // What was told to start and has not said that it has, does now.
+        // Commanded actions whose start was not reported are assumed to start now.
         for ticket in self.account.open_tickets() {
             let entry = self.account.get(ticket);
             let Some(entry) = entry.filter(|entry| entry.started.is_none()) else {
@@ -160,12 +161,12 @@ impl Run<'_> {
         }
     }
 
-    /// Whether it should have ended.
+    /// Returns `true` if it should have ended.
     fn is_due(&self, underway: &Underway) -> bool {
         &underway.start + &underway.planned <= self.now
     }
 
-    /// When something that is under way is expected to end; `None` if it is expected to go on.
+    /// Returns the expected end of a running action; `None` if it is not expected to end.
     fn expected_end(&self, ticket: Ticket, underway: &Underway, late: Late) -> Option<Rational> {
         let planned = &underway.start + &underway.planned;
         if !self.is_due(underway) {
@@ -185,10 +186,10 @@ impl Run<'_> {
         }
     }
 
-    /// The steps of the present plan that have not been started, and may be before some time, with the times before which
-    /// they are not expected to start. Their tickets are not chosen yet.
+    /// Returns the steps of the present plan that have not started and may start before some time,
+    /// with their earliest times. Their tickets are not chosen yet.
     fn to_come(&self, before: &Rational) -> Vec<Expected> {
-        // Others number what they start as they like.
+        // These executors choose their own step numbers.
         if self.ports.executor.need() == Need::PartialOrder {
             return Vec::new();
         }
@@ -209,12 +210,12 @@ impl Run<'_> {
             }
         });
         let mut left: Vec<Expected> = left.collect();
-        // Of what can start at the same time, what was planned first.
+        // Among steps that can start at the same time, the first one planned comes first.
         left.sort_by(|one, other| one.start.cmp(&other.start));
         left
     }
 
-    /// When a step can start, if all that it waits for has happened.
+    /// Returns the earliest start of a step, if all its predecessors have happened.
     fn start_in(&self, future: &Future, it: &Expected) -> Option<Rational> {
         let mut start = it.start.clone().max(future.belief.time().clone());
         for wait in self.account.waits(it.step) {
@@ -225,7 +226,7 @@ impl Run<'_> {
         Some(start)
     }
 
-    /// Lets the next thing happen; whether there was any.
+    /// Executes the next event of the forecast. Returns `false` if there is none.
     fn lets_happen_what_is_next(&self, future: &mut Future, reach: &Reach) -> bool {
         let starts = future.to_come.iter();
         let starts = starts
@@ -238,11 +239,11 @@ impl Run<'_> {
         let ends = future.ends.iter().enumerate();
         let ends = ends.filter(|(_, (time, ..))| *time <= reach.ends_by);
         let end = ends.min_by(|(_, one), (_, other)| one.cmp(other));
-        // Ends before starts: what starts may need what has ended.
+        // Ends come before starts, because starts may need the effects of ends.
         let end = end.filter(|(_, (time, ..))| start.as_ref().is_none_or(|start| time <= start));
         if let Some((index, _)) = end {
             let (time, ticket, step) = future.ends.swap_remove(index);
-            // What cannot be computed is left as it was: what is expected is no promise.
+            // Effects that cannot be computed are ignored, since the forecast is not a guarantee.
             let _ = future.belief.arrive(&time);
             let _ = future.belief.end(ticket, &[]);
             if let Some(step) = step {
@@ -266,7 +267,7 @@ impl Run<'_> {
                 return true;
             }
         }
-        // None of them can start.
+        // None of these steps can start.
         for index in now.into_iter().rev() {
             future.to_come.remove(index);
         }
@@ -275,7 +276,7 @@ impl Run<'_> {
 }
 
 impl Future {
-    /// It is taken to start.
+    /// Records the expected start of a step.
     fn start(&mut self, it: Expected, ticket: Ticket, time: Rational) {
         match &it.duration {
             Some(duration) => self.ends.push((&time + duration, ticket, Some(it.step))),
@@ -290,7 +291,7 @@ impl Future {
     }
 }
 
-/// What is believed once an action has begun; `None` if its conditions do not hold.
+/// Returns the belief after the start of an action; `None` if its conditions do not hold.
 fn begun(
     belief: &Progression,
     ticket: Ticket,

@@ -1,4 +1,4 @@
-//! The end of a run: nothing is left running.
+//! End of a run: cancels running actions and waits for them to stop.
 
 use elbowroom_num::Rational;
 
@@ -9,21 +9,22 @@ use crate::executor::News;
 use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
 
-/// How many seconds of the world's time cancelled actions have to stop when a run ends.
+/// Time that cancelled actions have to stop at the end of a run, in seconds of the world's clock.
 pub const FAREWELL: i64 = 5;
 
 /// The closing phase of a run, while running actions are cancelled.
 pub(super) struct Closing {
     verdict: Verdict,
     dead_end: Vec<Reason>,
-    /// When it ends, whatever has stopped by then.
+    /// Time at which the run ends at the latest.
     last: Rational,
-    /// `true` once the world has reported its time. A wait that was cut short may have left the clock of the run behind.
+    /// `true` once the world has reported its time. After an interrupted wait, the clock of the run
+    /// may be behind.
     has_answered: bool,
 }
 
 impl Run<'_> {
-    /// Whether the run was asked to end.
+    /// Ends the run if that was requested.
     pub(super) fn heed(&mut self) -> Result<(), Stop> {
         if !(self.is_to_end)() {
             return Ok(());
@@ -34,9 +35,9 @@ impl Run<'_> {
         Err(Stop::Over(Verdict::Interrupted))
     }
 
-    /// Ends the run: cancels the running actions, and waits for their ends. A world that cannot be reached
-    /// ([`WorldError::is_reachable`](crate::WorldError)) receives no commands. A failure of the world meanwhile ends the
-    /// wait, and leaves the verdict as it is.
+    /// Ends the run: cancels the running actions, and waits for their ends. A world that cannot be
+    /// reached ([`WorldError::is_reachable`](crate::WorldError)) receives no commands. If the world
+    /// fails meanwhile, the wait ends, and the verdict is not changed.
     pub(super) fn stop(&mut self, stop: Stop) {
         self.agenda.clear();
         self.news.clear();
@@ -79,14 +80,14 @@ impl Run<'_> {
             return;
         }
         self.progress.begin_plan();
-        // What stops at once is told at once.
+        // Immediate ends are reported at once.
         self.agenda.push(Todo::Close(self.now.clone()));
         let running = open.into_iter();
         let running = running.filter(|ticket| !self.account.is_cancelled(*ticket));
         self.agenda.push(Todo::Cancel(running.collect()));
     }
 
-    /// Waits for what was told to stop, if there is something left.
+    /// Waits for the cancelled actions that have not stopped, or ends the run if there are none.
     pub(super) fn close(&mut self, until: Rational) {
         if self.account.open_tickets().next().is_some() {
             self.asked = Some(Next::Wait { until });
@@ -95,7 +96,7 @@ impl Run<'_> {
         }
     }
 
-    /// The world has answered to [`Self::close`].
+    /// Continues after the world's answer to [`Self::close`].
     pub(super) fn go_on_closing(&mut self) {
         let moves_on = self.progress.note(&self.now, self.steps);
         if let Some(closing) = &mut self.closing
@@ -112,7 +113,8 @@ impl Run<'_> {
         }
     }
 
-    /// Returns `true` if facts or numbers have changed since the verdict, which was that no plan is known from there.
+    /// Returns `true` if the verdict was that no plan is known, and facts or numbers have changed
+    /// since.
     fn is_verdict_outdated(&self, verdict: &Verdict) -> bool {
         let is_change = |news: &News| matches!(news, News::Fact(_) | News::Value(_));
         matches!(verdict, Verdict::Unsolvable | Verdict::NoPlan { .. })
@@ -145,7 +147,8 @@ impl Run<'_> {
         self.report = Some(report);
     }
 
-    /// Goes on where the run was over, if it is to: with a new plan from here.
+    /// Continues a run that was over with a new plan from there, if that is permitted. Returns
+    /// `true` if it does.
     pub(super) fn reopen(&mut self) -> bool {
         let Some(left) = self.reopenings.checked_sub(1) else {
             return false;
@@ -158,9 +161,9 @@ impl Run<'_> {
 }
 
 impl<'a> Run<'a> {
-    /// The same run, which was over so many times, each time without its goal
-    /// ([`Verdict::NoPlan`], [`Verdict::PlannerFailed`]), and was then gone on with: another plan is looked for, from where it
-    /// was over. [`Run::go`] goes on so often by itself.
+    /// Makes the run continue up to `times` times after it was over without its goal
+    /// ([`Verdict::NoPlan`], [`Verdict::PlannerFailed`]): another plan is searched for, from the
+    /// situation at its end. [`Run::go`] does that by itself.
     #[must_use]
     pub fn reopened(self, times: usize) -> Run<'a> {
         Self {

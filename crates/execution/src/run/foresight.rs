@@ -1,9 +1,9 @@
-//! What is foreseen while something is late: where a new plan will begin when one is needed.
+//! Forecast, while an action is late, of the initial situation of the next plan.
 //!
-//! At the warning, the planner is told where a plan will be needed: what is late still goes on there,
-//! and until then everything else starts and ends as the present plan has it. Whenever things come
-//! otherwise, it is foreseen anew; who comes a moment earlier or later than was foreseen changes
-//! nothing, as the plan is made to fit when it is needed.
+//! With the warning, the planner is notified of that situation: the late action is still running,
+//! and until then everything else starts and ends according to the present plan. The forecast is
+//! updated when the execution deviates from it. Small differences in time do not matter, because
+//! the plan is fitted to the real situation when it is needed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,38 +18,39 @@ use crate::executor::CAN_HAVE_A_CLOCK;
 use crate::executor::StepId;
 use crate::request::Urgency;
 
-/// Where a plan will be needed if what is late does not end, as the planner was told.
+/// The initial situation of the next plan if a late action does not end, as reported to the
+/// planner.
 pub(super) struct Foreseen {
     pub(super) prospect: Prospect,
-    /// Since when.
+    /// The time of the forecast.
     pub(super) since: Rational,
-    /// From then on a plan is needed.
+    /// The time from when a new plan is needed.
     until: Rational,
-    /// Whether something has happened since that nobody expected.
+    /// `true` if an unexpected event has happened since.
     is_overtaken: bool,
-    /// Once the present plan is let go of.
+    /// The abandoned plan, once the present plan was abandoned.
     left: Option<Left>,
 }
 
-/// What a plan was when it was let go of.
+/// State of a plan when it was abandoned.
 struct Left {
-    /// What was started of it.
+    /// The steps that were started.
     steps: BTreeMap<StepId, Ticket>,
-    /// Whether things had come as they were foreseen.
+    /// `true` if the execution had been as foreseen.
     is_as_foreseen: bool,
 }
 
-/// A foreseen situation that a plan can be asked for.
+/// A foreseen situation for a request.
 pub(super) struct Ahead {
     pub(super) prospect: Prospect,
     pub(super) since: Rational,
-    /// What was started of the plan that was let go of.
+    /// The started steps of the abandoned plan.
     pub(super) left_behind: BTreeMap<StepId, Ticket>,
-    /// Whether things stand otherwise by a little.
+    /// `true` if the real situation differs slightly.
     pub(super) is_guess: bool,
 }
 
-/// Something that is foreseen to be under way.
+/// An action that is foreseen to be running.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Doing {
     Started(Ticket),
@@ -57,11 +58,12 @@ enum Doing {
 }
 
 impl Run<'_> {
-    /// Tells the planner from where a plan will be needed at `until`, or before that where something
-    /// else is late, too.
+    /// Notifies the planner of the expected situation at `until`, when a plan will be needed, or
+    /// before that if another action is late.
     pub(super) fn foresee(&mut self, until: &Rational) {
         if self.search.as_ref().is_some_and(Search::is_optional) {
-            // It comes first; if its plan does not take over, this is asked again.
+            // The optional search comes first. If its plan does not take over, there is another
+            // call.
             return;
         }
         let until = self.next_need().unwrap_or_else(|| until.clone());
@@ -86,26 +88,25 @@ impl Run<'_> {
         })
     }
 
-    /// When a plan is needed if what was warned of does not end.
+    /// Returns the time at which a plan is needed if actions with a warning do not end.
     fn next_need(&self) -> Option<Rational> {
         let needs = self.account.open_tickets().filter_map(|ticket| {
             let entry = self.account.get(ticket)?;
             let window = self.ports.executor.window(entry.step?, true)?.latest?;
-            // Where it has got more room since, there is another warning.
+            // If its slack has grown since, there is another warning.
             let until = entry.warned.clone()?;
             (until >= window && until >= self.now).then_some(until)
         });
         needs.min()
     }
 
-    /// Foresees anew where things have come otherwise than they were foreseen. Returns when to look
-    /// again.
+    /// Updates the forecast if the execution deviates from it. Returns the time of the next check.
     pub(super) fn tend_foresight(&mut self) -> Option<Rational> {
         if !CAN_HAVE_A_CLOCK || !self.settings.watches_room || self.search.is_some() {
             return None;
         }
         let Some(until) = self.next_need() else {
-            // What was late has ended, unless the plan is needed now.
+            // The late action has ended, unless the plan is needed now.
             self.foreseen.take_if(|it| it.until > self.now);
             return None;
         };
@@ -117,7 +118,7 @@ impl Run<'_> {
         self.next_doubt(&until)
     }
 
-    /// When something is late that was expected to end before then.
+    /// Returns the time at which an action becomes late that was expected to end before then.
     fn next_doubt(&self, until: &Rational) -> Option<Rational> {
         let doubts = self.belief.running().values().filter_map(|underway| {
             let planned = &underway.start + &underway.planned;
@@ -127,14 +128,14 @@ impl Run<'_> {
         doubts.min()
     }
 
-    /// Something has happened that was not foreseen.
+    /// Records an event that was not foreseen.
     pub(super) fn note_unforeseen(&mut self) {
         if let Some(foreseen) = &mut self.foreseen {
             foreseen.is_overtaken = true;
         }
     }
 
-    /// The present plan is let go of: what was foreseen is kept with what was started of it.
+    /// Keeps the forecast when the present plan is abandoned, with the steps that were started.
     pub(super) fn keep_foreseen(&mut self) {
         if let Some(mut foreseen) = self.foreseen.take().filter(|_| CAN_HAVE_A_CLOCK) {
             if foreseen.left.is_none() {
@@ -147,8 +148,8 @@ impl Run<'_> {
         }
     }
 
-    /// The situation that was foreseen, if it is near and things have come, but for moments, as they
-    /// were foreseen; where plans are waited for, without any difference.
+    /// Returns the foreseen situation if it is near and the execution was as foreseen. Small
+    /// differences in time are permitted, unless plans are awaited.
     pub(super) fn as_foreseen(&mut self, guess: Guess) -> Option<Ahead> {
         let foreseen = self.foreseen.take().filter(|_| CAN_HAVE_A_CLOCK)?;
         let Prospect {
@@ -176,7 +177,8 @@ impl Run<'_> {
         })
     }
 
-    /// Whether the same will be under way as was foreseen, by what is expected now.
+    /// Returns `true` if, by the present forecast, the same actions will be running as was
+    /// foreseen.
     fn has_come_as(&self, foreseen: &Foreseen) -> bool {
         let until = &foreseen.until;
         let ends_by = (&self.now + self.task.epsilon()).max(until.clone());
@@ -186,7 +188,8 @@ impl Run<'_> {
             && self.doings(&foreseen.prospect, until) == self.doings(&anew(), until)
     }
 
-    /// What is foreseen to be under way, but for what is to start or end about then.
+    /// Returns the actions that are foreseen to be running, except those that start or end at about
+    /// that time.
     fn doings(&self, prospect: &Prospect, until: &Rational) -> BTreeSet<Doing> {
         let slack = Self::slack();
         let is_about_then = |time: &Rational| *time >= until - &slack && *time <= until + &slack;

@@ -1,4 +1,4 @@
-//! The goals of a lasting run.
+//! Goals of an executive.
 
 use std::sync::Arc;
 
@@ -12,14 +12,14 @@ use crate::event::GoalTerms;
 use crate::executor::Need;
 use crate::reason::{About, Cause, Reason};
 
-/// A goal that is open.
+/// An open goal.
 pub(super) struct OpenGoal {
     pub(super) name: String,
-    /// As it was given; `None` for that of the problem.
+    /// Its text in PDDL; `None` for the goal of the problem.
     pub(super) text: Option<String>,
     pub(super) condition: problem::Condition,
     pub(super) terms: GoalTerms,
-    /// The same condition, grounded.
+    /// Its condition, grounded.
     pub(super) ground: Condition,
     /// The reason for which it can never become true, if that is known.
     pub(super) hopeless: Option<String>,
@@ -27,12 +27,12 @@ pub(super) struct OpenGoal {
     pub(super) aside: Option<String>,
     /// Lateness in words, if its deadline is known to be missed.
     pub(super) late: Option<String>,
-    /// `true` if the record says that it is set aside.
+    /// `true` if the record contains that it is set aside.
     pub(super) is_announced: bool,
 }
 
 impl OpenGoal {
-    /// Creates a goal of a task from its text and the condition that the text means.
+    /// Creates a goal of a task from its text and its condition.
     pub(super) fn new(
         task: &Task,
         name: String,
@@ -52,7 +52,7 @@ impl OpenGoal {
         }
     }
 
-    /// Returns the goal that the problem itself has.
+    /// Returns the problem's own goal.
     pub(super) fn of_the_problem(task: &Task) -> Self {
         let condition = task.problem().goal.clone();
         Self::new(task, FIRST_GOAL.to_owned(), None, condition)
@@ -64,7 +64,7 @@ impl OpenGoal {
     }
 }
 
-/// Returns the conjunction of all goals that are pursued.
+/// Returns the conjunction of all pursued goals.
 fn together<'g>(goals: impl IntoIterator<Item = &'g OpenGoal>) -> problem::Condition {
     let goals = goals.into_iter().filter(|it| it.is_pursued());
     let mut goals: Vec<_> = goals.map(|it| it.condition.clone()).collect();
@@ -79,7 +79,7 @@ fn together<'g>(goals: impl IntoIterator<Item = &'g OpenGoal>) -> problem::Condi
 }
 
 impl Run<'_> {
-    /// The goals have changed.
+    /// Records a change of the goals.
     pub(super) fn turn(&mut self, what: String, may_keep: bool) {
         self.set_goal();
         let Some(lasting) = &mut self.lasting else {
@@ -94,7 +94,7 @@ impl Run<'_> {
         lasting.change = Some(Turn::of(what, may_keep));
     }
 
-    /// All goals that are pursued are the goal of the task.
+    /// Makes the conjunction of all pursued goals the goal of the task.
     pub(super) fn set_goal(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;
@@ -109,16 +109,17 @@ impl Run<'_> {
         }
     }
 
-    /// Pursues these goals of a task.
+    /// Makes the conjunction of these goals the goal of the task.
     fn pursue(&mut self, task: &Task, goals: &[OpenGoal]) {
         self.task = Arc::new(self.planned_for(task, goals));
         let all = task.with_goal(together(goals));
         self.belief.pursue(&Arc::new(all));
     }
 
-    /// Returns the task of plans for these goals. A plan need not keep a goal true to its end if the goal has a deadline,
-    /// because the goal is closed as soon as it is achieved. Executors that choose the order themselves, and plans under
-    /// constraints of the problem, respect no deadlines of goals.
+    /// Returns the task for plans for these goals. A plan need not keep a goal with a deadline true
+    /// until its end, because such a goal is closed as soon as it is achieved. Executors that
+    /// choose the order themselves, and plans under constraints of the problem, ignore deadlines of
+    /// goals.
     fn planned_for(&self, task: &Task, goals: &[OpenGoal]) -> Task {
         let pursued = goals.iter().filter(|it| it.is_pursued());
         let deadlines = pursued.filter_map(|it| Some((it.terms.deadline.clone()?, &it.condition)));
@@ -131,7 +132,7 @@ impl Run<'_> {
         }
     }
 
-    /// The open goals.
+    /// Returns the open goals.
     pub(super) fn goals(&self) -> Goals {
         let Some(lasting) = &self.lasting else {
             return Goals::default();
@@ -143,7 +144,7 @@ impl Run<'_> {
         }
     }
 
-    /// Reads goals again that were read before.
+    /// Parses given goals again.
     fn read_again(&self, problem: &Task, goals: &Goals) -> Vec<OpenGoal> {
         let Some(lasting) = &self.lasting else {
             return Vec::new();
@@ -167,7 +168,7 @@ impl Run<'_> {
         goals.collect()
     }
 
-    /// The task with these goals, where `problem` has its own.
+    /// Returns the task with these goals; `problem` is the task with the goal of the problem.
     pub(super) fn task_of(&self, problem: &Arc<Task>, goals: &Goals) -> Arc<Task> {
         if !goals.are_others {
             return Arc::clone(problem);
@@ -175,7 +176,7 @@ impl Run<'_> {
         Arc::new(self.planned_for(problem, &self.read_again(problem, goals)))
     }
 
-    /// These are the open goals, where `problem` has its own.
+    /// Restores the open goals; `problem` is the task with the goal of the problem.
     pub(super) fn pursue_again(&mut self, problem: &Arc<Task>, goals: &Goals, is_paused: bool) {
         let open = self.read_again(problem, goals);
         if goals.are_others {
@@ -188,14 +189,15 @@ impl Run<'_> {
         }
     }
 
-    /// How the goals have changed, if they have: in words, and whether they have only become more.
+    /// Returns the change of the goals in words, and `true` if goals were only added. `None` if
+    /// they have not changed.
     pub(super) fn turn_in_words(&self) -> Option<(String, bool)> {
         let turn = self.lasting.as_ref()?.change.as_ref()?;
         let words = turn.reason.about.as_ref().map(ToString::to_string);
         Some((words.unwrap_or_default(), turn.may_keep))
     }
 
-    /// The goals have changed like that.
+    /// Restores a change of the goals.
     pub(super) fn turn_again(&mut self, turn: Option<(String, bool)>) {
         if let Some(lasting) = &mut self.lasting {
             lasting.change = turn.map(|(words, may_keep)| Turn::of(words, may_keep));

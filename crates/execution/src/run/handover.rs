@@ -1,4 +1,4 @@
-//! From one plan to the next.
+//! Transition from one plan to the next.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -36,7 +36,7 @@ pub(super) enum NextAttempt {
 }
 
 impl Run<'_> {
-    /// Brings what is running to where a new plan can begin: see [`RunningRule`].
+    /// Brings the running actions to a state that permits a new plan: see [`RunningRule`].
     pub(super) fn settle(&mut self) {
         match self.settings.running {
             RunningRule::Keep => {
@@ -53,11 +53,11 @@ impl Run<'_> {
         }
     }
 
-    /// Waits for the awaited actions that have not ended. Each wait ends at a warning or a time-out at
-    /// the latest.
+    /// Waits for the actions in `awaited` that have not ended. Each wait ends at a warning or a
+    /// time-out at the latest.
     pub(super) fn go_on_settling(&mut self, awaited: Option<Vec<Ticket>>) {
         if let Some(lost) = &awaited {
-            // Until it has stopped, it counts as running.
+            // It counts as running until it has stopped.
             let mut lost = lost.iter();
             if !lost.any(|ticket| self.belief.running().contains_key(ticket)) {
                 return;
@@ -66,8 +66,8 @@ impl Run<'_> {
         self.wait_until_timeout(Todo::Settle(awaited));
     }
 
-    /// Waits for these actions, although a plan could be requested without their ends. The wait ends if that has become
-    /// more urgent: the goals have changed, or doubts have been settled or have arisen.
+    /// Waits for these actions, although a plan could be requested without their ends. The wait
+    /// ends early if the goals change, or if doubts are settled or arise.
     pub(super) fn linger(&mut self, tickets: Vec<Ticket>, doubts: usize) {
         let mut running = tickets.iter();
         if running.any(|ticket| self.belief.running().contains_key(ticket))
@@ -78,8 +78,8 @@ impl Run<'_> {
         }
     }
 
-    /// Waits until the next time-out or its warning at the latest, and goes on with this then. If nothing can time out,
-    /// nothing is running.
+    /// Waits until the next time-out or its warning at the latest, and performs `todo` then. If
+    /// nothing can time out, nothing is running.
     fn wait_until_timeout(&mut self, todo: Todo) {
         let Some(until) = self.next_timeout() else {
             return;
@@ -90,7 +90,8 @@ impl Run<'_> {
         self.agenda.push(Todo::Pass(until));
     }
 
-    /// A plan can only go on with what has started, and with what it may go on doing.
+    /// Returns the actions that no plan can continue: those that have not started, and those whose
+    /// over-all condition fails.
     fn what_cannot_go_on(&self) -> Vec<Ticket> {
         let breaking = self.belief.breaking().into_iter();
         let breaking: BTreeSet<Ticket> = breaking.map(|(ticket, _)| ticket).collect();
@@ -160,12 +161,12 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Takes in the answer to a request for which the run has waited. The plan is adopted when the time has passed
-    /// that planning took.
+    /// Processes the answer to an awaited request. The plan is adopted when its planning time has
+    /// passed.
     pub(super) fn take_plan(&mut self, attempt: Attempt, planned: Planned) -> Result<(), Stop> {
         let took = match &self.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
-            // The world's time begins when there is a first plan.
+            // The world's clock starts when there is a first plan.
             PlanningTime::Measured if self.settings.plans_aside => Rational::ZERO,
             PlanningTime::Measured => planned.seconds.unwrap_or_default(),
         };
@@ -212,8 +213,8 @@ impl Run<'_> {
                 };
             }
         };
-        // Actions that end before the adoption belong to neither plan. Their effects are news, and the new plan
-        // receives their ends.
+        // Actions that end before the adoption belong to neither plan. Their effects are news, and
+        // the new plan receives their ends.
         self.account.begin_plan(&BTreeMap::new());
         self.agenda.push(Todo::Adopt(Box::new(Made {
             plan,
@@ -232,7 +233,7 @@ impl Run<'_> {
         match guess {
             // Overdue actions may still end in time.
             Guess::AQuarterLonger => NextAttempt::Guess(Guess::AnyMoment),
-            // They are not cancelled in vain.
+            // They are only cancelled if there is a plan without them.
             Guess::AnyMoment if self.may_carry_on() => NextAttempt::Guess(Guess::Cancelled),
             Guess::AnyMoment => NextAttempt::CancelOverdue,
             Guess::Cancelled => NextAttempt::CarryOn,
@@ -247,15 +248,15 @@ impl Run<'_> {
         self.agenda.push(Todo::Cancel(overdue));
     }
 
-    /// Learns from what a plan took what the next one will take: as much, if that is more than was
-    /// expected; else less, but only by half at a time. If one long search delayed all plans after it,
-    /// a run whose goals come faster than that would not start anything any more.
+    /// Updates the expected planning time: to the last planning time if that is greater, otherwise
+    /// to no less than half of the previous value. If one long search delayed all later plans, a
+    /// run with frequent new goals would never start anything.
     pub(super) fn expect(&mut self, took: &Rational) {
         let half = &self.allowance / &Rational::from(2);
         self.allowance = half.max(took.clone());
     }
 
-    /// Takes up a plan, as soon as the time is over that it took to make it.
+    /// Adopts a plan when its planning time has passed.
     pub(super) fn adopt(&mut self, made: Box<Made>) {
         if self.is_to_turn() {
             // It was made for other goals.
@@ -272,12 +273,13 @@ impl Run<'_> {
         self.take_up(Course::of(&made.plan, &made.situation, &made.running));
     }
 
-    /// Where things will stand when the new plan can begin: after the time that planning is
-    /// expected to take, and ε after whatever happens last before that.
+    /// Returns the situation when the new plan can start: after the expected planning time, and ε
+    /// after the last event before that.
     pub(super) fn situation(&self, allowance: &Rational, guess: Guess) -> (Situation, Vec<Ticket>) {
         let epsilon = self.task.epsilon();
         let mut time = &self.now + allowance;
-        // Another goal makes another problem, which is written anew for planners that read files.
+        // With other goals, the problem is a different one, and is written again for planners that
+        // read files.
         if self.now.is_positive() || self.account.started() > 0 || self.has_other_goals() {
             time += epsilon;
         }
@@ -287,7 +289,7 @@ impl Run<'_> {
         self.situation_at(time, guess)
     }
 
-    /// The same at this time, or ε after the timed initials that come just before it.
+    /// Returns the situation at this time, or ε after the timed initials that come just before it.
     pub(super) fn situation_at(&self, time: Rational, guess: Guess) -> (Situation, Vec<Ticket>) {
         if guess != Guess::Cancelled {
             return situation_at(&self.belief, time, guess);

@@ -1,4 +1,4 @@
-//! Where a run stands: the situation for a plan from here, and what is left of the present plan.
+//! Present situation of a run: the start of a new plan, and the remaining plan.
 
 use std::sync::Arc;
 
@@ -9,20 +9,21 @@ use elbowroom_num::{Interval, Rational};
 use crate::event::Ticket;
 use crate::progression::Progression;
 
-/// When something will end that should have ended.
+/// Estimated end time of an overdue action, for replanning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guess {
-    /// After a quarter of the time that it has taken, or sooner where its own conditions over all do not hold for so
-    /// long. A guess that it ends at any moment would lead to a new plan at each moment.
+    /// After a quarter of the time that it has taken, or sooner if its own over-all conditions do
+    /// not hold for that long. The estimate that it ends at any moment would lead to a new plan at
+    /// each moment.
     AQuarterLonger,
-    /// As soon as it can: if there is no plan even then, there is none with it.
+    /// As soon as possible. If there is no plan even then, there is none with this action.
     AnyMoment,
-    /// It does not end: it is cancelled.
+    /// Never: it is cancelled.
     Cancelled,
 }
 
-/// Where things will stand at `time` if nothing ends before that, or ε after the timed initials
-/// that come just before it; and the tickets of what is under way, in the situation's order.
+/// Returns the situation at `time`, or ε after timed initials that come just before it, if no
+/// action ends until then; and the tickets of the running actions, in the situation's order.
 pub fn situation_at(
     belief: &Progression,
     mut time: Rational,
@@ -62,9 +63,9 @@ pub fn situation_at(
     (situation, tickets)
 }
 
-/// Returns when a running action is expected to end that is overdue now: after a quarter of the time that it has taken,
-/// halved until its conditions over all hold until then if nothing else ends before. With a later end, no plan would be
-/// valid.
+/// Returns the expected end of a running action that is overdue now: after a quarter of the time
+/// that it has taken. The quarter is halved until the action's over-all conditions hold until then,
+/// if nothing else ends before. With a later end, no plan would be valid.
 pub fn a_quarter_longer(belief: &Progression, ticket: Ticket, now: &Rational) -> Rational {
     let holds_until = |end: &Rational| {
         let mut state = belief.clone();
@@ -83,8 +84,9 @@ pub fn a_quarter_longer(belief: &Progression, ticket: Ticket, now: &Rational) ->
     now + longer
 }
 
-/// The plan that continues what is under way and then does what is left, all of it as much later as
-/// the latest of it is late; `None` if the judge finds that it does not work.
+/// Returns the plan that continues the running actions and then executes the remaining steps. All
+/// steps are shifted by the greatest delay of any of them. `None` if the validator rejects the
+/// plan.
 pub fn rest_of(
     task: &Task,
     situation: &Situation,

@@ -1,4 +1,4 @@
-//! Taking in what the world reports: each report once, and no report against reason.
+//! Processing of reports: each report counts once, and implausible ones are corrected or ignored.
 
 use std::sync::Arc;
 
@@ -21,8 +21,9 @@ const BEFORE_THE_START: &str = "its time is before its start; taken as then";
 const WITHOUT_A_START: &str = "its start was not reported";
 const WITH_THE_COMMAND: &str = "its start was not reported; taken as the time of the request";
 
-/// Returns `true` if a remark on a report means that the report was counted, with another time or with a start. A report
-/// with another remark was ignored.
+/// Returns `true` if a remark on a report means that the report was counted with another time, or
+/// with an assumed start. Other remarks are on reports that were ignored, contradict an earlier
+/// report, or came after a time-out.
 pub fn is_correction(remark: &str) -> bool {
     [
         IN_THE_FUTURE,
@@ -34,17 +35,17 @@ pub fn is_correction(remark: &str) -> bool {
     .contains(&remark)
 }
 
-/// The objection to a report on a ticket that was not given out.
+/// Objection to a report on a ticket that was never issued.
 const NEVER_STARTED: &str = "nothing of that number was started";
 
-/// The objection to a report on what is no longer known.
+/// Objection to a report on a start that is no longer known.
 const LONG_PAST: &str = "it had ended, and was long past";
 
 impl Run<'_> {
-    /// Believes what is reported, as far as it can be believed, and notes what is new.
+    /// Updates the belief with the reports, as far as they are credible, and records the news.
     pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
         let timed_before = self.belief.timed_past();
-        // The earliest time of each observation and those behind it; the last one comes first.
+        // For each observation, the earliest time among it and the later ones; in reverse order.
         let mut earliest: Vec<Rational> = Vec::with_capacity(observations.len());
         for observation in observations.iter().rev() {
             let time = &observation.time;
@@ -64,7 +65,7 @@ impl Run<'_> {
                 remark,
             });
         }
-        // Time passes for the belief when everything that happened in it is known.
+        // The belief advances when all events up to now are known.
         let now = self.now.clone();
         self.close_goals_due_before(&now);
         let _ = self.belief.advance(&now);
@@ -135,7 +136,7 @@ impl Run<'_> {
         remark.or(is_early.then_some(IN_THE_FUTURE))
     }
 
-    /// An action reports the part of it that is done.
+    /// Processes a report on the completion of a running action.
     fn progressed(&mut self, ticket: Ticket, time: &Rational, done: Option<&Rational>) -> Remark {
         match self.account.recent(ticket) {
             None => Some(self.unknown(ticket)),
@@ -149,7 +150,7 @@ impl Run<'_> {
         }
     }
 
-    /// The objection to a report on a ticket that is not known.
+    /// Returns the objection to a report on an unknown ticket.
     fn unknown(&self, ticket: Ticket) -> &'static str {
         if self.account.is_forgotten(ticket) {
             LONG_PAST
@@ -158,8 +159,8 @@ impl Run<'_> {
         }
     }
 
-    /// The belief is never taken back in time, so a late report changes the present state. What is
-    /// reported of one time is one group.
+    /// Advances the belief to the time of a report. The belief never goes back in time, so a late
+    /// report changes the present state. Reports with the same time form one group.
     pub(super) fn believe_until(&mut self, time: &Rational) {
         let _ = self.belief.arrive(time);
     }
@@ -180,7 +181,7 @@ impl Run<'_> {
         is_too_early.then_some(BEFORE_THE_COMMAND)
     }
 
-    /// An action has started, or happened.
+    /// Records that an action has started, or that an instantaneous action has happened.
     fn begin(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) {
         let Some(entry) = self.account.get(ticket) else {
             return;
@@ -190,7 +191,7 @@ impl Run<'_> {
         self.believe_until(time);
         self.note_measured(measured);
         let amounts = self.amounts(&action, false, Some(&planned), measured);
-        // An effect that cannot be computed leaves its fluent as it was.
+        // An effect that cannot be computed does not change its fluent.
         let _ = self.belief.start(ticket, &action, &planned, measured);
         self.note(time, What::Started(ticket));
         self.account.note_start(ticket, time, measured);
@@ -256,7 +257,7 @@ impl Run<'_> {
                 self.refusals.note(&entry.action.name, &self.now);
             }
         }
-        // An instantaneous action is over when it has started; what follows says nothing new.
+        // An instantaneous action ends when it starts; later reports contain nothing new.
         let is_over = self
             .account
             .get(ticket)
@@ -287,7 +288,8 @@ impl Run<'_> {
         }
     }
 
-    /// The measured amounts, with the nominal ones; to be asked before the happening takes effect.
+    /// Returns the measured amounts, with the inputs of the nominal ones. To be called before the
+    /// effects are applied.
     fn amounts(
         &self,
         action: &Action,
@@ -314,7 +316,7 @@ impl Run<'_> {
         measured.iter().map(amount).collect()
     }
 
-    /// Two reports exclude each other: the effects of the action's end are unknown.
+    /// Processes contradictory reports: the effects of the action's end are in doubt.
     fn contradict(&mut self, ticket: Ticket) {
         let Some(entry) = self.account.get(ticket) else {
             return;
@@ -327,7 +329,8 @@ impl Run<'_> {
         });
     }
 
-    /// The present plan does not know of an action of an earlier one, but may read what it wrote.
+    /// Reports the effects of an action of an earlier plan as news. The present plan does not
+    /// contain the action, but may read its effects.
     pub(super) fn tell_effects(&mut self, ticket: Ticket, is_end: bool) {
         let Some(entry) = self.account.get(ticket) else {
             return;
@@ -342,8 +345,8 @@ impl Run<'_> {
         }
     }
 
-    /// Cancels an action that has reached its time-out. If it was cancelled before and has not ended, it counts as
-    /// failed, and it is unknown whether it has come to its end.
+    /// Cancels an action that has reached its time-out. If it was cancelled before and has not
+    /// ended, it counts as failed, and its end effects are in doubt.
     pub(super) fn time_out(&mut self, ticket: Ticket, since: Rational) {
         let Some(entry) = self.account.get(ticket) else {
             return;
@@ -364,7 +367,7 @@ impl Run<'_> {
         self.end_timed_out(ticket, &now, since);
     }
 
-    /// An action that has timed out has ended without its effects, or counts as ended.
+    /// Ends an action that has timed out: it has ended without its effects, or counts as ended.
     fn end_timed_out(&mut self, ticket: Ticket, time: &Rational, since: Rational) {
         let entry = self.account.get(ticket);
         let Some((action, step)) = entry.map(|entry| (entry.action.name.clone(), entry.step))

@@ -1,25 +1,27 @@
-//! Runs that go on when their goal is reached: goals, facts and pauses while they run.
+//! Executives: runs that continue after their goal is reached, with goals, facts and pauses from
+//! outside.
 //!
-//! Whatever is asked of a run comes in as an observation ([`Event::Asked`]), so that it is recorded
-//! with everything else and a replay, or a run that goes on after a crash, hears of it again.
+//! Each request arrives as an observation ([`Event::Asked`]). So it is recorded with everything
+//! else, and replays and resumed runs receive it again.
 //!
-//! | asked or observed | what comes of it |
+//! | request or observation | result |
 //! | --- | --- |
-//! | a goal | all open goals together are the goal from then on, except those that are [set aside](super::choosing). If the rest of the plan, begun now, reaches this, it is kept; otherwise a plan is made from here |
-//! | a goal of a name that is open | it takes the place of the earlier one; a plan is made from here |
+//! | a goal | the goal is now the conjunction of all open goals, except those that are [set aside](super::choosing). If the remaining plan, started now, reaches it, the plan is kept; otherwise a new plan is made |
+//! | a goal with the name of an open one | it replaces the earlier goal; a new plan is made |
 //! | a goal is abandoned | a plan is made for the others; without others, nothing more is started |
-//! | a fact or value | believed; the plan goes on while it works with it, and else a plan is made from here |
+//! | a fact or value | believed; the plan continues if it is still feasible, otherwise a new one is made |
 //! | an action is cancelled | the world receives the cancellation; its end is an outcome like any other |
-//! | a pause | nothing is started or planned any more; what is under way goes on, what it does is followed, and who stays silent for too long is given up. Time passes, deadlines too |
-//! | the end of a pause | the plan goes on where it still can; else a plan is made from here |
+//! | a pause | nothing is started or planned any more. Running actions continue and are monitored, and silent ones time out. Time passes, also for deadlines |
+//! | the end of a pause | the plan continues if it is still feasible, otherwise a new one is made |
 //!
-//! Actions under way keep running through all of this: they are part of the situation in which the
-//! next plan begins ([`RunningRule`](super::RunningRule)).
+//! Actions keep running in all of these cases: they are part of the situation from which the next
+//! plan starts ([`RunningRule`](super::RunningRule)).
 //!
-//! Where another run would be over, because the goals are reached, no plan reaches them, none was
-//! found, or too many were needed, a lasting one *rests* ([`Entry::Resting`]): it starts nothing
-//! and says why. What is under way goes on to its end. A request ends the rest; so does, while goals
-//! are open, any news from the world, and each timed initial, at most once in [`BREATH`] seconds.
+//! Other runs end when the goals are reached, no plan reaches them, none was found, or the limit on
+//! new plans is reached. An executive becomes *idle* instead ([`Entry::Resting`]): it starts
+//! nothing, and records the reason. Running actions continue to their ends. A request ends the idle
+//! state. While goals are open, so do news from the world and each timed initial, at most once in
+//! [`BREATH`] seconds.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -42,25 +44,24 @@ use crate::executor::News;
 use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
 
-/// The name of the goal that the problem itself has.
+/// Name of the problem's own goal.
 pub const FIRST_GOAL: &str = "problem";
 
-/// For so many seconds of the world's time no further plan is looked for after none was found,
-/// whatever is reported.
+/// Time after an unsuccessful search during which no other one begins, whatever is reported, in
+/// seconds of the world's clock.
 const BREATH: i64 = 1;
 
-/// While a run is paused, news of the same fact or number are told once; looked at when there are
-/// so many.
+/// Length of the news during a pause above which repetitions are removed.
 const MANY_NEWS: usize = 1000;
 
-/// Reads goals that are given while a run goes on.
+/// Reads the goals that are given to a run.
 ///
-/// The answer is the condition, or in words why it is none.
+/// The result is the condition, or the error in words.
 pub trait GoalReader: Send {
     /// Reads a goal of this task.
     ///
     /// # Errors
-    /// In words, when the text is no condition on what the task has.
+    /// If the text is not a condition of the task, in words.
     fn read(&self, task: &Task, text: &str) -> Result<problem::Condition, String>;
 }
 
@@ -70,53 +71,55 @@ impl<F: Fn(&Task, &str) -> Result<problem::Condition, String> + Send> GoalReader
     }
 }
 
-/// What a run needs to go on when its goal is reached.
+/// State of an executive, or of an attended run.
 pub(super) struct Lasting<'a> {
     pub(super) reader: Box<dyn GoalReader + 'a>,
     /// The open goals.
     pub(super) goals: Vec<OpenGoal>,
-    /// Whether the goals were ever changed.
+    /// `true` if the goals were ever changed.
     pub(super) has_other_goals: bool,
     pub(super) is_paused: bool,
-    /// How the goals have changed since the present plan was made.
+    /// The change of the goals since the present plan was made.
     pub(super) change: Option<Turn>,
-    /// The selection among the goals, while it lasts.
+    /// The selection among the goals, while it is in progress.
     pub(super) choosing: Option<Choosing>,
-    /// Conjuncts of goals that exclude each other, as the planner's answers during the selection have proved.
+    /// Conjuncts of goals that exclude each other, as proved by the planner's answers during the
+    /// selection.
     pub(super) conflicts: Vec<Vec<String>>,
-    /// The plan that is executed, on the world's clock.
+    /// The present plan, on the world's clock.
     pub(super) plan: Option<TimeTriggeredPlan>,
-    /// The names of the goals that it is for.
+    /// The names of the plan's goals.
     pub(super) planned_goals: BTreeSet<String>,
-    /// Since when the run rests.
+    /// Start of the idle state.
     rests_since: Option<Rational>,
-    /// It is proved that no plan reaches the goals from there, whatever timed initials are to come.
+    /// `true` if it is proved that no plan reaches the goals from there, including the effects of
+    /// all coming timed initials.
     is_unsolvable: bool,
     at_rest: AtRest,
 }
 
-/// What becomes of a run where another one would be over.
+/// Behaviour when another run would be over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum AtRest {
-    /// It waits for what is asked next.
+    /// It waits for the next request.
     Waits,
-    /// It is over, too: it only takes pauses, and that its goal is abandoned.
+    /// It is also over. It accepts only pauses and the abandonment of its goal.
     Ends,
-    /// Its goal was abandoned: it is over as soon as nothing is under way.
+    /// Its goal was abandoned: it is over as soon as no action is running.
     GivenUp,
 }
 
 /// A change of the goals.
 pub(super) struct Turn {
     pub(super) reason: Reason,
-    /// Whether goals were only added, so that the plan may be right for these, too.
+    /// `true` if goals were only added, so that the plan may also reach these.
     pub(super) may_keep: bool,
 }
 
 impl<'a> Run<'a> {
-    /// The same run, which goes on when its goal is reached, or cannot be: it waits for other goals
-    /// ([`Event::Asked`](crate::Event::Asked)), which `reader` reads. Its end is the time limit, a world that
-    /// fails, or a request to end.
+    /// Turns the run into an executive, which does not end when its goal is reached or unreachable.
+    /// It waits for other goals ([`Event::Asked`](crate::Event::Asked)), which `reader` reads. It
+    /// ends at the time limit, when the world fails, or when its end is requested.
     #[must_use]
     pub fn lasting(mut self, reader: impl GoalReader + 'a) -> Self {
         let goals = if self.task.problem().goal.is_trivial() {
@@ -141,9 +144,9 @@ impl<'a> Run<'a> {
         self
     }
 
-    /// The same run, which can be paused, and whose goal can be abandoned: then nothing more is
-    /// started, and it is over ([`Verdict::Interrupted`]) when what is under way has ended. Other
-    /// goals it does not take.
+    /// Makes the run accept pauses and the abandonment of its goal, but no other goals. When the
+    /// goal is abandoned, nothing more is started, and the run is over ([`Verdict::Interrupted`])
+    /// when the running actions have ended.
     #[must_use]
     pub fn attended(self) -> Self {
         let reads_none = |_: &Task, _: &str| Err("this run has one goal".to_owned());
@@ -154,7 +157,7 @@ impl<'a> Run<'a> {
         run
     }
 
-    /// Takes in a request.
+    /// Processes a request.
     pub(super) fn asked_for(&mut self, request: &Request) -> Remark {
         let Some(lasting) = &mut self.lasting else {
             return Some("this run takes no requests; nothing was made of it");
@@ -215,25 +218,26 @@ impl<'a> Run<'a> {
         None
     }
 
-    /// Whether the goals are not, or no longer, those of the problem.
+    /// Returns `true` if the goals are not, or no longer, those of the problem.
     pub(super) fn has_other_goals(&self) -> bool {
         let lasting = self.lasting.as_ref();
         lasting.is_some_and(|lasting| lasting.has_other_goals)
     }
 
-    /// Whether nothing is to be started or planned for now.
+    /// Returns `true` if nothing is to be started or planned for now.
     pub(super) fn is_paused(&self) -> bool {
         let lasting = self.lasting.as_ref();
         lasting.is_some_and(|lasting| lasting.is_paused)
     }
 
-    /// Whether the goals have changed since a plan was asked for.
+    /// Returns `true` if the goals have changed since a plan was requested.
     pub(super) fn is_to_turn(&self) -> bool {
         let lasting = self.lasting.as_ref();
         lasting.is_some_and(|lasting| lasting.change.is_some())
     }
 
-    /// Whether the run waits, or turns to other goals, in place of asking its executor.
+    /// Handles pauses, changed goals and the idle state. Returns `true` if the executor is not to
+    /// be asked.
     pub(super) fn attend(&mut self) -> Result<bool, Stop> {
         let Some(lasting) = &mut self.lasting else {
             return Ok(false);
@@ -277,7 +281,8 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
-    /// Returns `true` if the run rests although goals are open, and a timed initial may make them reachable.
+    /// Returns `true` if the run is idle although goals are open, and a timed initial may make them
+    /// reachable.
     fn awaits_timed_initials(&self) -> bool {
         let lasting = self.lasting.as_ref();
         lasting
@@ -294,13 +299,15 @@ impl<'a> Run<'a> {
         self.news.extend(changes.map(News::of_change));
     }
 
-    /// Since when the run rests, if it does, and `true` if no plan reaches the open goals from there.
+    /// Returns the start of the idle state, if the run is idle, and `true` if no plan reaches the
+    /// open goals from there.
     pub(super) fn rests_since(&self) -> Option<(&Rational, bool)> {
         let lasting = self.lasting.as_ref()?;
         Some((lasting.rests_since.as_ref()?, lasting.is_unsolvable))
     }
 
-    /// Rests since then; `is_unsolvable` if no plan reaches the open goals from there.
+    /// Sets the start of the idle state. `is_unsolvable` is `true` if no plan reaches the open
+    /// goals from there.
     pub(super) fn rest_since(&mut self, since: Rational, is_unsolvable: bool) {
         if let Some(lasting) = &mut self.lasting {
             lasting.rests_since = Some(since);
@@ -315,7 +322,7 @@ impl<'a> Run<'a> {
         self.pursue_all();
     }
 
-    /// Keeps the rest of the plan, or makes another one.
+    /// Keeps the remaining plan, or makes another one.
     fn turn_to(&mut self, turn: Turn) -> Result<(), Stop> {
         let has_goals = self.lasting.as_ref().is_some_and(|it| !it.goals.is_empty());
         if !has_goals {
@@ -351,7 +358,7 @@ impl<'a> Run<'a> {
         self.replan(&turn.reason)
     }
 
-    /// Turns to goals once more; to those that were given since, if there are any.
+    /// Repeats a change of the goals, merged with later changes.
     pub(super) fn turn_back(&mut self, turn: Turn) {
         let Some(lasting) = &mut self.lasting else {
             return;
@@ -365,7 +372,7 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// A plan for these goals begins.
+    /// Records that a plan for these goals begins.
     pub(super) fn note_plan(&mut self, plan: &TimeTriggeredPlan, goals: &Goals) {
         if let Some(lasting) = &mut self.lasting {
             lasting.plan = Some(plan.clone());
@@ -381,7 +388,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// What goes on is no longer part of a plan.
+    /// Drops the plan. Running actions are no longer part of a plan.
     pub(super) fn drop_plan(&mut self) {
         self.account.begin_plan(&std::collections::BTreeMap::new());
         if let Some(lasting) = &mut self.lasting {
@@ -390,25 +397,26 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Whether the goals have changed otherwise than by new ones; `None` if they have not changed.
+    /// Returns `true` if goals were abandoned or replaced, `false` if they were only added, and
+    /// `None` if they have not changed.
     pub(super) fn has_given_up_goals(&self) -> Option<bool> {
         let turn = self.lasting.as_ref()?.change.as_ref()?;
         Some(!turn.may_keep)
     }
 
-    /// Whether nothing more is to be done.
+    /// Returns `true` if the goal of an attended run was abandoned.
     pub(super) fn is_given_up(&self) -> bool {
         let lasting = self.lasting.as_ref();
         lasting.is_some_and(|lasting| lasting.at_rest == AtRest::GivenUp)
     }
 
-    /// The plan that is executed, on the world's clock, if there is one.
+    /// Returns the present plan, on the world's clock, if there is one.
     pub(super) fn present_plan(&self) -> Option<&TimeTriggeredPlan> {
         self.lasting.as_ref()?.plan.as_ref()
     }
 
-    /// The rest of the plan, begun as soon as it can be from here, if it reaches the goal: what is
-    /// running as it is expected to go on, and what is to come at the distances that were planned.
+    /// Returns the remaining plan, started as soon as possible, if it reaches the goal. Running
+    /// actions end as expected, and the remaining steps keep their planned distances.
     fn kept(&self) -> Option<(TimeTriggeredPlan, Situation, Vec<Ticket>)> {
         let plan = self.lasting.as_ref()?.plan.as_ref()?;
         if self.settings.readies_aside && self.lost.plan {
@@ -434,7 +442,7 @@ impl<'a> Run<'a> {
         Some((rest, situation, running))
     }
 
-    /// Lets time pass without asking the executor.
+    /// Waits without asking the executor.
     pub(super) fn stay(&mut self) {
         let timeout = self.next_timeout();
         let soon = self.lasting.as_ref().and_then(|lasting| {
@@ -450,7 +458,7 @@ impl<'a> Run<'a> {
         self.agenda.push(Todo::Pass(until.max(self.now.clone())));
     }
 
-    /// Whether it is time to look for a plan again.
+    /// Returns `true` if it is time to search for a plan again.
     fn is_rested(&self) -> bool {
         let since = self.lasting.as_ref().and_then(|it| it.rests_since.as_ref());
         since.is_some_and(|since| {
@@ -458,7 +466,7 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Whether the run rests with this verdict, and is not over.
+    /// Returns `true` if the run becomes idle with this verdict, and is not over.
     pub(super) fn goes_on_after(&self, verdict: &Verdict) -> bool {
         self.lasting
             .as_ref()
@@ -473,7 +481,7 @@ impl<'a> Run<'a> {
             }
     }
 
-    /// Waits for a change, after the goals were reached, or because they cannot be.
+    /// Makes the run idle after the goals were reached, or because they cannot be reached.
     pub(super) fn rest(&mut self, verdict: &Verdict) {
         if self.choose_after(verdict) {
             return;
@@ -499,7 +507,7 @@ impl<'a> Run<'a> {
         if is_reached {
             lasting.goals.clear();
         }
-        // With no goals there is nothing that the world could be asked about.
+        // Without goals, there is no verdict.
         let verdict = verdict.filter(|_| !goals.is_empty());
         self.ports.recorder.record(&Entry::Resting {
             now: &self.now,
@@ -509,7 +517,7 @@ impl<'a> Run<'a> {
         });
         if is_reached {
             self.set_goal();
-            // What led to it explains nothing any more.
+            // The earlier history is not needed for explanations any more.
             self.history.clear();
             self.beginning = self.belief.clone();
         }
@@ -522,7 +530,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Who stays paused for long hears of many things again and again.
+/// Removes repeated news of the same fact or value, which accumulate in a long pause.
 fn forget_repetitions(news: &mut Vec<News>) {
     if news.len() < MANY_NEWS {
         return;

@@ -1,22 +1,21 @@
-//! What a lasting run forgets, so that it takes no more memory after a month than after an hour.
+//! Bounds on the memory of an executive, so that it does not grow with the length of the run.
 
 use super::{Run, Verdict};
 
-/// So many starts are known after they have ended: late reports on them are understood, and the
-/// report of the run has them.
+/// Number of ended starts that are kept, for late reports and for the report of the run.
 const MOST_STARTS: usize = 2000;
 
-/// So many events are known when there is no way on: what took a goal out of reach before them has
-/// always been so, for [`Run::dead_end`].
+/// Number of events that are kept for [`Run::dead_end`]. If an earlier event made a goal
+/// unreachable, the explanation says that the goal was never reachable.
 const MOST_EVENTS: usize = 1000;
 
 impl Run<'_> {
-    /// Forgets what is long past, if the run is one that goes on. To be called now and then.
+    /// Forgets the distant past of an executive. To be called now and then.
     pub(super) fn forget_the_past(&mut self) {
         if !self.goes_on_after(&Verdict::GoalReached) {
             return;
         }
-        // Twice as much before anything is done, so that it is seldom done.
+        // Only at twice the limit, so that it rarely happens.
         if self.history.len() >= 2 * MOST_EVENTS {
             let past = self.history.len() - MOST_EVENTS;
             self.beginning = self.believed_after(past);

@@ -1,4 +1,4 @@
-//! Requests for plans and prepared plans, and the continuations of the run at their answers.
+//! Requests for plans and prepared plans, and the continuations of the run when they are answered.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use crate::reason::Reason;
 use crate::record::Entry;
 use crate::request::{Answer, PlanRequest, PrepareRequest, RequestId, Urgency};
 
-/// Continuation of the run at the answer for which it waits.
+/// Continuation of the run when the awaited answer arrives.
 pub(super) enum Pending {
     /// The answer is a plan.
     Plan(Attempt),
@@ -45,14 +45,15 @@ pub(super) struct Preparation {
 pub(super) enum Otherwise {
     /// The run ends.
     End,
-    /// The plan as it was made takes over where that is possible. It was adjusted to the present situation.
+    /// The plan was fitted to the present situation. Instead, the plan takes over as it was made,
+    /// if possible.
     AsMade(Box<Search>, TimeTriggeredPlan),
     /// The plan of this search is outdated.
     SearchAgain(Box<Search>),
-    /// The rest of the present plan was to be kept for other goals, and another plan is made.
+    /// The remaining plan was to be kept for other goals. Another plan is made.
     PlanForOthers(Turn),
-    /// The present plan continues, also if the executor does not prefer the prepared one, which was requested for this
-    /// reason.
+    /// The present plan continues, also if the executor does not prefer the prepared one. The
+    /// prepared plan was requested for this reason.
     Continue(Reason),
 }
 
@@ -63,7 +64,7 @@ impl Run<'_> {
         RequestId(self.requests)
     }
 
-    /// Takes in the answer to a background request.
+    /// Takes the answer to a background request.
     pub fn answer(&mut self, answer: Answer) {
         match answer {
             Answer::Planned(id, planned) => self.planned(id, planned),
@@ -71,9 +72,9 @@ impl Run<'_> {
         }
     }
 
-    /// Takes in the answer to [`Next::Plan`]. Answers to other requests than open ones are ignored.
+    /// Takes the answer to [`Next::Plan`]. Answers to requests that are not open are ignored.
     ///
-    /// An answer that arrives while the run waits in the world is recorded with the end of the wait
+    /// An answer that arrives while the run waits in the world is recorded at the end of the wait
     /// ([`Event::PlanMade`]), at the present time; the driver can end the wait early.
     pub fn planned(&mut self, id: RequestId, planned: Planned) {
         if let Some(Next::Plan(request)) = &self.asked
@@ -93,9 +94,9 @@ impl Run<'_> {
         }
     }
 
-    /// Takes in the answer to [`Next::Prepare`]. Answers to other requests than open ones are ignored.
+    /// Takes the answer to [`Next::Prepare`]. Answers to requests that are not open are ignored.
     ///
-    /// An answer that arrives while the run waits in the world is recorded with the end of the wait
+    /// An answer that arrives while the run waits in the world is recorded at the end of the wait
     /// ([`Event::PlanReady`]), at the present time; the driver can end the wait early.
     pub fn prepared(&mut self, id: RequestId, prepared: Result<Mission, PrepareError>) {
         if let Some(Next::Prepare(request)) = &self.asked
@@ -116,7 +117,7 @@ impl Run<'_> {
         }
     }
 
-    /// Returns the arrivals of answers during the wait that ends at `now`.
+    /// Returns the answers that arrived during the wait that ends at `now`, as observations.
     pub(super) fn arrivals(&self, now: &Rational) -> Vec<Observation> {
         let (is_made, is_ready) = self.search.as_ref().map_or((false, false), Search::arrived);
         let made = is_made.then_some(Event::PlanMade);
@@ -204,7 +205,8 @@ impl Run<'_> {
         }
     }
 
-    /// Requests a prepared plan for these goals, which the task has, and begins with it when it is there.
+    /// Requests a prepared plan for these goals, which belong to the task, and begins with it when
+    /// it arrives.
     pub(super) fn await_preparation(
         &mut self,
         task: &Arc<Task>,

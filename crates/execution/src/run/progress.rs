@@ -1,43 +1,43 @@
-//! Whether the world's clock comes forward.
+//! Detection of a world whose clock does not advance.
 
 use elbowroom_num::Rational;
 
-/// So many answers of the world in one second of its time are too many, unless the plan has so
-/// many steps that they may all be about them.
+/// Maximum number of answers of the world within one second of its clock. Plans with very many
+/// steps permit more.
 const MOST_ANSWERS: usize = 10_000;
 
-/// How many answers each step of a plan may bring within a second: its start and its end, each of
-/// them once more, and some facts.
+/// Number of answers that each step of a plan may cause within a second: its start and its end,
+/// each of them repeated once, and some facts.
 const ANSWERS_PER_STEP: usize = 10;
 
-/// Counts the answers in which the clock has not come forward by a second.
+/// Counter of the answers since the clock last advanced by a second.
 ///
-/// Reports reset nothing: a world may report for ever without time passing. So the number of
-/// answers in a run is bounded, whatever the world says: by [`MOST_ANSWERS`] for each plan, and for
-/// each second until [`RunSettings::time_limit`](super::RunSettings::time_limit).
+/// Reports do not reset it, because a world may report forever without time passing. So the number
+/// of answers in a run is bounded: by [`MOST_ANSWERS`] for each plan, and for each second until
+/// [`RunSettings::time_limit`](super::RunSettings::time_limit).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Progress {
-    /// From when the answers are counted.
+    /// Time from when the answers are counted.
     since: Rational,
     answers: usize,
-    /// The last message since then that could not be understood, and why.
+    /// The last message since then that could not be read, with the reason.
     unintelligible: Option<(String, String)>,
 }
 
 impl Progress {
-    /// A new plan is taken up: what was tried again and again in the last one does not count
-    /// against it. How many plans there are is bounded by itself.
+    /// Resets the counter for a new plan: repeated attempts of the last plan do not count. The
+    /// number of plans has its own limit.
     pub(super) fn begin_plan(&mut self) {
         self.answers = 0;
         self.unintelligible = None;
     }
 
-    /// From when the answers are counted, and how many there were.
+    /// Returns the time from when the answers are counted, and their number.
     pub(super) fn counted(&self) -> (Rational, usize) {
         (self.since.clone(), self.answers)
     }
 
-    /// Goes on from what was [counted](Progress::counted).
+    /// Restores the state that [`Progress::counted`] returned.
     pub(super) fn go_on_counting(&mut self, since: Rational, answers: usize) {
         *self = Self {
             since,
@@ -46,16 +46,15 @@ impl Progress {
         };
     }
 
-    /// Takes note of a message that could not be understood: it may be what the world meant to say
-    /// instead of nothing.
+    /// Records a message that could not be read. It may explain why the clock stands still.
     pub(super) fn note_unintelligible(&mut self, said: &str, why: &str) {
         self.unintelligible = Some((said.to_owned(), why.to_owned()));
     }
 
-    /// Takes note of an answer at `now`; `steps` is how many the present plan has.
+    /// Counts an answer at `now`. `steps` is the number of steps of the present plan.
     ///
     /// # Errors
-    /// In words, when the clock stands still.
+    /// If the clock does not advance, in words.
     pub(super) fn note(&mut self, now: &Rational, steps: usize) -> Result<(), String> {
         if *now >= &self.since + Rational::ONE {
             self.since.clone_from(now);
@@ -87,7 +86,7 @@ mod tests {
     use super::{MOST_ANSWERS, Progress};
     use elbowroom_num::Rational;
 
-    /// The number of answers that are taken when the nth has the time `clock(n)`.
+    /// Returns the number of accepted answers if the nth has the time `clock(n)`.
     fn taken(most: i64, steps: usize, clock: impl Fn(i64) -> Rational) -> i64 {
         let mut progress = Progress::default();
         let mut taken = 0..most;

@@ -1,10 +1,10 @@
-//! Actions that the world refuses again and again: patience, where plans are made beside the run.
+//! Growing waits after repeated refusals of an action, with background planning.
 //!
-//! The same situation leads to the same plan, and that to the same refusal. When nothing else has
-//! happened in between, only time can help: the plan after the second refusal of an action in a row is
-//! asked for a tenth of a second later, and after each further one twice as much later. So a world that
-//! refuses something for a moment costs a few plans, and the number of new plans that may be made is not used up
-//! before anybody could have done anything about it.
+//! The same situation leads to the same plan, and that to the same refusal. If no other event has
+//! happened in between, only time can help. So the plan after the second refusal of an action in a
+//! row is requested 0.1 s later, and the delay doubles with each further refusal. A temporary
+//! refusal then costs only a few plans, and the limit on new plans is not used up before the cause
+//! can be removed.
 
 use std::collections::BTreeMap;
 
@@ -14,20 +14,20 @@ use super::Run;
 use super::agenda::Todo;
 use crate::reason::Reason;
 
-/// How often the wait is doubled at most: to 51 seconds.
+/// Maximum number of doublings of the wait: to 51 s.
 const MOST_DOUBLINGS: u32 = 9;
 
-/// What was refused since anything else has happened.
+/// Refusals since the last other event.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Refusals {
-    /// By the action's name: how often.
+    /// Number of refusals, by the action's name.
     pub times: BTreeMap<String, u32>,
-    /// Until when no plan is asked for.
+    /// Time until when no plan is requested.
     pub until: Rational,
 }
 
 impl Refusals {
-    /// An action has ended without having started.
+    /// Records that an action has ended without having started.
     pub(super) fn note(&mut self, action: &str, now: &Rational) {
         let times = self.times.entry(action.to_owned()).or_default();
         *times += 1;
@@ -38,7 +38,7 @@ impl Refusals {
         self.until = (now + wait).max(self.until.clone());
     }
 
-    /// Something else has happened, or other goals are pursued.
+    /// Forgets the refusals after another event, or when other goals are pursued.
     pub(super) fn forget(&mut self) {
         if !self.times.is_empty() {
             *self = Self::default();
@@ -47,8 +47,8 @@ impl Refusals {
 }
 
 impl Run<'_> {
-    /// Lets time pass before a plan is asked for, if what was refused would only be refused again; whether
-    /// it does.
+    /// Waits before a plan is requested, if the same action would only be refused again. Returns
+    /// `true` if it waits.
     pub(super) fn has_patience(&mut self, reason: &Reason) -> bool {
         let until = self.refusals.until.clone();
         if !self.settings.plans_aside || self.now >= until || self.is_to_turn() {

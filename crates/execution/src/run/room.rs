@@ -1,4 +1,4 @@
-//! How much longer what is under way may take, and what is done when that is used up.
+//! Slack of running actions: warnings before it is used up.
 
 use elbowroom_num::Rational;
 
@@ -7,25 +7,25 @@ use crate::event::Ticket;
 use crate::executor::{CAN_HAVE_A_CLOCK, StepId};
 use crate::record::{Entry, WarningCause};
 
-/// What is under way and late, and until when the plan can bear it.
+/// A running action that may become late, with its latest tolerable end.
 struct Late {
     ticket: Ticket,
     step: StepId,
     action: String,
-    /// The end of its window at present.
+    /// The end of its present window.
     window: Rational,
-    /// Whether it has been looked into whether the plan can bear more than that.
+    /// `true` if it was computed whether the plan tolerates a later end.
     is_known: bool,
-    /// When to warn of it.
+    /// The time of the warning.
     warn: Rational,
-    /// From then on a new plan is needed.
+    /// The latest tolerable end, after which a new plan is needed.
     until: Rational,
 }
 
 impl Run<'_> {
-    /// Warns of what has used its room: when a quarter of the time is left between its planned end and
-    /// the last moment that the plan can bear, or twice as long as planning is expected to take, if
-    /// that is longer. Returns when to look again.
+    /// Warns of actions that are about to use up their slack. The warning comes when a quarter of
+    /// the time between the planned end and the latest tolerable end is left, or twice the expected
+    /// planning time if that is longer. Returns the time of the next check.
     pub(super) fn warn(&mut self) -> Option<Rational> {
         if !CAN_HAVE_A_CLOCK || !self.settings.watches_room {
             return None;
@@ -58,8 +58,8 @@ impl Run<'_> {
         again.into_iter().min()
     }
 
-    /// The same with the last moment that the plan can bear, which may be later than what dispatching reckons with at
-    /// present; `None` if it has been warned of.
+    /// Returns the same with the latest tolerable end, which may be later than the end of the
+    /// present window. `None` if there was a warning of it.
     fn looked_into(&mut self, late: Late) -> Option<Late> {
         if late.is_known {
             return Some(late);
@@ -70,13 +70,14 @@ impl Run<'_> {
         self.late_at(late.ticket)
     }
 
-    /// The time between the moment from which on a new plan is needed and its beginning, if it is
-    /// made ahead.
+    /// Returns the time that is reserved between the need for a new plan and its start, if it is
+    /// made in advance.
     pub(super) fn margin(&self) -> Rational {
         self.allowance.clone().max(Rational::new(1, 4))
     }
 
-    /// What may come to use its room, and was not warned of.
+    /// Returns the actions that may use up their slack, without those for which there was a
+    /// warning.
     fn late(&self) -> impl Iterator<Item = Late> + '_ {
         let open = self.account.open_tickets();
         open.filter_map(|ticket| self.late_at(ticket))
@@ -107,14 +108,15 @@ impl Run<'_> {
         })
     }
 
-    /// Returns the overdue actions: those that run for longer than planned and have not been cancelled.
+    /// Returns the overdue actions: those that have run for longer than planned and have not been
+    /// cancelled.
     pub(super) fn overdue(&self) -> Vec<Ticket> {
         let mut overdue = self.longer_than_planned();
         overdue.retain(|ticket| !self.account.is_cancelled(*ticket));
         overdue
     }
 
-    /// Returns the actions that run for longer than planned.
+    /// Returns the actions that have run for longer than planned.
     pub(super) fn longer_than_planned(&self) -> Vec<Ticket> {
         let running = self.belief.running().iter();
         let overdue =

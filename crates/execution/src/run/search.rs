@@ -1,4 +1,4 @@
-//! Plans that are made beside the run: what goes on meanwhile, and how they take over.
+//! Background planning: execution during a search, and the switch to the new plan.
 
 mod fit;
 mod ready;
@@ -33,67 +33,70 @@ use crate::record::Entry;
 use crate::request::{RequestId, Urgency};
 use ready::Readying;
 
-/// So many searches in a row are ended at once because goals were abandoned. The next one is let go on
-/// for a while ([`Run::end_of_patience`]): somebody who keeps changing goals does not keep the run from
-/// acting.
+/// Number of searches in a row that end at once when goals are abandoned. The next one continues
+/// for a limited time ([`Run::end_of_patience`]), so that frequent changes of goals do not block
+/// the run.
 const MOST_ENDED: usize = 3;
 
-/// For so many seconds of the world's time a search for goals that were abandoned may go on after that,
-/// or for twice as long as planning is expected to take; and for twice as long again each time that this
-/// is over before there is a plan.
+/// Minimum time for which a search may continue although its goals were abandoned, in seconds of
+/// the world's clock. The time is at least twice the expected planning time. It doubles each time
+/// that it passes before there is a plan.
 const PATIENCE: i64 = 5;
 
-/// So many times at most it becomes twice as long.
+/// Maximum number of doublings of that time.
 const MOST_DOUBLINGS: u32 = 20;
 
-/// For so many seconds of the world's time, at most, a plan that is there waits for the world to say
-/// what was told to start has started.
+/// Maximum time for which a finished plan waits for the reports that commanded actions have
+/// started, in seconds of the world's clock.
 const WORD: i64 = 1;
 
-/// A plan in the making, or one that waits to take over.
+/// Background search for a plan, until the plan takes over.
 pub(super) struct Search {
     /// The request for the plan.
     request: RequestId,
-    /// The answer, until it is taken in.
+    /// The answer, until it is processed.
     answer: Option<Planned>,
     pub(super) reason: Reason,
     guess: Guess,
-    /// With the goals that it is made for.
+    /// The task, with the goals of the plan.
     task: Arc<Task>,
     /// These goals, as they were given.
     goals: Goals,
-    /// Where it begins.
+    /// The initial situation of the plan.
     situation: Situation,
-    /// What is under way there. Tickets that were not given out when it was begun are those of
-    /// what the present plan is expected to start.
+    /// The actions running there. Tickets that were not issued when the search began are those of
+    /// expected starts of the present plan.
     running: Vec<Ticket>,
-    /// What the present plan is expected to start until then.
+    /// The expected starts of the present plan until then.
     expected: Vec<Expected>,
     begun: Rational,
-    /// Since when its situation is expected: before it was begun where it was foreseen.
+    /// The time of the forecast of its situation, which is before the start of the search if the
+    /// situation was foreseen.
     since: Rational,
-    /// Whether its situation was foreseen, and things stood otherwise by a little when it was begun.
+    /// `true` if the situation was foreseen, and the real one differed slightly when the search
+    /// began.
     is_guess: bool,
     course: Goes,
-    /// The number of timed initials after which the goal was last known not to be out of reach.
+    /// Number of timed initials after which the goal was last not known to be unreachable.
     timed: usize,
     is_made: bool,
-    /// Whether something has happened since that nobody expected.
+    /// `true` if an unexpected event has happened since.
     is_overtaken: bool,
-    /// The plan, and since when it is there.
+    /// The finished plan, and the time at which it was finished.
     plan: Option<(TimeTriggeredPlan, Rational)>,
-    /// The plan as it is made ready.
+    /// The preparation of the plan.
     readying: Option<Readying>,
-    /// How often that was begun.
+    /// Number of preparations so far.
     tries: usize,
-    /// Steps of the plan before that were started, once that plan is let go of.
+    /// The started steps of the earlier plan, once that plan was abandoned.
     left_behind: BTreeMap<StepId, Ticket>,
-    /// Which change of the goals the plan is kept for, if none was looked for.
+    /// The change of the goals for which the plan is kept, if no other plan is searched for.
     kept_for: Option<Turn>,
 }
 
 impl Search {
-    /// Takes the answer to the request for the plan. If the run waits in the world, the end of the wait notes it.
+    /// Takes the answer to the request for the plan. If the run waits in the world, the answer is
+    /// recorded at the end of the wait.
     pub(super) fn take_answer(&mut self, id: RequestId, planned: Planned, is_waiting: bool) {
         if id == self.request && self.answer.is_none() && !self.is_made {
             self.answer = Some(planned);
@@ -101,12 +104,13 @@ impl Search {
         }
     }
 
-    /// Returns whether the present plan continues unless the new one is better.
+    /// Returns `true` if the present plan continues unless the new one is better.
     pub(super) fn is_optional(&self) -> bool {
         self.reason.cause == Cause::MoreSlack
     }
 
-    /// Returns whether answers have arrived that are not noted yet: a plan, and a prepared plan.
+    /// Returns `true` for each answer that has arrived and is not recorded yet: a plan, and a
+    /// prepared plan.
     pub(super) fn arrived(&self) -> (bool, bool) {
         let is_made = self.answer.is_some() && !self.is_made;
         (
@@ -124,51 +128,51 @@ impl Search {
     }
 }
 
-/// What goes on during a search.
+/// Execution during a search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Goes {
-    /// The present plan, until then if there is an end.
+    /// The present plan continues, until then if there is a limit.
     Plan { until: Option<Rational> },
-    /// What is under way.
+    /// Only the running actions continue.
     UnderWay,
 }
 
-/// What became of earlier searches and of the present plan, since one was taken up.
+/// Results of earlier searches, and state of the present plan, since a plan was last adopted.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lost {
-    /// Whether the present plan works no more.
+    /// `true` if the present plan is infeasible.
     pub(super) plan: bool,
-    /// The doubts that the world has been asked about.
+    /// The last question to the world about doubts.
     pub(super) inquiry: Inquiry,
     /// The plan that the executor abandoned, until another one is adopted.
     pub(super) abandoned: Option<Abandoned>,
-    /// The time at which no plan was found and the executor carried on, and the verdict without it; `None` once
-    /// something has happened since.
+    /// The time at which no plan was found and the executor carried on, and the verdict otherwise;
+    /// `None` after the next event.
     pub(super) in_vain: Option<(Rational, Verdict)>,
     /// `true` if a search for a better plan has used up its budget. No other one begins until there is a new plan.
     pub(super) sought_in_vain: bool,
     /// `true` if goals were closed during the last search.
     pub(super) has_closed_goals: bool,
-    /// How many plans in a row were outdated when they came.
+    /// Number of plans in a row that were outdated when they were finished.
     outdated: usize,
-    /// How many searches in a row were ended because goals were abandoned.
+    /// Number of searches in a row that ended because goals were abandoned.
     ended: usize,
-    /// How many of these had been let go on for a while.
+    /// Number of these that had continued for a limited time.
     ended_late: u32,
-    /// How many times in a row the plan was to be kept for other goals, and was outdated when it was
-    /// ready.
+    /// Number of times in a row that the plan was to be kept for other goals, and was outdated when
+    /// it was prepared.
     kept: usize,
 }
 
 impl Run<'_> {
-    /// Whether plans are made beside the run, from now on.
+    /// Returns `true` if plans are made in the background from now on.
     pub(super) fn plans_aside(&self) -> bool {
         let has_begun = self.now.is_positive() || self.account.started() > 0;
         let is_waited_for = !has_begun && !self.goes_on_after(&Verdict::GoalReached);
         CAN_HAVE_A_CLOCK && self.settings.plans_aside && !is_waited_for
     }
 
-    /// The planner says that it is done.
+    /// Records that the planner has finished.
     pub(super) fn note_plan_made(&mut self) -> Remark {
         match &mut self.search {
             Some(search) if !search.is_made && search.answer.is_some() => {
@@ -179,8 +183,8 @@ impl Run<'_> {
         }
     }
 
-    /// What is believed, with the goals that the present plan is for: until another plan takes over, it
-    /// need not reach the goals that were given since. `None` where these are the same.
+    /// Returns the belief with the goals of the present plan, which need not reach the goals that
+    /// were given since. `None` if the goals are the same.
     pub(super) fn belief_of_the_plan(&self) -> Option<Progression> {
         let (_, task) = (self.search.as_ref()?, self.plan_task.as_ref()?);
         let mut belief = self.belief.clone();
@@ -188,7 +192,7 @@ impl Run<'_> {
         Some(belief)
     }
 
-    /// Something has happened that nobody expected.
+    /// Records that an unexpected event has happened.
     pub(super) fn note_surprise(&mut self) {
         if let Some(search) = &mut self.search {
             search.is_overtaken = true;
@@ -196,7 +200,7 @@ impl Run<'_> {
         self.note_disagreement();
     }
 
-    /// A plan is needed, and there is none that could go on.
+    /// Begins a search when a plan is needed and the present one cannot continue.
     pub(super) fn search_from_here(&mut self, reason: &Reason) {
         self.let_go_of_plan();
         self.news.clear();
@@ -205,14 +209,14 @@ impl Run<'_> {
         }
     }
 
-    /// Another plan is needed, because the goals have changed, and the present one goes on until it
-    /// is there; whether that can be.
+    /// Begins a search because the goals have changed, while the present plan continues. Returns
+    /// `false` if the plan cannot continue.
     pub(super) fn search_while_the_plan_goes_on(&mut self, reason: &Reason) -> Result<bool, Stop> {
         let goes_on = self.plans_aside()
             && self.settings.running == super::RunningRule::Keep
             && !self.lost.plan
             && self.present_plan().is_some()
-            // Others number what they start as they like.
+            // These executors choose their own step numbers.
             && self.ports.executor.need() != Need::PartialOrder
             && self.needs_no_plan().is_none_or(|it| it == Outlook::Unmet);
         if !goes_on {
@@ -227,7 +231,7 @@ impl Run<'_> {
         Ok(true)
     }
 
-    /// One more new plan is made.
+    /// Counts a new plan. Fails if the limit is reached.
     pub(super) fn count_replan(&mut self, reason: &Reason) -> Result<(), Stop> {
         self.reasons.push(reason.clone());
         self.replans += 1;
@@ -238,7 +242,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Begins to look for a plan.
+    /// Begins a search for a plan.
     fn search(&mut self, reason: Reason, guess: Guess, course: Goes) {
         let foreseen = match &course {
             Goes::Plan { .. } => None,
@@ -298,7 +302,7 @@ impl Run<'_> {
         self.search(reason, Guess::AQuarterLonger, course);
     }
 
-    /// Ends a search without which the present plan continues.
+    /// Ends the search if it is optional, that is, if the present plan continues without it.
     pub(super) fn give_up_optional_search(&mut self) {
         if self.search.as_ref().is_some_and(Search::is_optional) {
             self.give_up_search();
@@ -315,9 +319,9 @@ impl Run<'_> {
         }
     }
 
-    /// What the present plan would start is not started any more.
+    /// Abandons the present plan: none of its remaining steps is started.
     pub(super) fn let_go_of_plan(&mut self) {
-        // It was for a better plan than this one.
+        // It searched for a better plan than this one.
         self.give_up_optional_search();
         self.lost.plan = true;
         self.keep_foreseen();
@@ -330,7 +334,7 @@ impl Run<'_> {
         self.forget_steps();
     }
 
-    /// When something about a search is to be decided, whatever happens.
+    /// Returns the time of the next decision about the search if no event comes before.
     pub(super) fn next_of_search(&self) -> Option<Rational> {
         let search = self.search.as_ref().filter(|_| CAN_HAVE_A_CLOCK)?;
         let next = self.next_whatever_is_asked(search);
@@ -370,10 +374,10 @@ impl Run<'_> {
         }
     }
 
-    /// Until when a search goes on though goals that it is for were abandoned.
+    /// Returns the time until which a search continues although its goals were abandoned.
     ///
-    /// It may be one that never ends, so that this has to be bounded; and if plans take longer than that,
-    /// one must be let come some time, though goals change all the while. So it becomes longer each time.
+    /// It is bounded because a search may never end. It grows with each such search, so that a plan
+    /// can be finished even if the goals change all the time.
     fn end_of_patience(&self, search: &Search) -> Rational {
         let expected = &self.allowance * &Rational::from(2);
         let patience = expected.max(Rational::from(PATIENCE));
@@ -381,7 +385,8 @@ impl Run<'_> {
         &search.begun + patience * Rational::from(1_i64 << doublings)
     }
 
-    /// Sees to a search, if there is one; whether the executor is not to be asked because of it.
+    /// Continues the search, if there is one. Returns `true` if the executor is not to be asked
+    /// because of it.
     pub(super) fn tend_search(&mut self) -> Result<bool, Stop> {
         if self.is_to_turn() {
             self.give_up_optional_search();
@@ -431,8 +436,8 @@ impl Run<'_> {
         Ok(self.waits_for_plan())
     }
 
-    /// Restarts a search that is in vain, because deadlines have passed since it began. From here, that is known at
-    /// once, with a certificate.
+    /// Restarts a search that has become futile because deadlines have passed since it began. From
+    /// the present situation, that is proved at once, with a certificate.
     fn restart_if_out_of_reach(&mut self) {
         let timed = self.belief.timed_past();
         let Some(search) = self.search.as_mut().filter(|it| it.timed < timed) else {
@@ -446,7 +451,7 @@ impl Run<'_> {
         }
     }
 
-    /// Lets time pass, if nothing goes on but what is under way.
+    /// Waits for the plan if only running actions continue. Returns `true` if it does.
     fn waits_for_plan(&mut self) -> bool {
         let search = self.search.as_ref();
         let waits = search.is_some_and(|search| search.course == Goes::UnderWay);
@@ -456,7 +461,7 @@ impl Run<'_> {
         waits
     }
 
-    /// Lets time pass, until something about the search is to be decided.
+    /// Waits until the next decision about the search.
     fn wait_for_search(&mut self) {
         let timeout = self.next_timeout().into_iter();
         let until = timeout.chain(self.next_of_search()).min();
@@ -465,7 +470,7 @@ impl Run<'_> {
         self.agenda.push(Todo::Pass(until.max(self.now.clone())));
     }
 
-    /// Takes in the planner's answer.
+    /// Processes the planner's answer.
     fn collect(&mut self) -> Result<(), Stop> {
         let Some(mut search) = self.search.take() else {
             return Ok(());
@@ -512,17 +517,17 @@ impl Run<'_> {
                 self.note_no_better_plan(&answer);
                 Ok(())
             }
-            // Another plan is needed anyway.
+            // Another plan is needed in any case.
             _ if self.is_to_turn() => {
                 if search.course == Goes::UnderWay {
                     self.choose_after_more_goals();
                 }
                 Ok(())
             }
-            // There was none from there; from here, there may be.
+            // There was no plan from that situation, but there may be one from the present one.
             _ if search.is_overtaken => self.search_again(&search.reason),
             _ if search.course != Goes::UnderWay && self.leave_out_new_goals() => Ok(()),
-            // What the present plan leads to was only expected.
+            // The situation was only a forecast.
             _ if search.is_guess
                 || !search.expected.is_empty()
                 || search.course != Goes::UnderWay =>
@@ -534,7 +539,7 @@ impl Run<'_> {
         }
     }
 
-    /// There is no plan from where nothing more is started.
+    /// Continues if there is no plan from a situation in which nothing more is started.
     fn without_plan(&mut self, search: &Search, answer: &PlanAnswer) -> Result<(), Stop> {
         let reason = search.reason.clone();
         match self.next_attempt(search.guess) {
@@ -547,7 +552,8 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// The plan that was made is outdated. Another one is searched for, unless the present plan continues.
+    /// Searches for another plan because the finished one is outdated, unless the present plan
+    /// continues.
     pub(super) fn search_again(&mut self, first: &Reason) -> Result<(), Stop> {
         if first.cause == Cause::MoreSlack {
             return Ok(());
@@ -563,7 +569,7 @@ impl Run<'_> {
             self.lost.plan = true;
             return Ok(());
         }
-        // It will take about as long again.
+        // The search is expected to take about as long again.
         let ahead = &self.allowance * &Rational::new(3, 2);
         let until = Some(&self.now + ahead + self.task.epsilon());
         self.search(reason.clone(), Guess::AQuarterLonger, Goes::Plan { until });

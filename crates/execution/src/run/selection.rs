@@ -1,16 +1,19 @@
-//! Selection of the goals to pursue if there is no plan for all of them (oversubscription planning).
+//! Selection of the goals to pursue if there is no plan for all of them (oversubscription
+//! planning).
 //!
-//! The only source of knowledge is the planner: whether it finds a plan for a set of goals. Up to [`MOST_EXACT`] goals,
-//! the sets are tried in order of value, the sum of the values of their goals, and sets of equal value in order of size and
-//! preference. So the first set with a plan is one of the greatest value. A set that contains a set without a plan is not tried.
-//! With more goals, the selection grows: by one goal first, after each success by twice as many as before, after each failure by half as many. It is maximal in the
-//! end, and each plan on the way there is executed at once.
+//! The only source of information is the planner: does it find a plan for a set of goals? With up
+//! to [`MOST_EXACT`] goals, the sets are tried in order of their value, which is the sum of the
+//! values of their goals; sets of equal value are tried in order of size and preference. So the
+//! first set with a plan has the greatest value. A superset of a set without a plan is not tried.
+//! With more goals, the selection grows: first by one goal, after each success by twice as many as
+//! before, and after each failure by half as many. In the end it is maximal, and each plan on the
+//! way is executed at once.
 
 use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
 
-/// The greatest number of goals for which a set of the greatest value is selected.
+/// Maximum number of goals for an exact selection, which has the greatest value.
 const MOST_EXACT: usize = 5;
 
 /// The goals, by position in the order of preference.
@@ -28,14 +31,14 @@ pub(super) enum Selection {
     Growth(Growth),
 }
 
-/// A selection that grows.
+/// A growing selection.
 #[derive(Clone, Debug)]
 pub(super) struct Growth {
-    /// The selected goals: there is a plan for these.
+    /// The selected goals, for which there is a plan.
     selected: Set,
     /// The goals that have not been tried, the next one last.
     rest: Vec<usize>,
-    /// The goals that are tried together with the selected ones.
+    /// The goals being tried together with the selected ones.
     tried: Vec<usize>,
 }
 
@@ -66,7 +69,7 @@ impl Selection {
         Self::Growth(growth)
     }
 
-    /// Notes that there is no plan for this set, which may not have been tried.
+    /// Records that there is no plan for this set, which may not have been tried.
     pub(super) fn exclude(&mut self, set: Set) {
         if let Self::Exact { failed, .. } = self {
             failed.push(set);
@@ -81,7 +84,7 @@ impl Selection {
         }
     }
 
-    /// Returns `true` if no set with this goal was tried since the selected ones became more.
+    /// Returns `true` if no set with this goal was tried since the selection last grew.
     pub(super) fn is_untried(&self, goal: usize) -> bool {
         match self {
             Self::Exact { .. } => false,
@@ -136,7 +139,7 @@ impl Growth {
         }
     }
 
-    /// The next goals to try.
+    /// Takes the next goals to try.
     fn take(&mut self, count: usize) {
         let left = self.rest.len().saturating_sub(count);
         self.tried = self.rest.split_off(left);
@@ -151,7 +154,7 @@ impl Growth {
     }
 }
 
-/// All sets of goals with these values, the first ones to be tried first.
+/// Returns all sets of goals with these values, in the order of trial.
 fn sets(values: &[Rational]) -> Vec<Set> {
     let all = 1_u32..1 << values.len();
     let set = |bits: u32| -> Vec<usize> {
@@ -188,7 +191,8 @@ mod tests {
         vec![Rational::ONE; count]
     }
 
-    /// Runs a selection among goals of these values to its end. Returns the selected set and the number of questions.
+    /// Runs a selection among goals of these values to its end. Returns the selected set and the
+    /// number of queries.
     fn select(values: &[Rational], has_plan: impl Fn(&Set) -> bool) -> (Set, usize) {
         let all: Set = (0..values.len()).collect();
         let mut selection = Selection::among(values.to_vec());
@@ -207,7 +211,7 @@ mod tests {
         set.iter().map(|it| &values[*it]).sum()
     }
 
-    /// The greatest value of a set without a conflict: all sets are tried.
+    /// Returns the greatest value of a set without a conflict, by trying all sets.
     fn greatest(values: &[Rational], conflicts: &[Set]) -> Rational {
         let count = values.len();
         let sets = (0_u32..1 << count)
@@ -267,7 +271,7 @@ mod tests {
             Step::Try(set) => set,
             Step::Select(set) => panic!("{set:?} is selected"),
         };
-        // A failure is announced before anything was asked: the goals are pursued already.
+        // The selection begins with a failure, because all goals are already pursued.
         let set = tried(selection.after_failure((0..4).collect()));
         assert_eq!(set, [0, 1, 2].into());
         let set = tried(selection.after_failure(set));

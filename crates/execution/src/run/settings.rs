@@ -1,4 +1,4 @@
-//! How to run, and how a run ended.
+//! Settings and results of runs.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,32 +15,32 @@ use crate::reason::Reason;
 pub struct RunSettings {
     /// The treatment of running actions when a new plan is made.
     pub running: RunningRule,
-    /// The planning time, as it passes in the world.
+    /// The planning time in the world.
     pub planning_time: PlanningTime,
-    /// How often a new plan may be made.
+    /// Maximum number of new plans.
     pub most_replans: usize,
     /// The rule that sets the time-out of each action.
     pub timeout: TimeoutRule,
-    /// Whether the room of what is under way is watched. Then there is a warning before a late
-    /// action makes a new plan necessary ([`Entry::Warning`](crate::Entry::Warning)), and an action
-    /// that no plan can bear any longer has failed: it is cancelled, and the next plan does without.
-    /// Otherwise, that no plan can bear it is the end of the run.
+    /// `true` if the slack of running actions is monitored. Then there is a warning before a late
+    /// action makes a new plan necessary ([`Entry::Warning`](crate::Entry::Warning)). An action
+    /// whose delay no plan tolerates any more is cancelled and counts as failed, and the next plan
+    /// does without it. If `false`, such a delay ends the run.
     pub watches_room: bool,
-    /// Whether plans are made beside the run ([`Planner::begin`](crate::Planner::begin)), while it
-    /// goes on: [`Run`](super::Run) has the rules. The first plan of a run that ends with its goal is
-    /// waited for.
+    /// `true` if plans are made in the background ([`Planner::begin`](crate::Planner::begin)),
+    /// while the run continues; [`Run`](super::Run) has the rules. The first plan of a run is
+    /// awaited, unless the run is an executive.
     pub plans_aside: bool,
-    /// Whether such plans are made ready beside the run, too
-    /// ([`Preparer::begin`](crate::Preparer::begin)). Then a plan takes over as soon as it is ready,
-    /// and what the present one begins until then is part of it.
+    /// `true` if such plans are also prepared in the background
+    /// ([`Preparer::begin`](crate::Preparer::begin)). Then a plan takes over as soon as it is
+    /// prepared, and actions that the present plan starts until then are part of it.
     pub readies_aside: bool,
-    /// The time limit of the run, by the world's clock.
+    /// The time limit of the run, on the world's clock.
     pub time_limit: Rational,
 }
 
 impl Default for RunSettings {
-    /// Running actions go on; planning takes as long as it takes; at most 10
-    /// new plans, as in paper 1's experiments; a million seconds.
+    /// Running actions continue, planning time is measured, at most 10 new plans as in paper 1's
+    /// experiments, and a time limit of a million seconds.
     fn default() -> Self {
         Self {
             running: RunningRule::Keep,
@@ -58,15 +58,15 @@ impl Default for RunSettings {
 /// The treatment of running actions when a new plan is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunningRule {
-    /// They are cancelled, and the plan begins when they have stopped. What `ROSPlan` does.
+    /// They are cancelled, and the plan begins when they have stopped, as in `ROSPlan`.
     Cancel,
     /// They are awaited, and the plan begins when they have ended.
     Await,
-    /// They go on, and the plan goes on with them: it takes them to last as long as they were
-    /// planned to, or, if they are overdue, a quarter longer than so far. Those whose over-all
-    /// condition has failed are cancelled: no plan can go on with them. So are, where their room is
-    /// watched ([`RunSettings::watches_room`]), overdue ones with which no plan is found, even if
-    /// they end at once.
+    /// They continue, and are part of the plan. They are assumed to take as long as planned or, if
+    /// they are overdue, a quarter longer than so far. Actions whose over-all condition has failed
+    /// are cancelled, because no plan can continue with them. If slack is monitored
+    /// ([`RunSettings::watches_room`]), overdue actions are also cancelled if no plan is found even
+    /// for the case that they end at once.
     #[default]
     Keep,
 }
@@ -99,17 +99,17 @@ impl FromStr for RunningRule {
     }
 }
 
-/// The planning time, as it passes in the world.
+/// The planning time in the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PlanningTime {
-    /// As long as the planner says it took.
+    /// The planning time that the planner reports.
     Measured,
     /// A fixed number of seconds.
     Seconds(Rational),
 }
 
 impl PlanningTime {
-    /// How [`Self::Measured`] is written.
+    /// Text of [`Self::Measured`].
     const MEASURED: &str = "measured";
 }
 
@@ -125,7 +125,7 @@ impl fmt::Display for PlanningTime {
 impl FromStr for PlanningTime {
     type Err = UnknownSetting;
 
-    /// `measured`, or a number of seconds that is not negative.
+    /// Parses `measured`, or a non-negative number of seconds.
     fn from_str(text: &str) -> Result<Self, UnknownSetting> {
         if text == Self::MEASURED {
             return Ok(Self::Measured);
@@ -140,13 +140,13 @@ impl FromStr for PlanningTime {
     }
 }
 
-/// A text that is no value of a setting.
+/// Error: a text is not a value of a setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{text}` is not {expected}")]
 pub struct UnknownSetting {
     /// The text as written.
     pub text: String,
-    /// The form that is expected.
+    /// The expected form.
     pub expected: &'static str,
 }
 
@@ -155,26 +155,26 @@ pub struct UnknownSetting {
 pub enum Verdict {
     /// The goal is reached.
     GoalReached,
-    /// No plan reaches the goal from where the run ended, with a certificate
+    /// No plan reaches the goal from the end of the run, with a certificate
     /// ([`PlanAnswer::Unsolvable`](crate::PlanAnswer::Unsolvable)).
     Unsolvable,
-    /// There may be a plan, but there is none to go on with.
+    /// There may be a plan, but none was found or can be executed.
     NoPlan {
         /// The reason.
         why: String,
         /// The kind of the reason, which decides on the advice.
         missing: MissingPlan,
     },
-    /// The planner has failed, so that nobody knows whether there is a plan.
+    /// The planner has failed, so it is unknown whether there is a plan.
     PlannerFailed {
-        /// How.
+        /// The error.
         why: String,
     },
     /// The limit on new plans was reached.
     ReplanLimit,
     /// The time limit was reached.
     TimeLimit,
-    /// The run was asked to end.
+    /// The end of the run was requested.
     Interrupted,
     /// The outside world failed.
     WorldFailed {
@@ -183,14 +183,14 @@ pub enum Verdict {
     },
 }
 
-/// The cause of a run without a plan, as far as something else may provide one.
+/// Reason for a run without a plan, if something else may provide one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissingPlan {
     /// No planner was asked, or the given plan cannot be executed.
     NotSearched,
     /// A planner has found none. Another planner, or greater limits, may find one.
     NotFound,
-    /// There may be one, or the goal may be reached, depending on facts and values that are in doubt.
+    /// A plan may exist, or the goal may be reached, depending on facts and values in doubt.
     InDoubt,
     /// There is one, but the executor rejects it.
     Rejected,
@@ -211,7 +211,7 @@ impl MissingPlan {
 }
 
 impl Verdict {
-    /// The word by which traces and tables name it.
+    /// Returns the name used in traces and tables.
     pub fn name(&self) -> &'static str {
         match self {
             Self::GoalReached => "goal-reached",
@@ -225,7 +225,7 @@ impl Verdict {
         }
     }
 
-    /// The verdict of a run whose planner has answered this, and no plan.
+    /// Returns the verdict of a run if the planner has given this answer, which is not a plan.
     pub(super) fn without_plan(answer: &PlanAnswer) -> Self {
         let why = answer.why_not().unwrap_or_default().to_owned();
         match answer {
@@ -242,7 +242,7 @@ impl Verdict {
         }
     }
 
-    /// Details of the verdict, if there are any.
+    /// Returns details of the verdict, if there are any.
     pub fn why(&self) -> Option<&str> {
         match self {
             Self::NoPlan { why, .. } | Self::PlannerFailed { why } | Self::WorldFailed { why } => {
@@ -256,19 +256,20 @@ impl Verdict {
 /// The report on a finished run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// How it ended.
+    /// The outcome.
     pub verdict: Verdict,
-    /// The time, by the world's clock.
+    /// The time of the end, on the world's clock.
     pub time: Rational,
-    /// The number of new plans made, or asked for.
+    /// The number of new plans that were requested.
     pub replans: usize,
     /// The reason.
     pub reasons: Vec<Reason>,
-    /// Where no plan reaches the goal any more: what can never become true again, and since when,
-    /// as far as that is known ([`Run::explaining`](super::Run::explaining)).
+    /// If no plan reaches the goal any more: the parts of the goal that can never become true
+    /// again, and since when, as far as that is known
+    /// ([`Run::explaining`](super::Run::explaining)).
     pub dead_end: Vec<Reason>,
     /// The number of actions started.
     pub starts: usize,
-    /// The executed steps, with the times and amounts observed: a plan for the judge.
+    /// The executed steps, with the observed times and amounts: a plan for the validator.
     pub executed: Vec<ExecutedStep>,
 }

@@ -1,4 +1,5 @@
-//! Known reasons for which goals are not reached: deadlines that are missed, and goals that exclude each other.
+//! Known reasons for which goals are not reached: missed deadlines, and goals that exclude each
+//! other.
 
 use std::collections::BTreeSet;
 
@@ -36,7 +37,7 @@ impl Conflict {
 }
 
 impl Run<'_> {
-    /// Notes what the planner's answer to a request for these goals says of them.
+    /// Records the information about these goals in the planner's answer.
     pub(super) fn note_shortfall(&mut self, goals: &Goals, shortfall: &Shortfall) {
         let is_choosing = self.is_choosing_goals();
         let Some(lasting) = &mut self.lasting else {
@@ -87,13 +88,13 @@ impl Run<'_> {
         conflicts.collect()
     }
 
-    /// Returns the number of goals that are pursued.
+    /// Returns the number of pursued goals.
     pub(super) fn pursued_goals(&self) -> usize {
         let goals = self.lasting.iter().flat_map(|it| &it.goals);
         goals.filter(|goal| goal.is_pursued()).count()
     }
 
-    /// Returns how late the pursued goals with deadlines would be, as far as that is known.
+    /// Returns the lateness of the pursued goals with deadlines, as far as it is known.
     pub(super) fn missed_deadlines(&self) -> Vec<Reason> {
         let goals = self.lasting.iter().flat_map(|it| &it.goals);
         let late = goals.filter(|goal| goal.is_pursued()).filter_map(|goal| {

@@ -1,13 +1,13 @@
-//! Where a lasting run stands, as all that is needed to go on from there: its record can begin anew
-//! there, without what was recorded before.
+//! Snapshots of an executive, from which it can be resumed. Its record can be rotated there:
+//! earlier entries are not needed.
 //!
-//! There are two kinds of such moments. When a plan is taken up, the executor forgets the one before,
-//! and all that it will know follows from the plan and from what is believed. When the run rests and
-//! nothing is under way, there is no plan. A run that is put together from [`Stand`] decides as this
-//! one does, whatever comes. For that, a run forgets at these moments what would take too much to
-//! write down, whether its record begins anew or not: late reports on what had ended long before count
-//! for nothing from then on. Only the words in which things are explained and reported depend on how
-//! far the record reaches back.
+//! There are two kinds of such moments. When a plan is adopted, the executor forgets the earlier
+//! one, and its further state follows from the plan and the belief. When the run is idle and no
+//! action is running, there is no plan. A run that is restored from a [`Stand`] makes the same
+//! decisions as this one. To keep the snapshot small, the run forgets part of its past at these
+//! moments, whether or not its record is rotated: late reports on actions that ended long ago are
+//! ignored from then on. Only the texts of explanations and reports depend on the length of the
+//! record.
 
 use std::sync::Arc;
 
@@ -23,73 +23,72 @@ use crate::event::{GoalTerms, Ticket};
 use crate::executor::News;
 use crate::progression::Progression;
 
-/// A lasting run that takes up a plan, or rests with nothing under way.
+/// Snapshot of an executive that adopts a plan, or is idle with no action running.
 #[derive(Clone, Debug)]
 pub struct Stand {
-    /// What is believed, at the present time.
+    /// The belief, at the present time.
     pub belief: Progression,
-    /// How many actions were started: the next ticket.
+    /// Number of actions started, which is the next ticket.
     pub started: usize,
-    /// Those that are under way, and the last ones that have ended. What else was started has ended long
-    /// ago.
+    /// The running actions, and the last ones that have ended. All other starts ended long ago.
     pub starts: Vec<KnownStart>,
-    /// How long making a plan is expected to take, in seconds of the world's time.
+    /// Expected planning time, in seconds of the world's clock.
     pub allowance: Rational,
-    /// Since when answers of the world are counted, and how many there were: a clock that stands
-    /// still is noticed ([`Verdict::WorldFailed`]).
+    /// The time from when answers of the world are counted, and their number, to detect a clock
+    /// that stands still ([`Verdict::WorldFailed`]).
     pub answers: (Rational, usize),
-    /// How many new plans were made since the run last rested.
+    /// Number of new plans since the run was last idle.
     pub replans: usize,
-    /// What the world has refused since anything else has happened.
+    /// Actions refused by the world since the last other event.
     pub refusals: Refusals,
     /// The open goals.
     pub goals: Goals,
-    /// Whether nothing is to be started.
+    /// `true` if the run is paused.
     pub is_paused: bool,
-    /// What it does.
+    /// The state of the run.
     pub doing: Doing,
 }
 
-/// What a run does where its record can begin anew.
+/// State of a run at a snapshot.
 #[derive(Clone, Debug)]
 pub enum Doing {
-    /// It rests.
+    /// It is idle.
     Rests {
-        /// Since then.
+        /// Start of the idle state.
         since: Rational,
         /// `true` if it is proved that no plan reaches the open goals from there.
         is_unsolvable: bool,
     },
-    /// It takes up a plan.
+    /// It adopts a plan.
     TakesUp(Box<TakesUp>),
 }
 
-/// A plan that is taken up.
+/// A plan that is being adopted.
 #[derive(Clone, Debug)]
 pub struct TakesUp {
     /// The plan, on the world's clock.
     pub plan: TimeTriggeredPlan,
-    /// From where.
+    /// The situation from which the plan starts.
     pub situation: Situation,
-    /// The tickets of what is under way there, in its order.
+    /// The tickets of the actions that are running there, in its order.
     pub running: Vec<Ticket>,
-    /// What of the plan has begun since.
+    /// The steps of the plan that have begun since.
     pub begun: Vec<Ticket>,
-    /// The goals that it is for.
+    /// The goals of the plan.
     pub goals: Goals,
-    /// What it does not know of.
+    /// Events that the plan does not account for.
     pub news: Vec<News>,
-    /// How the goals have changed since it was asked for, in words, and whether they have only become
-    /// more; if they have changed.
+    /// The change of the goals since the plan was requested, in words, and `true` if goals were
+    /// only added. `None` if they have not changed.
     pub turn: Option<(String, bool)>,
 }
 
-/// Goals that are open, as they were given.
+/// Open goals, as they were given.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Goals {
     /// The goals in the order of their requests.
     pub open: Vec<GivenGoal>,
-    /// Whether they are not, or no longer, those of the problem.
+    /// `true` if they are not, or no longer, those of the problem.
     pub are_others: bool,
 }
 
@@ -100,7 +99,7 @@ pub struct GivenGoal {
     pub name: String,
     /// Its text in PDDL; `None` for the goal of the problem.
     pub text: Option<String>,
-    /// Its value and its times.
+    /// Its value and its deadline.
     pub terms: GoalTerms,
     /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     pub aside: Option<String>,
@@ -121,8 +120,7 @@ impl GivenGoal {
 }
 
 impl Run<'_> {
-    /// A plan is about to be taken up: forgets what is long past, and has the recorder begin anew if it
-    /// wants to.
+    /// Forgets the distant past before a plan is adopted, and lets the recorder rotate.
     pub(super) fn begin_anew_with(&mut self, course: Course<'_>, goals: &Goals) {
         if !self.goes_on_after(&Verdict::GoalReached) {
             return;
@@ -135,7 +133,7 @@ impl Run<'_> {
             begun,
         } = course;
         self.account.leave_behind(&[running, begun].concat());
-        // What was said last is told first, and goes before it.
+        // The agenda is processed from its end, and each item is inserted before the earlier ones.
         let news = self.agenda.iter().map(|todo| match todo {
             Todo::Tell(news) => Some(news.as_slice()),
             _ => None,
@@ -171,7 +169,7 @@ impl Run<'_> {
         self.ask_to_begin_anew(&|| Doing::TakesUp(Box::new(takes_up())));
     }
 
-    /// The run rests: forgets what was before, and has the recorder begin anew if it wants to.
+    /// Forgets the distant past while the run is idle, and lets the recorder rotate.
     pub(super) fn begin_anew_at_rest(&mut self) {
         let Some((since, is_unsolvable)) = self.idle_since() else {
             return;
@@ -191,8 +189,8 @@ impl Run<'_> {
         });
     }
 
-    /// Has the recorder begin anew if it wants to. The report, and explanations, have what the record
-    /// has.
+    /// Lets the recorder rotate. After a rotation, the report and explanations go back no further
+    /// than the record.
     fn ask_to_begin_anew(&mut self, doing: &dyn Fn() -> Doing) {
         let (goals, is_paused) = (self.goals(), self.is_paused());
         let (belief, account, progress) = (&self.belief, &self.account, &self.progress);
@@ -218,7 +216,8 @@ impl Run<'_> {
         }
     }
 
-    /// Since when the run rests, if nothing is under way, or to be done.
+    /// Returns the time since when the run is idle, if no action is running and there is nothing to
+    /// do.
     fn idle_since(&self) -> Option<(Rational, bool)> {
         let is_idle = self.goes_on_after(&Verdict::GoalReached)
             && self.search.is_none()
@@ -232,8 +231,8 @@ impl Run<'_> {
         Some((since.clone(), is_unsolvable))
     }
 
-    /// The same run, where another one has been; to be called once the run is
-    /// [lasting](Run::lasting). Nothing is made of it otherwise.
+    /// Restores the state of another run from a snapshot. To be called after [`Run::lasting`];
+    /// otherwise it has no effect.
     #[must_use]
     pub fn standing(mut self, stand: Stand) -> Self {
         if !self.goes_on_after(&Verdict::GoalReached) {

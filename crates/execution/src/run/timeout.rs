@@ -11,7 +11,7 @@ use super::{Run, UnknownSetting};
 use crate::event::Ticket;
 use crate::record::{Entry, WarningCause};
 
-/// Longest wait for the end of a cancelled action, in seconds of the world.
+/// Longest wait for the end of a cancelled action, in seconds of the world's clock.
 const STOPPING: i64 = 600;
 
 /// The same for an action that was cancelled because it had reached its time-out.
@@ -48,12 +48,13 @@ pub enum TimeoutRule {
         /// Shortest time-out; positive.
         at_least: Rational,
     },
-    /// Rules of their own for some actions.
+    /// Separate rules for some actions.
     ByAction {
-        /// The rule of each named action: a ground action, `(drive a b)`, or all of one name, `drive`. That of the ground
-        /// action comes first. No rule in here is `ByAction` itself.
+        /// The rule of each named action: a ground action, `(drive a b)`, or all actions of one
+        /// name, `drive`. The rule of the ground action takes precedence. These rules are not
+        /// `ByAction` themselves.
         actions: BTreeMap<String, TimeoutRule>,
-        /// The rule of the others.
+        /// The rule of the other actions.
         others: Box<TimeoutRule>,
     },
 }
@@ -83,7 +84,7 @@ impl TimeoutRule {
         }
     }
 
-    /// Returns the names of actions for which it has rules of their own.
+    /// Returns the names of actions with separate rules.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let actions = match self {
             Self::ByAction { actions, .. } => Some(actions),
@@ -110,7 +111,7 @@ impl TimeoutRule {
         }
     }
 
-    /// Reads a rule for all actions alike.
+    /// Parses one rule.
     fn read_one(text: &str) -> Option<Self> {
         let number = |text: &str| text.trim().parse::<Rational>().ok();
         let rule = match text.trim().split_once("x,") {
@@ -130,7 +131,7 @@ impl TimeoutRule {
         })
     }
 
-    /// Reads rules of actions, behind that of the others.
+    /// Parses rules: the general one first, then those of actions.
     fn read(text: &str) -> Option<Self> {
         let mut parts = text.split(';').peekable();
         let others = match parts.next_if(|first| !first.contains('=')) {
@@ -163,7 +164,7 @@ impl TimeoutRule {
     }
 }
 
-/// The name in a ground action: `drive` in `(drive a b)`.
+/// Returns the name in a ground action: `drive` in `(drive a b)`.
 fn name_of(action: &str) -> &str {
     let inner = action.strip_prefix('(').unwrap_or(action);
     let name = inner.split_whitespace().next().unwrap_or(inner);
@@ -172,7 +173,7 @@ fn name_of(action: &str) -> &str {
         .unwrap_or(name)
 }
 
-/// A number as a decimal, or as a fraction where that would round it.
+/// Formats a number as a decimal, or as a fraction if the decimal would be rounded.
 fn written(number: &Rational) -> String {
     let decimal = number.to_decimal(6);
     if decimal.parse::<Rational>().as_ref() == Ok(number) {
@@ -204,7 +205,8 @@ impl fmt::Display for TimeoutRule {
 impl FromStr for TimeoutRule {
     type Err = UnknownSetting;
 
-    /// Reads `none`, a positive number of seconds, or `10x,600`; and behind that rules of actions, `; drive=40`.
+    /// Parses `none`, a positive number of seconds, or `10x,600`; then optional rules of actions,
+    /// `; drive=40`.
     fn from_str(text: &str) -> Result<Self, UnknownSetting> {
         Self::read(text).ok_or_else(|| UnknownSetting {
             text: text.to_owned(),
@@ -218,14 +220,14 @@ impl FromStr for TimeoutRule {
 /// An action that can time out.
 struct Limit {
     ticket: Ticket,
-    /// When a warning is due; `None` if it was given, or if the action has been cancelled.
+    /// The time of the warning; `None` if it was given, or if the action has been cancelled.
     warn: Option<Rational>,
-    /// When the action times out.
+    /// The time-out.
     until: Rational,
 }
 
 impl Run<'_> {
-    /// The time-outs of the actions that have not ended, on the world's clock.
+    /// Returns the time-outs of the actions that have not ended, on the world's clock.
     fn limits(&self) -> impl Iterator<Item = Limit> + '_ {
         let open = self.account.open_tickets();
         open.filter_map(|ticket| {
@@ -246,7 +248,8 @@ impl Run<'_> {
             let began = entry.started.as_ref().unwrap_or(&entry.ordered);
             let progress = entry.progress.as_ref().map_or(began, |(time, _)| time);
             let until = began.max(progress) + &timeout;
-            // A quarter of the time between the planned end and the time-out is left then.
+            // The warning comes when a quarter of the time between the planned end and the time-out
+            // is left.
             let since = if planned < timeout {
                 planned
             } else {
@@ -262,9 +265,10 @@ impl Run<'_> {
         })
     }
 
-    /// Returns when the next warning or time-out is due. An action may end at its time-out, and several
-    /// reports of one moment may come one after the other, so it is cancelled ε later. While an action
-    /// runs that never times out, the end of the run is the last moment to wait for.
+    /// Returns the time of the next warning or time-out. An action may end exactly at its time-out,
+    /// and several reports on one moment may arrive one after the other, so it is cancelled ε
+    /// later. While an action is running that never times out, the time limit of the run is
+    /// returned at the latest.
     pub(super) fn next_timeout(&self) -> Option<Rational> {
         let epsilon = self.task.epsilon();
         let due = self.limits();
@@ -274,7 +278,7 @@ impl Run<'_> {
         due.chain(end).min()
     }
 
-    /// Warns of time-outs that come near, and cancels the actions that have reached theirs.
+    /// Warns of approaching time-outs, and cancels the actions that have reached theirs.
     pub(super) fn check_timeouts(&mut self) {
         let limits: Vec<Limit> = self.limits().collect();
         let (expired, running): (Vec<_>, Vec<_>) =

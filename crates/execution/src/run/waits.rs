@@ -1,4 +1,4 @@
-//! What the starts of a plan wait for.
+//! Predecessors that the starts of a plan wait for.
 
 use std::collections::BTreeMap;
 
@@ -7,19 +7,19 @@ use elbowroom_plan::{Bound, Node, NodeId};
 
 use crate::executor::{Mission, StepId};
 
-/// The start of a step of a plan, or, where that is true, its end.
+/// A step, and `false` for its start or `true` for its end.
 pub(super) type Moment = (StepId, bool);
 
-/// What a start of the present plan waits for.
+/// A predecessor that a start of the present plan waits for.
 #[derive(Clone, Debug)]
 pub(super) struct Wait {
     pub(super) moment: Moment,
-    /// How long after that it comes at the soonest.
+    /// Minimum distance of the start after it.
     pub(super) least: Rational,
 }
 
-/// What the starts of a plan wait for: starts and ends that its network has before them. Times by the
-/// clock are not among these.
+/// Returns the predecessors that each start of a plan waits for, by the plan's network: starts and
+/// ends, without fixed times.
 pub(super) fn waits_of(mission: &Mission) -> BTreeMap<StepId, Vec<Wait>> {
     let plan = &mission.plan.plan;
     let moment = |node: NodeId| match plan.nodes[node.index()] {
@@ -32,7 +32,7 @@ pub(super) fn waits_of(mission: &Mission) -> BTreeMap<StepId, Vec<Wait>> {
         let (Some(moment), Some((step, false))) = (moment(earlier), moment(later)) else {
             return;
         };
-        // Starts that fall together do not wait for each other.
+        // Simultaneous starts do not wait for each other.
         let follows = moment.1 || mission.nominal[earlier] < mission.nominal[later];
         if moment.0 != step && (least.is_positive() || (least.is_zero() && follows)) {
             waits.entry(step).or_default().push(Wait { moment, least });

@@ -1,5 +1,5 @@
-//! What every executor in the registry owes: to a world that keeps its word, and to one that does
-//! not. Nothing but this crate and a plan is needed for that.
+//! Requirements on all executors in the registry, with worlds that satisfy their contract and
+//! worlds that violate it. The tests need only this crate and a plan.
 
 mod scene;
 
@@ -14,7 +14,7 @@ use elbowroom_execution::{
 use elbowroom_num::Rational;
 use scene::{Scene, Toy, Whims};
 
-/// Keeps each entry as a text; of a plan, that it was taken up.
+/// Recorder that keeps each entry as text; of a plan, only its adoption.
 #[derive(Clone, Default)]
 struct Notes(Arc<Mutex<Vec<String>>>);
 
@@ -22,7 +22,7 @@ impl Recorder for Notes {
     fn record(&mut self, entry: &Entry<'_>) {
         let mut notes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         notes.push(match entry {
-            // Its table of facts is a hash map, whose order says nothing.
+            // Its table of facts is a hash map without a defined order.
             Entry::Mission(mission) => format!("a plan from {}", mission.origin),
             other => format!("{other:?}"),
         });
@@ -36,7 +36,7 @@ impl Notes {
     }
 }
 
-/// What was started and neither ended nor was cancelled.
+/// Started actions that have neither ended nor been cancelled.
 #[derive(Default)]
 struct Books {
     open: BTreeSet<Ticket>,
@@ -169,7 +169,7 @@ fn whatever_the_world_says_the_run_ends_and_nothing_is_left_running() {
 
 #[test]
 fn a_world_that_fails_at_any_moment_ends_the_run_at_once() {
-    /// Answers so often, and then no more.
+    /// World that fails after a number of answers.
     struct Mortal {
         inner: Toy,
         left: usize,
@@ -203,7 +203,7 @@ fn a_world_that_fails_at_any_moment_ends_the_run_at_once() {
             let why = "it is gone".to_owned();
             let failed = Verdict::WorldFailed { why };
             if report.verdict != failed {
-                // The plan was done before.
+                // The plan was finished before the failure.
                 assert_eq!(report.verdict, Verdict::GoalReached, "{executor}, {left}");
                 assert!(left > 2, "{executor}, {left}");
             }

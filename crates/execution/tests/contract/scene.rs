@@ -1,4 +1,4 @@
-//! A problem with a plan made ready, and a world for it, with nothing above this crate.
+//! A problem with a prepared plan, and a world for it, without any crate above this one.
 
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ const PLAN: &str = "0: (boil) [10]\n0: (chop) [4]\n10.001: (cook) [8]";
 pub(crate) struct Scene {
     task: Arc<Task>,
     plan: TimeTriggeredPlan,
-    /// What executors tell each other about orders, if they do.
+    /// Orders shared between executors, if any.
     pub(crate) orders: Option<Orders>,
 }
 
@@ -53,7 +53,7 @@ impl Scene {
         }
     }
 
-    /// A run of the plan that has not begun, and its workers. When the plan no longer works, it is over.
+    /// Creates a run of the plan, with its workers. The run is over when the plan fails.
     pub(crate) fn run(
         &self,
         executor: &str,
@@ -79,8 +79,8 @@ impl Scene {
     }
 }
 
-/// Makes plans ready without a solver: each duration may take up to twice as long as planned, which
-/// in this plan, without deadlines, is right.
+/// Prepares plans without a solver: each duration may be up to twice as long as planned. For this
+/// plan, which has no deadlines, that is correct.
 struct ByHand;
 
 impl Preparer for ByHand {
@@ -116,7 +116,7 @@ impl Preparer for ByHand {
     }
 }
 
-/// No numbers, no objections.
+/// Region without objections, for plans without numbers.
 struct Everywhere;
 
 impl Region for Everywhere {
@@ -125,16 +125,16 @@ impl Region for Everywhere {
     }
 }
 
-/// How a world deviates.
+/// Deviations of a world.
 #[derive(Clone, Copy)]
 pub(crate) enum Whims {
-    /// Not at all.
+    /// No deviations.
     None,
     /// Actions take longer or fail, and reports are lost, repeated, wrong, or from the future.
     Seeded(u64),
 }
 
-/// A world in which actions take as long as they are told to, but for its whims.
+/// World in which actions take the commanded durations, apart from its deviations.
 pub(crate) struct Toy {
     now: Rational,
     coming: Vec<Observation>,
@@ -156,7 +156,7 @@ impl Toy {
         }
     }
 
-    /// Whether something happens that does so once in `times`; xorshift.
+    /// Returns `true` once in `times` calls on average; xorshift.
     fn one_in(&mut self, times: u64) -> bool {
         if matches!(self.whims, Whims::None) {
             return false;
@@ -246,7 +246,7 @@ impl World for Toy {
     }
 }
 
-/// The start that an observation says has ended.
+/// Returns the start whose end the observation reports.
 fn ended_by(observation: &Observation) -> Option<Ticket> {
     match observation.event {
         Event::Ended { ticket, .. } => Some(ticket),
@@ -254,7 +254,7 @@ fn ended_by(observation: &Observation) -> Option<Ticket> {
     }
 }
 
-/// The starts that have ended in that time.
+/// Returns the starts whose ends are reported.
 pub(crate) fn ended(passage: &Passage) -> Vec<Ticket> {
     passage.observations.iter().filter_map(ended_by).collect()
 }

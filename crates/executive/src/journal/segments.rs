@@ -15,7 +15,7 @@ use crate::messages::plain;
 /// Rotation settings of a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segments {
-    /// Length from which the journal is rotated, in bytes.
+    /// Minimum length at a rotation, in bytes.
     pub size: u64,
     /// Number of earlier segments that are kept: `FILE.1` is the latest one.
     pub kept: usize,

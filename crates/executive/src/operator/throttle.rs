@@ -15,7 +15,7 @@ const LONGEST_DELAY: Duration = Duration::from_millis(100);
 pub(super) struct SimulationThrottle {
     /// Runs since the last answer.
     since: Clock,
-    /// Time by which the world is ahead of the wall clock.
+    /// Lead of the world's clock over the wall clock.
     ahead: Duration,
     /// `true` if there was a delay since the last answer.
     has_slept: bool,

@@ -1,4 +1,4 @@
-//! Facts that change by themselves at a rate.
+//! Spontaneous changes of facts at a rate.
 
 use elbowroom_model::Problem;
 use elbowroom_model::problem::{ObjectId, Predicate};
@@ -6,34 +6,34 @@ use elbowroom_model::problem::{ObjectId, Predicate};
 use super::WorldModel;
 use crate::pattern::ActionPattern;
 
-/// How often facts change by themselves, per second.
+/// Rates of spontaneous changes of facts, per second.
 ///
-/// A rate of λ means: for as long as the fact has the other value, it changes within the next
-/// `t` seconds with probability 1 − exp(−λ·t), whatever has been before and whoever made it so
-/// (an exponentially distributed time, drawn anew each time).
+/// With a rate of λ, a fact changes within the next `t` seconds with probability 1 − exp(−λ·t), for
+/// as long as it has the other value and regardless of the past. So the time until the change is
+/// exponentially distributed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hazard {
     /// The facts.
     pub fact: ActionPattern,
-    /// While it is false.
+    /// The rate while it is false.
     pub becomes_true: f64,
-    /// While it is true.
+    /// The rate while it is true.
     pub becomes_false: f64,
-    /// Whether the world reports such a change.
+    /// `true` if the world reports such a change.
     pub is_reported: bool,
 }
 
-/// Of so many facts at most, rates are given.
+/// Maximum number of facts with rates.
 pub(super) const MOST_FACTS: usize = 10_000;
 
 impl WorldModel {
-    /// How often a fact, `(predicate object …)`, changes by itself; `None`: never.
+    /// Returns the rates of a fact, `(predicate object …)`; `None` if it never changes by itself.
     pub fn hazard(&self, fact: &str) -> Option<&Hazard> {
         let mut rules = self.hazards.iter().rev();
         rules.find(|rule| rule.fact.matches(fact))
     }
 
-    /// All facts of the problem that change by themselves at a rate, by name, each once.
+    /// Returns all facts of the problem that change spontaneously at a rate, by name, each once.
     pub fn hazardous(&self, problem: &Problem) -> Vec<(String, &Hazard)> {
         let mut found = Vec::new();
         for predicate in &problem.predicates {
@@ -50,7 +50,7 @@ impl WorldModel {
 }
 
 impl Hazard {
-    /// The rate at which a fact becomes `truth` while it is not.
+    /// Returns the rate of the change to `truth`.
     pub fn rate(&self, truth: bool) -> f64 {
         if truth {
             self.becomes_true
@@ -60,7 +60,7 @@ impl Hazard {
     }
 }
 
-/// How many facts a predicate has; `None` if that cannot be counted.
+/// Returns the number of facts of a predicate; `None` if it overflows.
 pub(super) fn count(predicate: &Predicate, problem: &Problem) -> Option<usize> {
     let mut parameters = predicate.parameters.iter();
     parameters.try_fold(1_usize, |count, parameter| {

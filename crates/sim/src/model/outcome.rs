@@ -1,45 +1,45 @@
-//! What a failure leaves behind, and how long it holds things up.
+//! Outcomes of failures: changes, and a delay of the failure.
 
 use elbowroom_num::Rational;
 use rand::Rng;
 
 use super::Failing;
 
-/// One of the ways in which things may stand when an action has failed.
+/// A possible outcome of a failure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// How likely it is, given that the action fails.
+    /// The probability of the outcome, given that the action fails.
     pub probability: f64,
-    /// What changes, in this order, when the action is told to have failed.
+    /// The changes, in this order, at the time at which the failure is reported.
     pub changes: Vec<OutcomeChange>,
-    /// For how many seconds more the action is under way: it fails that much later, and until then
-    /// nobody can start it again or cancel it.
+    /// The delay of the failure, in seconds. The action is running until then, and can neither be
+    /// started again nor be cancelled.
     pub delay: Rational,
-    /// Whether the world reports the changes.
+    /// `true` if the world reports the changes.
     pub is_reported: bool,
 }
 
 /// A fact or a fluent that a failure changes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutcomeChange {
-    /// Which one.
+    /// The fact or fluent.
     pub what: Template,
-    /// What becomes of it.
+    /// Its change.
     pub becomes: Becoming,
 }
 
-/// What becomes of a fact or a fluent.
+/// A change of a fact or a fluent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Becoming {
     /// The fact becomes true or false.
     Truth(bool),
     /// The fluent gets a value.
     Value(Rational),
-    /// The fluent grows by this, or shrinks if it is negative; one without a value stays without.
+    /// The number is added to the fluent's value; a fluent without a value does not get one.
     Grown(Rational),
 }
 
-/// A fact or a fluent, some of whose objects may be those of an action.
+/// A fact or a fluent, with objects and arguments of an action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Template {
     pub(super) name: String,
@@ -49,13 +49,13 @@ pub struct Template {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Word {
     Object(String),
-    /// The object that the action has at this place.
+    /// The argument of the action at this index.
     Argument(usize),
 }
 
 impl Template {
-    /// What is meant when the action is `(name object …)`: `(predicate object …)`, or
-    /// `(function object …)`.
+    /// Returns the ground name, `(predicate object …)` or `(function object …)`, for the action
+    /// `(name object …)`.
     pub fn of(&self, action: &str) -> String {
         let action: Vec<&str> = action
             .trim_matches(['(', ')'])
@@ -76,7 +76,7 @@ impl Template {
 }
 
 impl Failing {
-    /// Which of its outcomes a failure has; `None`: none of them.
+    /// Draws the outcome of a failure; `None` if none of them applies.
     pub fn outcome(&self, rng: &mut impl Rng) -> Option<&Outcome> {
         let mut left = rng.random::<f64>();
         self.outcomes.iter().find(|outcome| {

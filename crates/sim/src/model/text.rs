@@ -1,4 +1,4 @@
-//! Reading world files.
+//! Parser of world files.
 
 mod changes;
 mod failures;
@@ -15,13 +15,13 @@ use crate::draw::Distribution;
 use crate::pattern::{ActionPattern, Names};
 use section::{File, Section, Shape};
 
-/// A distribution where it stands, with its minimum and maximum.
+/// A distribution with its position, its minimum and its maximum.
 type Found = (Span, Distribution, Limit, Limit);
 
-/// A minimum or a maximum, where it stands.
+/// A minimum or a maximum, with its position.
 type Limit = Option<(Span, f64)>;
 
-/// The text, and what its names stand for.
+/// The text, and the problem that defines its names.
 struct Reader<'a> {
     source: &'a Source,
     problem: &'a Problem,
@@ -92,7 +92,7 @@ impl Reader<'_> {
         self.pattern(action, Names::Actions)
     }
 
-    /// The distribution of a section that has nothing else than `own`.
+    /// Reads the distribution of a section that has no other keys than `own`.
     fn rule_of(&self, section: &Spanned<Section>, name: &str, own: &[&str]) -> Read<Rule> {
         match section.get_ref().excess(name, own, true) {
             Some((span, message)) => Err(self.wrong(&span, message)),
@@ -100,7 +100,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A time, or a time span, that is not meant to be less than 0.
+    /// Checks a rule for times, which must not be negative.
     fn not_negative(&self, section: &Spanned<Section>, rule: Rule) -> Read<Rule> {
         if !rule.means_negative() {
             return Ok(rule);
@@ -134,7 +134,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The one distribution that a section has.
+    /// Reads the distribution of a section, which must be the only one.
     fn rule(&self, section: &Spanned<Section>) -> Read<Rule> {
         let given = section.get_ref();
         let mut found: Vec<Found> = Vec::new();
@@ -201,7 +201,8 @@ impl Reader<'_> {
         })
     }
 
-    /// The limit inside the braces or the one beside them, whichever there is.
+    /// Returns the limit inside the braces or the one beside them. It is an error if there are
+    /// both.
     fn once(&self, inside: Limit, beside: &Limit) -> Read<Limit> {
         match (inside, beside) {
             (Some((span, _)), Some(_)) => Err(self.wrong(
@@ -309,7 +310,7 @@ impl Reader<'_> {
         })
     }
 
-    /// A name without placeholders.
+    /// Reads a name without placeholders.
     fn ground(&self, text: &Spanned<String>) -> Read<String> {
         let name = text.get_ref().trim();
         let name = if name.starts_with('(') {
@@ -360,7 +361,7 @@ impl Reader<'_> {
     }
 }
 
-/// The new value of a fact or a fluent; `None` if it is not a number.
+/// The new value of a fact or a fluent; the value is `None` if it is not finite.
 enum Becomes {
     Truth(bool),
     Value(Option<Rational>),

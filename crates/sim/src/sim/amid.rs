@@ -1,4 +1,4 @@
-//! Worlds that begin in the middle of things, as they may go on after what has been seen of them.
+//! Worlds that begin in the middle of an execution, conditioned on the observations so far.
 
 use elbowroom_execution::{Progression, SeenChange, Ticket, Underway};
 use elbowroom_model::ground::FactId;
@@ -9,23 +9,23 @@ use super::{Coming, Commanded, SimWorld};
 use crate::draw::{Purpose, keyed};
 use crate::model::{Exogenous, ExogenousChange, Failure, WorldModel};
 
-/// So many draws are made for one that goes with what has been seen.
+/// Number of draws for one that is consistent with the observations.
 const DRAWS: u64 = 64;
 
-/// When two times count as the same, to find out which event it was: that part of the range of what
-/// can be drawn.
+/// Maximum difference of times that count as equal when an observed change is matched with an
+/// event, as a share of the range of the drawn times.
 const SAME: f64 = 0.05;
 
-/// What an observer has seen of the facts that may change by themselves.
+/// Observations of the facts that may change by themselves.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
-    /// Each change of such a fact, in the order of time, and whether the world has made it.
+    /// The observed changes, in order of time. Each is marked as spontaneous or not.
     pub changes: Vec<SeenChange>,
 }
 
 impl Seen {
-    /// Whether the fact was so at that time, which is before the present; `initially` if nothing
-    /// was seen before.
+    /// Returns the observed truth of the fact at that time, which is before the present;
+    /// `initially` if it was not observed before.
     fn was(&self, fact: FactId, time: &Rational, initially: bool) -> bool {
         let mut before = self
             .changes
@@ -36,13 +36,14 @@ impl Seen {
 }
 
 impl<'a> SimWorld<'a> {
-    /// A world that goes on from what is believed, which is taken for true, at its time.
+    /// Creates a world that continues from a belief, which is taken as the true state at its time.
     ///
-    /// What is under way has the rest of a duration that is drawn from those that are longer than
-    /// it has taken by now, and fails as often as what has not failed by now. Events that are to
-    /// come are drawn from those that go with what was seen. What is started from now on depends
-    /// on the seed and on how often it was started from now on alone, so that others who go on from
-    /// here meet the same world, as far as they do the same.
+    /// Running actions take the rest of a duration that is drawn from those that are longer than
+    /// the time so far, and fail with the probability of an action that has not failed so far.
+    /// Coming events are drawn consistently with the observations. The results of later starts
+    /// depend only on the seed and on the number of starts of the action since `belief`, so
+    /// different executors that continue from here meet the same world, as long as they do the
+    /// same.
     pub fn amid(belief: &Progression, model: &'a WorldModel, seed: u64, past: &Seen) -> Self {
         let now = belief.time().clone();
         let mut world = Self::empty(belief.clone(), model, seed);
@@ -63,7 +64,7 @@ impl<'a> SimWorld<'a> {
         world
     }
 
-    /// Draws how an action under way goes on.
+    /// Draws the end of a running action.
     fn go_on(&mut self, ticket: Ticket, underway: &Underway) {
         let name = &underway.action.name;
         let mut commanded = Commanded {
@@ -86,7 +87,7 @@ impl<'a> SimWorld<'a> {
             let fails = failing.filter(|failing| dice.random::<f64>() < failing.probability);
             let Some(failing) = fails.filter(|failing| failing.when != Failure::AtStart) else {
                 let end = &underway.start + &duration;
-                // What failed at its start is not under way.
+                // An action that failed at its start is not running.
                 if fails.is_none() && end > self.now {
                     coming = Some((end, Coming::End(ticket)));
                     break;
@@ -111,7 +112,7 @@ impl<'a> SimWorld<'a> {
                 break;
             }
         }
-        // Nobody has seen it last that long: it may as well last a quarter longer.
+        // No draw lasts that long, so a quarter of the time so far is added.
         let late = || {
             let elapsed = &self.now - &underway.start;
             let quarter = elapsed / Rational::from(4);
@@ -122,8 +123,8 @@ impl<'a> SimWorld<'a> {
         self.put(time, what);
     }
 
-    /// Which events were those that were seen: of several that it may have been, each as often as
-    /// it comes at such a time.
+    /// Returns the events that explain the observed changes. Among several candidates, each is
+    /// drawn in proportion to its probability of coming at such a time.
     fn matched(&self, past: &Seen) -> Vec<usize> {
         let mut matched: Vec<usize> = Vec::new();
         let changes = past.changes.iter().filter(|change| change.is_by_itself);
@@ -138,7 +139,7 @@ impl<'a> SimWorld<'a> {
                 .collect();
             let all: u64 = weights.iter().map(|(_, weight)| weight).sum();
             if all == 0 {
-                // A fact that changes at a rate, or what a failure has left behind.
+                // The change comes from a fact with a rate, or from the outcome of a failure.
                 continue;
             }
             let key = format!("seen {number}");
@@ -154,7 +155,7 @@ impl<'a> SimWorld<'a> {
         matched
     }
 
-    /// The fact that an event changes, and what it becomes.
+    /// Returns the fact that an event changes, and its new truth.
     fn changes(&self, event: &Exogenous) -> Option<(FactId, bool)> {
         match &event.change {
             ExogenousChange::Fact(name, truth) => {
@@ -178,7 +179,7 @@ impl<'a> SimWorld<'a> {
         happens.then(|| time.max(Rational::ZERO))
     }
 
-    /// How many draws come at about that time.
+    /// Returns the number of draws close to that time.
     fn often_at(&self, index: usize, event: &Exogenous, time: &Rational) -> u64 {
         let drawn = (0..DRAWS).filter_map(|draw| self.drawn(index, event, draw));
         let drawn: Vec<f64> = drawn.map(|time| time.to_f64()).collect();
@@ -189,14 +190,14 @@ impl<'a> SimWorld<'a> {
         drawn.iter().filter(near).count() as u64
     }
 
-    /// When an event is still to come, if it is: given that it was not seen.
+    /// Draws the time of an event that was not observed; `None` if it does not come any more.
     fn to_come(&self, index: usize, event: &Exogenous, past: &Seen) -> Option<Rational> {
         for draw in 0..DRAWS {
             let time = self.drawn(index, event, draw)?;
             if time > self.now {
                 return Some(time);
             }
-            // If it has happened and was to be seen, it must have changed nothing.
+            // A past event that would have been reported must have changed nothing.
             let went_unseen = match self.changes(event) {
                 Some((fact, truth)) => {
                     let initially = self.truth.task().initial().facts.contains(&fact);

@@ -1,4 +1,4 @@
-//! Failures that nothing but chance explains, and what they leave behind.
+//! Failures by chance, and their outcomes.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use super::{Coming, SimWorld};
 use crate::model::{Becoming, Outcome};
 
 impl SimWorld<'_> {
-    /// An action breaks down; it fails at once, or when it has held things up.
+    /// Makes an action break down. It fails at once, or after the delay of its outcome.
     pub(super) fn break_down(&mut self, ticket: Ticket) {
         let Some(commanded) = self.actions.get_mut(&ticket) else {
             return;
@@ -23,8 +23,8 @@ impl SimWorld<'_> {
         }
     }
 
-    /// An action that has broken down has failed. What its start did may be undone, and something
-    /// may be left behind.
+    /// Makes a broken action fail, undoes its start effects if the rule says so, and applies its
+    /// outcome.
     pub(super) fn fail_at_last(&mut self, ticket: Ticket) {
         let Some(commanded) = self.actions.get(&ticket).cloned() else {
             return;
@@ -58,7 +58,7 @@ impl SimWorld<'_> {
         for change in changes {
             let (fact, truth) = match change {
                 Change::Add(fact) => (*fact, false),
-                // Where a start both deletes and adds, it makes true.
+                // A fact that the start both deletes and adds becomes true.
                 Change::Delete(fact) if !is_added(*fact) => (*fact, true),
                 Change::Delete(_) | Change::Update { .. } => continue,
             };
@@ -73,7 +73,7 @@ impl SimWorld<'_> {
             let name = change.what.of(&action.name);
             let event = match &change.becomes {
                 Becoming::Truth(truth) => {
-                    // An object of another type than the predicate's cannot matter.
+                    // Facts with objects of the wrong type do not exist and are ignored.
                     let Some(fact) = task.fact_named(&name) else {
                         continue;
                     };

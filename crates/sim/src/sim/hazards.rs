@@ -1,4 +1,4 @@
-//! Facts that change by themselves at a rate.
+//! Spontaneous changes of facts at a rate.
 
 use elbowroom_execution::Event;
 use elbowroom_model::ground::FactId;
@@ -9,27 +9,27 @@ use rand_distr::Exp1;
 use super::{Coming, SimWorld};
 use crate::draw::{Purpose, keyed, rounded};
 
-/// The moments at which a fact changes unless it already is so: a Poisson process. Cut down to
-/// those moments at which the fact has the other value, it has no memory either, and it does not
-/// depend on what anybody does.
+/// The moments at which a fact changes unless it already has that value: a Poisson process.
+/// Restricted to the moments at which the fact has the other value, it is memoryless as well, and
+/// independent of the executor's actions.
 #[derive(Clone, Debug)]
 pub(super) struct Chance {
     fact: FactId,
     becomes: bool,
-    /// Per second.
+    /// Changes per second.
     rate: f64,
     is_reported: bool,
-    /// The last of these moments, in seconds, before it is rounded.
+    /// The last of these moments, in seconds, without rounding.
     at: f64,
     rng: ChaCha8Rng,
 }
 
 impl SimWorld<'_> {
-    /// Puts the first such moment of each fact from now on on the agenda.
+    /// Adds the first such moment of each fact from now on to the agenda.
     pub(super) fn expose(&mut self) {
         let task = self.truth.task().clone();
         for (name, hazard) in self.model.hazardous(task.problem()) {
-            // Arguments are of the right types, so the fact is there.
+            // The arguments have the right types, so the fact exists.
             let Some(fact) = task.fact_named(&name) else {
                 continue;
             };
@@ -50,7 +50,7 @@ impl SimWorld<'_> {
         }
     }
 
-    /// The next such moment.
+    /// Adds the next such moment to the agenda.
     fn come_again(&mut self, index: usize) {
         let chance = &mut self.chances[index];
         let pause: f64 = chance.rng.sample(Exp1);
@@ -59,7 +59,7 @@ impl SimWorld<'_> {
         self.put(time, Coming::Chance(index));
     }
 
-    /// One of these moments has come.
+    /// Processes such a moment: changes the fact if it has the other value.
     pub(super) fn take_chance(&mut self, index: usize) {
         let chance = &self.chances[index];
         let (fact, truth, is_reported) = (chance.fact, chance.becomes, chance.is_reported);

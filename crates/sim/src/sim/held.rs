@@ -1,13 +1,13 @@
-//! Actions whose end is left to somebody else.
+//! Actions whose end is decided from outside.
 
 use elbowroom_execution::Ticket;
 
 use super::{Coming, SimWorld};
 
 impl SimWorld<'_> {
-    /// An action that is under way does not end by itself any more, but when it is
-    /// [let go](Self::let_go). Whether it is under way, and was going to end: an action that will
-    /// fail does so when the model says.
+    /// Keeps a running action from ending by itself; it ends when it is [let go](Self::let_go).
+    /// Returns `true` if the action is running and was going to end. An action that is going to
+    /// fail is not affected.
     pub fn hold(&mut self, ticket: Ticket) -> bool {
         let count = self.agenda.len();
         self.agenda
@@ -15,7 +15,7 @@ impl SimWorld<'_> {
         self.agenda.len() < count
     }
 
-    /// An action that was held ends now, as soon as time is let pass.
+    /// Ends a held action now, when the world is next asked to wait.
     pub fn let_go(&mut self, ticket: Ticket) {
         if self.actions.get(&ticket).is_some_and(|own| own.has_started) {
             self.put(self.now.clone(), Coming::End(ticket));

@@ -1,4 +1,4 @@
-//! The port: commands and the passing of time.
+//! Implementation of the port: commands and waits.
 
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ impl World for SimWorld<'_> {
                 }
             }
             Command::Cancel { ticket } => {
-                // What has broken down is over when it has failed, and not before.
+                // An action that has broken down ends when it fails, and not before.
                 let is_broken = |own: &Commanded<'_>| own.is_broken;
                 if self.actions.get(ticket).is_some_and(is_broken) {
                     return Ok(());

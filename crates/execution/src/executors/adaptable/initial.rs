@@ -1,4 +1,4 @@
-//! What is not certain of the beginning, as long as nothing has told: [`Initial`].
+//! Uncertain initial facts, until they are observed: [`Initial`].
 
 use std::collections::BTreeMap;
 
@@ -10,9 +10,9 @@ use elbowroom_probability::{Belief, Likelihoods};
 use crate::event::Ending;
 use crate::executor::News;
 
-/// How likely initial facts hold of which nothing has been heard since: the `[beliefs]` of a
-/// likelihood file. A fact is heard of when its change is reported, when an action has an effect on
-/// it, and when an action starts or ends that needs it then.
+/// Probabilities of initial facts that have not been observed yet: the `[beliefs]` of a likelihood
+/// file. A fact counts as observed when its change is reported, when an action has an effect on it,
+/// and when an action that needs it starts or ends.
 #[derive(Clone, Debug)]
 pub(super) struct Initial(BTreeMap<(PredicateId, Vec<ObjectId>), f64>);
 
@@ -21,12 +21,12 @@ impl Initial {
         Self(likelihoods.beliefs.clone())
     }
 
-    /// Whether nothing is open.
+    /// Returns `true` if no fact is uncertain.
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Takes note of what is new; `action` is the one that it is about.
+    /// Processes a news item; `action` is the action that it concerns.
     pub(super) fn learn(&mut self, news: &News, action: Option<&Action>, task: &Task) {
         match (news, action) {
             (News::Fact(fact), _) => self.is_known(task, *fact),
@@ -53,7 +53,8 @@ impl Initial {
         }
     }
 
-    /// What had to hold, held. Of a disjunction nobody knows which part.
+    /// Marks the conjuncts of a condition as having held. Of a disjunction, the part that held is
+    /// unknown.
     fn needed(&mut self, task: &Task, condition: &Condition) {
         for part in condition.conjuncts() {
             match part {
@@ -75,12 +76,12 @@ impl Initial {
         }
     }
 
-    /// From now on the fact is what reports and effects say.
+    /// Marks a fact as observed: only reports and effects determine it from now on.
     fn is_known(&mut self, task: &Task, fact: FactId) {
         self.0.remove(&task.atom(fact));
     }
 
-    /// Brings in what is open still.
+    /// Sets the probabilities of the facts that are still uncertain.
     pub(super) fn apply(&self, task: &Task, belief: &mut Belief) {
         for ((predicate, arguments), probability) in &self.0 {
             if let Some(fact) = task.find_fact(*predicate, arguments) {
@@ -103,7 +104,8 @@ mod tests {
     use crate::event::Ending;
     use crate::executor::{News, StepId};
 
-    /// Whoever lifts needs the crate closed throughout, and it is not on the floor afterwards.
+    /// The action `lift` needs the crate closed throughout, and the crate is not on the floor
+    /// afterwards.
     fn scene() -> (Arc<Task>, Step, Likelihoods) {
         let domain = Source::new(
             "d",
@@ -151,8 +153,8 @@ mod tests {
             measured: Vec::new(),
         };
         initial.learn(&started, Some(&step.action), &task);
-        // It was here, and from now on its being on the floor is what effects and reports say: in
-        // the state of the beginning, it is.
+        // The start needed `here`. The start effect deletes `floor`, so its probability is no
+        // longer applied, and the initial state has it.
         close(believed(&initial, &task), [1.0, 1.0, 0.3, 0.2]);
         let ended = |ending| News::Ended {
             step: StepId(0),

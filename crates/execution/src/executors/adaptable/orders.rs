@@ -1,4 +1,4 @@
-//! Searches for orders of plans, for who takes up the same plan more than once: [`Orders`].
+//! Order searches of plans, for executors that adopt the same plan repeatedly: [`Orders`].
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -6,13 +6,13 @@ use elbowroom_model::{Step, Task};
 use elbowroom_plan::PartialOrderPlan;
 use elbowroom_probability::LayerDispatch;
 
-/// What `adaptable` found out about plans, with one likelihood file, from situations of one task that
-/// share a table of facts. Shared by clones. Nobody has to fill it, and it changes no decision: it
-/// saves looking for the same orders in every sample of a world.
+/// Cache of `adaptable`'s order searches, by plan. It applies to one likelihood file and to
+/// situations of one task that share a table of facts. Clones share the cache. It is optional and
+/// does not change any decision; it avoids the same search in each sample of a world.
 #[derive(Clone, Debug, Default)]
 pub struct Orders(Arc<Mutex<Vec<Known>>>);
 
-/// A plan, and where nothing of it has been begun.
+/// A plan, with its search before any step has begun.
 #[derive(Debug)]
 struct Known {
     task: Arc<Task>,
@@ -21,11 +21,11 @@ struct Known {
     dispatch: LayerDispatch,
 }
 
-/// How many plans are kept: those of one scene are fewer.
+/// Number of plans that are kept. A scene has fewer.
 const MOST: usize = 64;
 
 impl Orders {
-    /// Who chooses happenings of this plan, if it was taken up before.
+    /// Returns the search of this plan if the plan was adopted before.
     pub(super) fn get(
         &self,
         task: &Task,
@@ -39,7 +39,7 @@ impl Orders {
         own.map(|known| known.dispatch.clone())
     }
 
-    /// Keeps it.
+    /// Adds a plan.
     pub(super) fn put(
         &self,
         task: &Arc<Task>,
@@ -60,7 +60,8 @@ impl Orders {
     }
 }
 
-/// Whether two rests of a task begin alike.
+/// Returns `true` if two remaining tasks have the same problem, initial state, timed initials and
+/// ε.
 fn is_same(one: &Task, other: &Task) -> bool {
     std::ptr::eq(one, other)
         || std::ptr::eq(one.problem(), other.problem())

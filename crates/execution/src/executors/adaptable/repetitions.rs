@@ -1,4 +1,4 @@
-//! Actions that succeed in the same state again and again: [`Repetitions`].
+//! Detection of actions that succeed repeatedly in the same state: [`Repetitions`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use elbowroom_plan::InstanceId;
 
 use crate::executor::StepId;
 
-/// Limit on the number of states that are kept; beyond it, all are forgotten.
+/// Limit on the number of states that are kept. Beyond it, all are forgotten.
 const MOST_KEPT: usize = 4096;
 
 /// Facts, numbers and running actions at the start of an action, and the action.
@@ -22,8 +22,9 @@ type Place = (
 
 /// Number of successes of actions by the state at their start.
 ///
-/// An executor that always chooses the same in the same state repeats such a circle for ever, unless the world changes
-/// something by itself. Likelihoods may promise that in a world that never does it.
+/// An executor that always makes the same choice in the same state repeats such a cycle forever,
+/// unless the world changes spontaneously. Likelihoods may predict such changes for a world without
+/// them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Repetitions {
     started: BTreeMap<StepId, Place>,
@@ -31,7 +32,7 @@ pub(super) struct Repetitions {
 }
 
 impl Repetitions {
-    /// The number of successes of an action after a start in this state.
+    /// Returns the number of successes of an action after a start in this state.
     pub(super) fn count(&self, state: &State, running: &[InstanceId], instance: InstanceId) -> u32 {
         let place = place(state, running, instance);
         self.successes.get(&place).copied().unwrap_or(0)
@@ -48,7 +49,7 @@ impl Repetitions {
         self.started.insert(step, place(state, running, instance));
     }
 
-    /// Notes the end of an action.
+    /// Records the end of an action.
     pub(super) fn end(&mut self, step: StepId, succeeded: bool) {
         let Some(place) = self.started.remove(&step).filter(|_| succeeded) else {
             return;

@@ -1,4 +1,4 @@
-//! A plan being executed by its orders, or all that can be done by a table: [`Rest`].
+//! Execution of a plan by its orders, or of a policy table: [`Rest`].
 
 mod numbers;
 
@@ -23,75 +23,79 @@ use crate::progression::Progression;
 use crate::reason::{About, Behind, Cause, Reason};
 use crate::separation::Separation;
 
-/// A search looks at so many happenings at most, sequences times the plan's length; then the best
-/// order so far is taken. Plans of some twenty happenings are searched to the end.
+/// Work limit of a search, in happenings: the number of sequences times the plan's length. When it
+/// is reached, the best order so far is used. Plans of about twenty happenings are searched
+/// completely.
 const MOST_HAPPENINGS: usize = 200_000;
 
-/// An action is given up when it has failed so often in a row that this is how likely that was.
+/// An action is abandoned when the probability of its failures in a row falls below this value.
 const TOO_UNLIKELY: f64 = 1e-6;
 
-/// However unlikely it is to start, it is not tried more often than this in a row: where starts
-/// take no time, neither does trying again.
+/// Maximum number of failures in a row, however unlikely a start is. Retries take no time if starts
+/// take none.
 const MOST_FAILURES: i32 = 1000;
 
-/// So often in a row a failure is put down to a condition that does not hold.
+/// Number of failures in a row that are attributed to an unmet condition.
 const MOST_EXPLAINED: i32 = 3;
 
-/// An action that succeeds more often than this at one time, by the same order, does not lead on.
+/// Maximum number of successes of an action at one time with one order. Beyond it, the plan makes
+/// no progress.
 const MOST_AT_ONCE: u32 = 20;
 
-/// An order is executed to its end, and no longer chosen again at each start, when an action has succeeded this often in
-/// the same state.
+/// Number of successes of an action in the same state after which an order is executed to its end
+/// and no longer chosen again at each start.
 const MOST_RECONSIDERED: u32 = 3;
 
-/// An action that succeeds more often than this in the same state does not lead on, and the plan is abandoned.
+/// Maximum number of successes of an action in the same state. Beyond it, the plan makes no
+/// progress and is abandoned.
 const MOST_REPEATED: u32 = 20;
 
-/// So often an action is stopped before its end for good reasons.
+/// Number of times that an action may be cancelled in favour of a likelier order.
 const MOST_LET_GO: u32 = 3;
 
-/// A plan, and how it stands.
+/// State of the execution of a plan.
 #[derive(Clone)]
 pub(super) struct Rest {
     mission: Arc<Mission>,
     /// The plan's steps in the order of the model's instances.
     steps: Arc<[Step]>,
     chooser: Chooser,
-    /// Instances that were told to start and have not ended, with their starts on the plan's clock.
+    /// Instances that were commanded to start and have not ended, with their starts on the plan's
+    /// clock.
     under_way: BTreeMap<StepId, (InstanceId, Option<Rational>)>,
     /// The timed initials, on the plan's clock.
     timed: Vec<(NodeId, Rational)>,
     /// Instances that were running when the plan was adopted. Their steps are only the remainder of an action,
     /// with the remaining duration and without start conditions, so they are never started.
     continued: BTreeSet<InstanceId>,
-    /// Starts and ends that have been observed lately, on the plan's clock.
+    /// Recent starts and ends, on the plan's clock.
     recent: Vec<(NodeId, Rational)>,
     /// The happenings that starts and planned ends are separated from, with changes by the world.
     separation: Separation,
-    /// How often each instance has failed in a row.
+    /// Number of failures in a row, by instance.
     failures: BTreeMap<InstanceId, i32>,
     /// The time of each instance's latest success, and the number of its successes at that time.
     successes: BTreeMap<InstanceId, (Rational, u32)>,
-    /// The latest event, before which there was still an order.
+    /// The latest event, for the explanation when no order is left.
     latest: Option<Behind>,
     repetitions: Repetitions,
-    /// The happening that was chosen last.
+    /// The last chosen happening.
     chosen: Option<NodeId>,
     /// `true` if an action has ended before the order expected its end.
     is_ahead: bool,
     /// `true` if the table of a small world has led to the same state repeatedly.
     is_table_circling: bool,
-    /// Steps that were told to stop and have not.
+    /// Steps that were cancelled and have not ended.
     let_go: BTreeSet<StepId>,
-    /// How often each instance was told to stop.
+    /// Number of cancellations, by instance.
     times_let_go: BTreeMap<InstanceId, u32>,
     /// The number of the next order.
     next_step: u32,
 }
 
 impl Rest {
-    /// A plan that has just been taken up: `steps` are the actions in the order of the model's
-    /// instances.
+    /// Creates the state of a plan that is being adopted. `steps` are the actions in the order of
+    /// the model's instances.
     pub(super) fn new(
         mission: &Mission,
         chooser: Chooser,
@@ -119,7 +123,7 @@ impl Rest {
         let mut separation =
             Separation::new(&mission.task, &mission.origin).with_failures(Arc::clone(likelihoods));
         for (step, (instance, _)) in &under_way {
-            // The steps of running actions are what is left of them.
+            // The steps of running actions are only their remainders.
             let rest = &steps[instance.index()];
             let end = rest.duration.clone().unwrap_or_default();
             separation.expect(step.0, (&mission.task, &rest.action), end);
@@ -151,7 +155,8 @@ impl Rest {
         self.is_table_circling
     }
 
-    /// The window of a step under way; when the others happen is decided then.
+    /// Returns the window of the end of a running step. All other times are decided at the last
+    /// moment.
     pub(super) fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         let (instance, start) = self.under_way.get(&step)?;
         let start = start.as_ref().filter(|_| is_end)?;
@@ -162,7 +167,7 @@ impl Rest {
         })
     }
 
-    /// Notes the news. Returns the reason for a new plan, if one is needed.
+    /// Processes a news item. Returns the reason for a new plan, if one is needed.
     pub(super) fn learn(
         &mut self,
         news: &News,
@@ -214,7 +219,7 @@ impl Rest {
                 }
                 failed(step, failures, ending, likelihoods)
             }
-            // Layers are compared with the belief, which has the change already.
+            // Layers are compared with the belief, which already contains the change.
             News::Fact(_) | News::Value(_) => {
                 self.note_change(news, moment);
                 None
@@ -226,8 +231,8 @@ impl Rest {
         }
     }
 
-    /// Notes the success of an action that may be repeated. Returns the reason for a new plan if it succeeds again and
-    /// again at one time: an action without duration would be repeated for ever.
+    /// Records the success of an action. Returns the reason for a new plan if the action succeeds
+    /// too often at one time: an action without duration would be repeated forever.
     fn succeeded(&mut self, instance: InstanceId, time: Rational) -> Option<Reason> {
         self.failures.remove(&instance);
         let (latest, times) = self.successes.entry(instance).or_default();
@@ -240,7 +245,7 @@ impl Rest {
         (times > MOST_AT_ONCE).then(|| reason.since(self.world(&since)))
     }
 
-    /// Notes a change by the world.
+    /// Records a spontaneous change.
     fn note_change(&mut self, news: &News, moment: &Moment<'_>) {
         let mut change = Footprint::default();
         match news {
@@ -253,7 +258,7 @@ impl Rest {
             .note(change, &(moment.now - &self.mission.origin));
     }
 
-    /// The action that something new is about.
+    /// Returns the action that a news item concerns.
     pub(super) fn action_of(&self, news: &News) -> Option<&Action> {
         let (News::Started { step, .. } | News::Ended { step, .. }) = news else {
             return None;
@@ -262,7 +267,7 @@ impl Rest {
         Some(&self.steps[instance.index()].action)
     }
 
-    /// The news, by name.
+    /// Returns a news item with names instead of numbers.
     fn named(&self, news: &News, belief: &Progression) -> Option<Behind> {
         let action = |step: &StepId| {
             let (instance, _) = self.under_way.get(step)?;
@@ -292,7 +297,7 @@ impl Rest {
         })
     }
 
-    /// An instance's start or end.
+    /// Returns the node of an instance's start or end.
     fn node(&self, instance: InstanceId, is_end: bool) -> NodeId {
         let model = self.chooser.search().model();
         if is_end {
@@ -302,7 +307,7 @@ impl Rest {
         }
     }
 
-    /// Happenings so recent that those which interfere with them have to wait.
+    /// Returns the happenings of the last ε; interfering happenings have to wait.
     fn lately(&mut self, now: &Rational) -> Vec<(NodeId, Rational)> {
         let epsilon = self.mission.task.epsilon();
         self.recent.retain(|(_, time)| time + epsilon > *now);
@@ -314,7 +319,7 @@ impl Rest {
         lately
     }
 
-    /// The decision at this moment.
+    /// Returns the decision at this moment.
     pub(super) fn next(&mut self, moment: &Moment<'_>, initial: &Initial) -> Decided {
         if !self.let_go.is_empty() {
             return wait(None, About::EndOfCancelled);
@@ -324,7 +329,7 @@ impl Rest {
         }
         let now = moment.now - &self.mission.origin;
         if now.is_negative() {
-            // The plan begins ε after whatever happened before it.
+            // The plan begins ε after the last event before it.
             return wait(Some(self.mission.origin.clone()), About::NextStart);
         }
         let state = moment.belief.state();
@@ -350,8 +355,8 @@ impl Rest {
             }
         };
         let mut choice = self.chooser.choose(&circumstances, &mut most);
-        // Behind an action that ended before the order expected it, only layers before its start may fit. It is not
-        // repeated for that.
+        // After an action ends earlier than the order expected, possibly only layers before its
+        // start fit. The action is not repeated for that.
         if let Ok(Choice::Next(next)) = &choice
             && self.is_ahead
             && let Some(instance) = self.starting(next).first()
@@ -378,7 +383,7 @@ impl Rest {
                 choice = self.chooser.choose(&circumstances, &mut most);
             }
         }
-        // An order that counts on other numbers is dropped.
+        // An order that relies on other numbers is dropped.
         if let Ok(Choice::Next(next)) = &choice
             && self.is_lacking_for_good(next, moment, &now)
             && self.chooser.drop_order(next, false)
@@ -395,8 +400,8 @@ impl Rest {
             },
             Ok(Choice::Next(next)) => self.carry_on(&next, moment, &now, (&state, &running)),
             Ok(Choice::Replan) if self.awaits_ends(&now) => {
-                // What is under way is ended before a plan is given up: a robot that is let go
-                // between two places is at neither. And it may change what can be done.
+                // Running actions are awaited before the plan is abandoned: a robot whose move is
+                // cancelled is at neither place, and an end may make another order possible.
                 let until = self.first_overdue().map(|time| self.world(&time));
                 wait(until, About::EndOfRunning)
             }
@@ -409,7 +414,8 @@ impl Rest {
         }
     }
 
-    /// Reason to abandon a plan because an action succeeds repeatedly after a start in the same state.
+    /// Returns the reason to abandon a plan because an action succeeds repeatedly after a start in
+    /// the same state.
     fn is_circling(&self, instance: InstanceId, count: u32, now: &Rational) -> Reason {
         let name = &self.steps[instance.index()].action.name;
         let about =
@@ -418,7 +424,8 @@ impl Rest {
         reason.since(now.clone())
     }
 
-    /// The actions that start if this is next: several if they need each other. Empty for an end or a timed initial.
+    /// Returns the actions that start if this happening is next: several if they need each other.
+    /// Empty for an end or a timed initial.
     fn starting(&self, next: &NextHappening) -> Vec<InstanceId> {
         let nodes = &self.chooser.search().model().plan().nodes;
         let starting = std::iter::once(&next.node).chain(&next.together);
@@ -429,8 +436,8 @@ impl Rest {
         starting.collect()
     }
 
-    /// Stops an action whose end is not worth waiting for; not again and again, which would take no
-    /// time.
+    /// Cancels an action whose end is not worth waiting for. The number of cancellations is
+    /// limited, because they take no time.
     fn let_go(&mut self, instance: InstanceId, now: &Rational) -> Decided {
         let times = self.times_let_go.entry(instance).or_default();
         if *times >= MOST_LET_GO {
@@ -453,13 +460,13 @@ impl Rest {
         }
     }
 
-    /// Whether something is under way, and nothing overdue.
+    /// Returns `true` if an action is running and none is overdue.
     fn awaits_ends(&self, now: &Rational) -> bool {
         let is_overdue = self.first_overdue().is_some_and(|time| time <= *now);
         !self.under_way.is_empty() && !is_overdue
     }
 
-    /// The time at which the first of the actions under way is later than it can be.
+    /// Returns the time at which the first running action becomes overdue.
     fn first_overdue(&self) -> Option<Rational> {
         let plan = self.chooser.search().model().plan();
         let ends = self.under_way.values().filter_map(|(instance, start)| {
@@ -469,7 +476,7 @@ impl Rest {
         ends.min()
     }
 
-    /// A time of the plan by the world's clock.
+    /// Converts a time of the plan to the world's clock.
     fn world(&self, time: &Rational) -> Rational {
         time + &self.mission.origin
     }
@@ -485,14 +492,14 @@ impl Rest {
         let world = |time: &Rational| time + &origin;
         let starting = self.starting(next);
         let Some(first) = starting.first() else {
-            // An end, or timed initials: it comes when it comes. When it is too late for the order,
-            // another one is looked for.
+            // The next happening is an end or a timed initial, so the executor waits for it. If it
+            // is too late for the order, another order is searched for.
             let late = next
                 .slot
                 .latest
                 .as_ref()
                 .map(|latest| latest + self.mission.task.epsilon());
-            // What needs it at the same moment is started then.
+            // Starts that need it at the same moment happen then.
             let moment = (!next.together.is_empty()).then(|| next.slot.earliest.clone());
             let until = late.into_iter().chain(moment).filter(|time| time > now);
             let until = until.min();
@@ -535,7 +542,7 @@ impl Rest {
         }
     }
 
-    /// The order to start an action now.
+    /// Returns the order to start an action now.
     fn start(
         &mut self,
         instance: InstanceId,
@@ -561,8 +568,8 @@ impl Rest {
     }
 }
 
-/// Why an action is given up that has failed so often in a row: it is tried again as long as its
-/// likelihoods explain that.
+/// Returns the reason to abandon the plan if an action has failed too often in a row. An action is
+/// retried as long as its likelihoods explain the failures.
 fn failed(
     step: &Step,
     failures: i32,
@@ -586,7 +593,7 @@ fn failed(
     Some(Reason::new(Cause::Failed).of(&action.name).about(about))
 }
 
-/// Whether what an action needs is known not to hold: no wonder that it has failed.
+/// Returns `true` if a condition of the action is known not to hold, which explains its failure.
 fn lacks_something(step: &Step, has_started: bool, belief: &Progression) -> bool {
     let needs = match &step.action.body {
         Body::Instantaneous(snap) => vec![&snap.condition],

@@ -1,4 +1,4 @@
-//! The search for a better plan while the present one is executed.
+//! Search for a better plan while the present one is executed.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::InstanceId;
@@ -7,8 +7,8 @@ use super::{Rest, promise};
 use crate::executor::Mission;
 
 impl Rest {
-    /// Returns whether a better plan is to be searched for: the guarantee has become weaker than at the last search, and
-    /// little slack is left for the actions that have not begun.
+    /// Returns `true` if a better plan is to be searched for: the guarantee has become weaker than
+    /// at the last search, and little slack is left for the actions that have not begun.
     pub(super) fn seeks_better_plan(&mut self, now: &Rational) -> bool {
         if self.promise <= self.sought_at || !self.has_actions_to_begin() {
             return false;
@@ -17,8 +17,8 @@ impl Rest {
         self.slack(now) < Rational::new(1, 4)
     }
 
-    /// Returns whether another plan is better than the rest of this one: its guarantee is no weaker, and it has at least
-    /// twice the slack.
+    /// Returns `true` if another plan is better than the rest of this one: its guarantee is no
+    /// weaker, and it has at least twice the slack.
     pub(super) fn is_worse_than(&self, mission: &Mission, now: &Rational) -> bool {
         let has_guarantee =
             promise::begin(mission).is_ok_and(|(_, promise)| promise <= self.promise);

@@ -1,4 +1,5 @@
-//! Continuation of a plan without a guarantee: time is lacking or numbers fall short, and no other plan was found.
+//! Continuation of a plan without a guarantee, if time is too short or numbers are insufficient and
+//! no other plan was found.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, Node, NodeId, StnPlan};
@@ -10,10 +11,10 @@ use crate::executor::{Decided, Decision, Executor, Moment, News};
 use crate::preparation::Region;
 use crate::reason::{About, Cause, Promise, Reason};
 
-/// The reduction of durations that the rest of a plan needs so that it ends in time.
+/// Class of the reduction of durations that the remaining plan needs to end in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Hope {
-    /// It cannot work, however little it takes.
+    /// No reduction suffices.
     #[default]
     None,
     /// More than half.
@@ -23,7 +24,7 @@ pub(super) enum Hope {
 }
 
 impl Hope {
-    /// The least share of the planned durations that the rest may take.
+    /// Returns the least share of the planned durations that is assumed.
     fn share(self) -> Rational {
         match self {
             Self::Fair => Rational::new(1, 2),
@@ -35,13 +36,14 @@ impl Hope {
 /// A plan that is executed without a guarantee.
 pub(super) struct CarriedOn {
     executor: Box<dyn Executor>,
-    /// It is abandoned if there is less hope.
+    /// The plan is abandoned if the hope falls below this.
     hope: Hope,
-    /// There is that much hope until then if nothing ends before; on the world's clock.
+    /// Time until which that hope holds if no action ends before, on the world's clock.
     until: Option<Rational>,
-    /// The time at which it was carried on. No other plan was found then.
+    /// Start of the continuation. No other plan was found then.
     since: Rational,
-    /// The observations that the executor has not received yet: before it decides, another plan is searched for.
+    /// Observations that the executor has not received yet. Before it decides, another plan is
+    /// searched for.
     unread: Vec<News>,
 }
 
@@ -60,12 +62,13 @@ impl CarriedOn {
         })
     }
 
-    /// Returns whether another plan is to be searched for: an action has ended.
+    /// Returns `true` if another plan is to be searched for, because an action has ended.
     pub(super) fn seeks_better_plan(&self) -> bool {
         !self.unread.is_empty()
     }
 
-    /// Returns whether another plan may exist since something has ended, while this one continues.
+    /// Returns `true` if another plan may exist because an action has ended, and this plan
+    /// continues meanwhile.
     fn may_be_replaced(&self, moment: &Moment<'_>) -> bool {
         let has_ended = |news: &News| matches!(news, News::Ended { .. });
         let continues = || {
@@ -77,7 +80,7 @@ impl CarriedOn {
             && continues().unwrap_or_default()
     }
 
-    /// Decides with all observations.
+    /// Returns the decision of the executor, which receives all observations.
     fn decide(&mut self, moment: &Moment<'_>) -> Decided {
         let mut news = std::mem::take(&mut self.unread);
         news.extend_from_slice(moment.news);
@@ -89,8 +92,8 @@ impl CarriedOn {
 }
 
 impl Rest {
-    /// Returns the hope for the rest of the plan after this reason to abandon it. Numbers that fall short may suffice
-    /// after all if durations deviate to their advantage.
+    /// Returns the hope for the remaining plan after this reason to abandon it. Insufficient
+    /// numbers may still suffice if durations deviate favourably.
     pub(super) fn hope(&self, reason: &Reason, now: &Rational) -> Hope {
         let lacks_numbers = matches!(
             (reason.cause, &reason.about),
@@ -111,7 +114,8 @@ impl Rest {
         promise::times_if_faster(&self.dispatch, &self.values, &hope.share(), now)
     }
 
-    /// Returns until when there is this much hope if nothing ends before; `Err` if there is less.
+    /// Returns the time until which there is this much hope if no action ends before; `Err` if
+    /// there is less.
     fn hopes_until(&self, hope: Hope, now: &Rational) -> Result<Option<Rational>, ()> {
         let times = self.times(hope, now).ok_or(())?;
         let running = self.dispatch.running().iter();
@@ -150,7 +154,7 @@ impl Rest {
         })
     }
 
-    /// Follows an executor that knows no guarantee, as long as there is hope.
+    /// Returns the decision of the executor without a guarantee, as long as there is hope.
     pub(super) fn decide_carried_on(
         &mut self,
         moment: &Moment<'_>,
@@ -160,7 +164,7 @@ impl Rest {
         let now = moment.now;
         let is_over = carried_on.until.as_ref().is_some_and(|until| until < now);
         if !moment.news.is_empty() {
-            // The executor that is followed finds out by itself what prevents the rest.
+            // The other executor detects by itself whether the remaining plan is blocked.
             let _ = self.dispatch.take(moment);
             self.observe(moment);
             self.limit_by_numbers(now, region);
@@ -198,7 +202,8 @@ impl Rest {
         decided
     }
 
-    /// Finds the limits of running actions by numbers. Where numbers already fall short, there are none.
+    /// Computes the numeric limits of running actions. If numbers are insufficient already, there
+    /// are no limits.
     fn limit_by_numbers(&mut self, now: &Rational, region: &mut dyn Region) {
         self.limits.clear();
         if self.durations_move_numbers && self.works_without_deadlines(now, region) {
@@ -207,7 +212,7 @@ impl Rest {
     }
 }
 
-/// Allows timed initials to come later, so that nothing has to come before a given time.
+/// Removes the deadlines of a plan: timed initials may come later.
 pub(super) fn remove_deadlines(plan: &mut StnPlan) {
     let nodes = &plan.nodes;
     for constraint in &mut plan.constraints {

@@ -1,6 +1,8 @@
-//! As long as all that was observed lies within the plan's envelope, the rest of the plan works, and nothing needs to
-//! be asked: a schedule in which it works is what the network keeps to, and of numbers the envelope says it. Once
-//! something has left it, a box is looked for that does the same for the rest.
+//! Comparison of observations with the envelope. While all observations lie within the plan's
+//! envelope, the remaining plan works, and no query of the region is needed: the dispatched network
+//! keeps a feasible schedule, and the envelope guarantees the numeric conditions. Once an
+//! observation has left the envelope, a new box is computed that serves the same purpose for the
+//! remaining plan.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,29 +18,30 @@ use crate::preparation::Region;
 use crate::quantities::{expression, places};
 use crate::reason::{Promise, Reason};
 
-/// The box within which the rest of the plan is known to work, and what was observed, held against it.
+/// The box of the remaining plan, and the observations compared with it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inside {
-    /// What was found for the rest once something had left the plan's envelope, which it is otherwise.
+    /// The box computed for the remaining plan after an observation left the plan's envelope.
+    /// `None` as long as the plan's envelope applies.
     found: Option<DecoupledEnvelope>,
-    /// Whether something was observed since that the box does not hold, or of which it does not say anything.
+    /// `true` if a later observation lies outside the box, or is not covered by it.
     has_left: bool,
-    /// The amounts that were observed since.
+    /// Parameters whose amounts were observed since then.
     amounts: BTreeSet<ParameterId>,
-    /// When actions under way will have taken as long as the box has it, on the plan's clock: by action, and the
-    /// first one first.
+    /// The times, on the plan's clock, at which running actions will have reached their longest
+    /// durations in the box: by action, and sorted by time.
     ends: BTreeMap<InstanceId, Rational>,
     due: BTreeSet<(Rational, InstanceId)>,
 }
 
 impl Inside {
-    /// Something was observed that the box does not hold.
+    /// Records an observation that the box does not cover.
     pub(super) fn leave(&mut self) {
         self.has_left = true;
     }
 
-    /// Takes note of when an action will have taken as long as the envelope has it; `None` if it is over, or has no
-    /// such time.
+    /// Sets the time at which an action reaches its longest duration in the box; `None` if it is
+    /// over, or has no such time.
     fn set_due(&mut self, instance: InstanceId, time: Option<Rational>) {
         if let Some(old) = self.ends.remove(&instance) {
             self.due.remove(&(old, instance));
@@ -49,14 +52,15 @@ impl Inside {
         }
     }
 
-    /// The actions that have taken as long as the envelope has it by this time, on the plan's clock, and since when.
+    /// Returns the actions that have reached their longest durations in the box by this time, on
+    /// the plan's clock, with the times of that.
     fn due_by(&self, local: &Rational) -> impl Iterator<Item = &(Rational, InstanceId)> {
         self.due.iter().take_while(move |(time, _)| time <= local)
     }
 }
 
 impl Rest {
-    /// Takes up a plan, parts of which may be under way.
+    /// Begins with a plan, which may have running actions.
     pub(super) fn begin(&mut self, region: &mut dyn Region) {
         self.await_running();
         let now = self.mission.now.clone();
@@ -65,18 +69,18 @@ impl Rest {
         }
     }
 
-    /// The box in which the rest of the plan is known to work, if there is one.
+    /// Returns the box of values for which the remaining plan is known to work, if there is one.
     fn known(&self) -> Option<&DecoupledEnvelope> {
         let found = self.inside.found.as_ref();
         found.or(self.mission.envelope.as_ref())
     }
 
-    /// Whether there is a box in which the rest of the plan is known to work.
+    /// Returns `true` if there is a box of values for which the remaining plan is known to work.
     pub(super) fn is_known(&self) -> bool {
         self.known().is_some()
     }
 
-    /// From now on this box is what the rest of the plan is known to work in.
+    /// Replaces the box of the remaining plan.
     pub(super) fn enter(&mut self, found: DecoupledEnvelope) {
         self.inside = Inside {
             found: Some(found),
@@ -86,7 +90,7 @@ impl Rest {
         self.await_running();
     }
 
-    /// Takes note of when the actions under way will have taken as long as the box has it.
+    /// Records when the running actions will have reached their longest durations in the box.
     fn await_running(&mut self) {
         let running: Vec<InstanceId> = self.dispatch.running().iter().copied().collect();
         for instance in running {
@@ -94,7 +98,8 @@ impl Rest {
         }
     }
 
-    /// An action has started or ended: how long it takes, or may take within the envelope.
+    /// Records the duration of an action that has ended, or the longest duration in the box of one
+    /// that has started.
     pub(super) fn observe_duration(&mut self, instance: InstanceId) {
         let [start, end] = self.dispatch.nodes_of(instance);
         let Some(start) = self.dispatch.happened(start).cloned() else {
@@ -108,7 +113,7 @@ impl Rest {
             return;
         };
         let interval = self.known().map(|known| known.interval(parameter));
-        // What ends just before an open end is as good as what ends there: neither is let be over it.
+        // An open end counts like a closed one: in neither case is the action allowed to exceed it.
         let most = interval.and_then(|interval| match &interval.upper {
             End::Closed(most) | End::Open(most) => Some(most),
             End::Infinite => None,
@@ -125,17 +130,17 @@ impl Rest {
         }
     }
 
-    /// An amount was measured that says the value of one parameter.
+    /// Records a measured amount that determines the value of one parameter.
     pub(super) fn observe_amount(&mut self, parameter: ParameterId, value: &Rational) {
         let interval = self.known().map(|known| known.interval(parameter));
         let is_held = interval.is_some_and(|interval| interval.contains(value));
         let is_new = self.inside.amounts.insert(parameter);
-        // No value of a parameter stands for two amounts that differ.
+        // Two different amounts cannot come from one value of a parameter.
         self.inside.has_left |= !is_held || !is_new && self.values[parameter] != *value;
     }
 
-    /// Amounts were measured while it was not known yet how long their actions take: those that depend on it are not
-    /// what the envelope is about.
+    /// Records start amounts that were measured before the durations of their actions were known.
+    /// The envelope does not cover amounts that depend on durations.
     pub(super) fn observe_early_amounts(&mut self, moment: &Moment<'_>) {
         let depends = places(moment.news).any(|place| {
             !place.is_end && self.depends_on_duration(place.instance, place.amount.measured.fluent)
@@ -143,7 +148,7 @@ impl Rest {
         self.inside.has_left |= depends;
     }
 
-    /// Whether what an action does to a number at its start depends on how long it takes.
+    /// Returns `true` if an action's start effect on a number depends on the action's duration.
     fn depends_on_duration(&self, instance: InstanceId, fluent: FluentId) -> bool {
         let plan = &self.mission.plan;
         let action = &plan.plan.instance(instance).action;
@@ -164,8 +169,9 @@ impl Rest {
         depends
     }
 
-    /// Something has happened at a time at which the plan did not have it: only where its constraints hold all the same,
-    /// with the values that were observed, is what happens still one of the plan's schedules.
+    /// Checks the observed times after an event that the plan did not permit. If the plan's
+    /// constraints cannot be satisfied with the observed values, the execution is no longer one of
+    /// the plan's schedules, and the box does not apply any more.
     pub(super) fn look_at_times(&mut self, now: &Rational) {
         if self.inside.has_left || !self.reads_more_than_facts {
             return;
@@ -175,9 +181,10 @@ impl Rest {
         self.inside.has_left |= network.is_err();
     }
 
-    /// Whether the rest of the plan works without asking, as long as what is under way ends within the box: all that was
-    /// observed lies within it, and there is a schedule for the rest, because what is dispatched keeps to its constraints
-    /// whatever the durations are for which it was made ready, and trusts in luck for none.
+    /// Returns `true` if the remaining plan works without a query of the region, as long as running
+    /// actions end within the box. This holds if all observations lie within the box and a schedule
+    /// for the remaining plan exists. The dispatched network guarantees a schedule for all
+    /// durations it was prepared for, except with [`Promise::Luck`].
     pub(super) fn is_covered(&self, now: &Rational, region: &dyn Region) -> bool {
         let local = self.dispatch.local(now);
         let mut due = self.inside.due_by(&local);
@@ -188,15 +195,16 @@ impl Rest {
             && due.all(|(time, _)| *time == local)
     }
 
-    /// Whether something under way has taken longer than the box has it.
+    /// Returns `true` if a running action has taken longer than the box permits.
     pub(super) fn is_beyond(&self, now: &Rational) -> bool {
         let local = self.dispatch.local(now);
         let first = self.inside.due.first();
         first.is_some_and(|(time, _)| *time < local)
     }
 
-    /// Where actions have taken as long as the box has it: asks about the rest as it is now, and finds out how long those
-    /// may still take to which the new box gives no more room. Why the rest does not work, if it does not.
+    /// Handles actions that have reached their longest durations in the box: queries the region for
+    /// the remaining plan, and computes how long actions may still take that have no slack in the
+    /// new box. Returns the reason if the remaining plan does not work.
     pub(super) fn come_to_limits(
         &mut self,
         now: &Rational,
@@ -208,7 +216,7 @@ impl Rest {
         if then < *now || !was_covered {
             let reason = self.ask(instance, now, region);
             if was_covered && reason.is_some() {
-                // It worked then: there is a limit between.
+                // The plan worked with the earlier end, so there is a limit in between.
                 self.find_limit(instance, &then, region);
                 return reason.filter(|_| self.outlived(now).is_none());
             }
@@ -222,16 +230,16 @@ impl Rest {
         None
     }
 
-    /// The first action under way that will have taken as long as the box has it by then, and when, on the plan's clock,
-    /// of those of which no more is known.
+    /// Returns the first running action without a computed limit that will have reached its longest
+    /// duration in the box by `by`, and the time of that on the plan's clock.
     fn first_due(&self, by: &Rational) -> Option<(Rational, InstanceId)> {
         let local = self.dispatch.local(by);
         let due = self.next_due()?;
         (due.0 <= local).then(|| due.clone())
     }
 
-    /// When the first action under way will have taken as long as the box has it, on the plan's clock, of those of which
-    /// no more is known.
+    /// Returns the time, on the plan's clock, at which the first running action without a computed
+    /// limit reaches its longest duration in the box.
     pub(super) fn next_due(&self) -> Option<&(Rational, InstanceId)> {
         if !self.durations_move_numbers {
             return None;

@@ -1,4 +1,5 @@
-//! How long actions under way may take before the numbers of the rest of the plan no longer do.
+//! Longest durations of running actions for which the numeric conditions of the remaining plan
+//! hold.
 
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{InstanceId, ParametrizedPlan, Valuation};
@@ -9,7 +10,7 @@ use crate::preparation::Region;
 use crate::reason::{About, Cause, Reason};
 
 impl Rest {
-    /// Finds out how long each action under way may take, as far as numbers depend on it.
+    /// Computes how long each running action may take, as far as numbers depend on it.
     pub(super) fn find_limits(&mut self, now: &Rational, region: &mut dyn Region) {
         self.limits.clear();
         if !self.durations_move_numbers || self.dispatch.running().is_empty() {
@@ -22,7 +23,7 @@ impl Rest {
         }
     }
 
-    /// Finds out how long an action under way may take, as far as numbers depend on it.
+    /// Computes how long a running action may take, as far as numbers depend on it.
     pub(super) fn find_limit(
         &mut self,
         instance: InstanceId,
@@ -50,7 +51,7 @@ impl Rest {
         self.limits.insert(instance, limit);
     }
 
-    /// The time at which an action under way reaches its limit, on the plan's clock.
+    /// Returns the time at which a running action reaches its limit, on the plan's clock.
     pub(super) fn limit_of(&self, instance: InstanceId, limit: &Rational) -> Option<Rational> {
         let [start, end] = self.dispatch.nodes_of(instance);
         let start = self.dispatch.happened(start)?;
@@ -58,7 +59,7 @@ impl Rest {
         (!has_ended).then(|| start + limit)
     }
 
-    /// An action under way that has taken longer than the numbers permit.
+    /// Returns the reason if a running action has taken longer than the numeric conditions permit.
     pub(super) fn outlived(&self, now: &Rational) -> Option<Reason> {
         let local = self.dispatch.local(now);
         let mut limits = self.limits.iter();
@@ -79,7 +80,7 @@ impl Rest {
         })
     }
 
-    /// Has what waits wake up when an action reaches its limit.
+    /// Ends a wait when an action reaches its limit.
     pub(super) fn waking(&self, decided: Decided) -> Decided {
         let Decision::Wait { until } = &decided.decision else {
             return decided;
@@ -98,7 +99,7 @@ impl Rest {
         }
     }
 
-    /// ε after the first limit of what is under way.
+    /// Returns the time ε after the first limit of a running action.
     pub(super) fn after_limit(&self) -> Option<Rational> {
         let limits = self.limits.iter();
         let times = limits.filter_map(|(instance, limit)| {
@@ -109,12 +110,13 @@ impl Rest {
     }
 }
 
-/// No duration is looked at that is longer by more than this many times.
+/// Longest extension of a duration that is examined, as a multiple of the duration (of 1 s if it is
+/// shorter).
 const FAR: i64 = 1_000_000;
 
-/// The greatest duration that does, up to `epsilon`; `None` if all up to `most` do, or all that
-/// anybody waits for. `least` does. Where conditions are alternatives there may be others beyond
-/// a gap; what is found ends before the gap.
+/// Returns the greatest duration for which `does` holds, up to `epsilon`. `None` if it holds up to
+/// `most`, or up to the longest duration examined. It must hold for `least`. With disjunctive
+/// conditions there may be a gap; the search ends before the gap.
 fn greatest(
     least: &Rational,
     most: Option<&Rational>,

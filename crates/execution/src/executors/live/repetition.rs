@@ -1,8 +1,8 @@
-//! Plans that are made again after durations have broken them.
+//! Repeated adoption of the same plan after its durations were violated.
 //!
-//! The planner answers with the same plan in the same state, however often the world's durations have broken it. Where
-//! they deviate in the same way each time, its guarantee is of no use: every other attempt after the second is executed
-//! by the plan's orderings, without a guarantee.
+//! In the same state the planner returns the same plan, however often the world's durations have
+//! violated it. If they deviate in the same way each time, its guarantee is useless. So every other
+//! attempt after the second is executed by the plan's orderings, without a guarantee.
 
 use std::collections::BTreeMap;
 
@@ -15,24 +15,24 @@ use crate::executor::{Mission, News, StepId};
 use crate::preparation::Region;
 use crate::reason::Reason;
 
-/// The number of attempts with a guarantee before the first one without.
+/// Number of attempts with a guarantee before the first one without.
 const GUARANTEED: usize = 2;
 
-/// The attempts in a row to execute the same plan.
+/// Consecutive attempts to execute the same plan.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Repetition {
     /// The present plan, with times from its beginning.
     plan: TimeTriggeredPlan,
     /// The number of times that it was abandoned for lack of time, or after an untimely end.
     abandoned: usize,
-    /// `true` if the present attempt was abandoned so.
+    /// `true` if the present attempt was abandoned for one of these reasons.
     is_over: bool,
     /// `true` if an action of the present attempt has ended earlier or later than planned.
     is_untimely: bool,
 }
 
 impl Repetition {
-    /// A plan is adopted.
+    /// Records the adoption of a plan.
     pub(super) fn note_adopted(&mut self, plan: &TimeTriggeredPlan) {
         if !self.is_over || self.plan != *plan {
             *self = Self {
@@ -44,12 +44,13 @@ impl Repetition {
         self.is_untimely = false;
     }
 
-    /// An action has ended earlier or later than planned. Others may fail for that reason.
+    /// Records that an action has ended earlier or later than planned. Other actions may fail for
+    /// that reason.
     pub(super) fn note_untimely_end(&mut self) {
         self.is_untimely = true;
     }
 
-    /// The present plan is abandoned.
+    /// Records that the present plan is abandoned.
     pub(super) fn note_abandoned(&mut self, reason: &Reason) {
         if !self.is_over && (self.is_untimely || promise::lacks_time(reason)) {
             self.abandoned += 1;
@@ -57,7 +58,7 @@ impl Repetition {
         }
     }
 
-    /// Returns whether the present plan is to be executed by its orderings alone.
+    /// Returns `true` if the present plan is to be executed by its orderings alone.
     pub(super) fn is_by_orderings(&self) -> bool {
         self.abandoned
             .checked_sub(GUARANTEED)
@@ -66,7 +67,7 @@ impl Repetition {
 }
 
 impl Rest {
-    /// Returns whether an action that has started ends earlier or later than planned.
+    /// Returns `true` if an action that has started ends earlier or later than planned.
     pub(super) fn has_untimely_end(&self, news: &[News]) -> bool {
         news.iter().any(|news| {
             let News::Ended { step, time, .. } = news else {
@@ -80,8 +81,8 @@ impl Rest {
         })
     }
 
-    /// Begins with a plan by its orderings, as it was planned. Durations that the preparation has chosen in place of the
-    /// planned ones served the guarantee.
+    /// Begins with a plan by its orderings, with the planned durations. Durations that the
+    /// preparation has chosen instead are only useful for the guarantee.
     pub(super) fn by_orderings(
         mission: &Mission,
         region: &mut dyn Region,

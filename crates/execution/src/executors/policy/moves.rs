@@ -1,4 +1,5 @@
-//! The moves of `policy`: when they are weighed, what the plan's is worth, and which is the best.
+//! The moves of `policy`: the times of evaluation, the value of the plan's decision, and the best
+//! move.
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use crate::progression::Progression;
 use crate::reason::{About, Cause, Reason};
 
 impl Policy {
-    /// The period in which moves are weighed: the present one, if it has just begun.
+    /// Returns the period for the next evaluation of moves: the present one, if it has just begun.
     pub(super) fn turn(&self, now: &Rational, period: &Rational) -> Turn {
         let number = count(&(now / period).floor());
         let is_over = now - begins(number, period) > slack(period);
@@ -46,7 +47,7 @@ impl Policy {
         }
     }
 
-    /// What it is worth to do as the plan says.
+    /// Returns the success probability of the decision of the plan's executor.
     pub(super) fn worth(
         &self,
         kept: &Decided,
@@ -67,7 +68,8 @@ impl Policy {
         }
     }
 
-    /// What the plan says, but not past the next moment at which moves are weighed.
+    /// Returns the decision of the plan's executor; a wait ends at the latest when moves are
+    /// evaluated next.
     pub(super) fn until_next(
         &mut self,
         kept: Decided,
@@ -94,7 +96,7 @@ impl Policy {
         }
     }
 
-    /// The best move.
+    /// Returns the decision for the best move.
     pub(super) fn best(
         &mut self,
         moment: &Moment<'_>,
@@ -103,7 +105,7 @@ impl Policy {
         length: &Rational,
     ) -> Decided {
         let now = moment.now;
-        // What should be over may be a moment late, because it was begun a moment late.
+        // An overdue action may be slightly late because it was started slightly late.
         let late = begins(period, length) + slack(length) / Rational::from(2);
         if weighed.is_overdue && *now < late {
             return wait(Some(late), About::EndOfRunning);
@@ -164,7 +166,7 @@ impl Policy {
         }
     }
 
-    /// What may interfere with the last happening waits ε.
+    /// Returns the time until which a start has to wait, so that it is ε after the last happening.
     pub(super) fn apart(&self, moment: &Moment<'_>) -> Option<Rational> {
         let task = moment.belief.task();
         let timed = task.timed().iter().map(|timed| &timed.time);
@@ -174,12 +176,12 @@ impl Policy {
     }
 }
 
-/// When a period begins.
+/// Returns the beginning of a period.
 pub(super) fn begins(period: usize, length: &Rational) -> Rational {
     length * &Rational::from(i64::try_from(period).unwrap_or(i64::MAX))
 }
 
-/// How long after its beginning moves are weighed in a period.
+/// Returns the time after the beginning of a period during which moves are still evaluated.
 fn slack(length: &Rational) -> Rational {
     length / Rational::from(4)
 }

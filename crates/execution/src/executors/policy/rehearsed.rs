@@ -1,4 +1,4 @@
-//! `policy` where there is no table: what to do with a plan is tried out at each occasion.
+//! `policy` without a table: the possible choices are compared by rollouts.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,64 +17,65 @@ use crate::rehearsal::{Rehearsal, Rehearsing, Scene, SeenChange};
 
 use super::moves::wait;
 
-/// The greatest number of consecutive hand-overs of an abandoned plan without any action that succeeds in between. Then
-/// a new plan is requested, and the number of new plans is limited.
+/// Maximum number of hand-overs of an abandoned plan without a successful action in between. Beyond
+/// it, a new plan is requested, and the number of new plans is limited.
 const MOST_HAND_OVERS: usize = 10;
 
-/// So often in the time that a plan takes it is looked ahead, whether or not something happens.
+/// Number of rehearsals within the duration of a plan if nothing happens.
 const LOOKS: i64 = 8;
 
-/// Follows plans as `live` does, or as another executor does better, and gives them up when another
-/// one is likelier to succeed: as often as it reaches the goal in samples of the world.
+/// Executor that follows plans as `live` does, or hands them over to an executor that does better.
+/// It abandons a plan if another one is more likely to succeed. Success probabilities are the
+/// shares of samples of the world in which the goal is reached.
 ///
-/// Steps have numbers of their own for whoever executes: those of `live` are the run's, those of
-/// others are translated.
+/// The step numbers of `live` are those of the run; those of other executors are translated.
 pub(super) struct Rehearsed {
     rehearsal: Box<dyn Rehearsal>,
-    /// `live`, who takes up each new plan.
+    /// `live`, which adopts each new plan.
     keeper: Box<dyn Executor>,
-    /// Who has taken over from it.
+    /// The executor that has taken over the plan.
     other: Option<Box<dyn Executor>>,
-    /// By the run's number: what was ordered, or went on when the plan was taken up, and has not
-    /// ended.
+    /// Steps that have not ended, by the run's number: commanded ones, and those that were running
+    /// when the plan was adopted.
     steps: BTreeMap<StepId, Commanded>,
-    /// The run's next number.
+    /// The next step number of the run.
     next_step: u32,
-    /// The steps of the plan that were not begun, by the world's clock.
+    /// The steps of the plan that have not begun, on the world's clock.
     left: Vec<Step>,
     /// The number of hand-overs of an abandoned plan since an action last succeeded.
     hand_overs: usize,
-    /// The facts that may change by themselves, as they were last.
+    /// The watched facts with their last truth.
     watched: Option<BTreeMap<FactId, bool>>,
     seen: Vec<SeenChange>,
-    /// How many plans were taken up.
+    /// Number of plans adopted.
     plans: usize,
-    /// What whoever executes is still to be told, because nothing was to be begun.
+    /// News that the present executor has not received, because the decision was to wait.
     untold: Vec<News>,
-    /// Whether the plan is a new one.
+    /// `true` if the plan is new.
     is_new: bool,
-    /// Whether there was an occasion that could not be taken.
+    /// `true` if a rehearsal is due that had to be postponed.
     is_owed: bool,
-    /// Whether nothing would come out otherwise than it did: all was tried out when nothing was under
-    /// way, or nothing had to be, and nothing was learnt of the world since.
+    /// `true` if a rehearsal would have the same result as the last one: that one took place while
+    /// no action was running, or found no need for alternatives, and nothing has been learnt about
+    /// the world since.
     is_settled: bool,
-    /// When it was tried out last, and after how long to do so again.
+    /// The time of the last rehearsal, and the time between rehearsals.
     looked: Option<Rational>,
     period: Rational,
 }
 
-/// A step.
+/// A step that has not ended.
 #[derive(Clone, Debug)]
 struct Commanded {
-    /// The number by which whoever executes knows it; `None` if it does not.
+    /// The step number of the present executor; `None` if that executor does not know the step.
     inner: Option<StepId>,
     name: String,
     /// The ticket, if it is known.
     ticket: Option<Ticket>,
-    /// The step of the plan, to be done again if it fails; `None` if it was under way when the plan
-    /// was taken up.
+    /// The plan's step, which is repeated if it fails; `None` if it was running when the plan was
+    /// adopted.
     step: Option<Step>,
-    /// When it has started.
+    /// The time of its start.
     started: Option<Rational>,
     is_let_go: bool,
 }
@@ -108,7 +109,7 @@ impl Rehearsed {
         }
     }
 
-    /// The news as whoever executes is told them.
+    /// Processes the news. Returns them with the step numbers of the present executor.
     fn learn(&mut self, moment: &Moment<'_>) -> Vec<News> {
         self.watch(moment);
         if moment.news.iter().any(|news| self.tells(news)) {
@@ -120,7 +121,7 @@ impl Rehearsed {
                 News::Started { step, .. } | News::Ended { step, .. } => {
                     let inner = match self.steps.get(step) {
                         Some(commanded) => commanded.inner,
-                        // Of a step before the present plan, as the run tells `live`.
+                        // A step of an earlier plan. `live` receives it unchanged.
                         None => self.other.is_none().then_some(*step),
                     };
                     if let Some(inner) = inner {
@@ -134,14 +135,14 @@ impl Rehearsed {
         told
     }
 
-    /// Whether anything is learnt from that.
+    /// Returns `true` if the news item carries information about the world.
     fn tells(&self, news: &News) -> bool {
         let of = |step| {
             let step: Option<&Commanded> = self.steps.get(step);
             step.map(|step| self.rehearsal.tells(&step.name))
         };
         match news {
-            // When it starts is up to chance as well where its end is.
+            // If the time of the end is random, so is the time of the start.
             News::Started { step, .. } => of(step).is_none_or(|tells| tells.by_lasting),
             News::Ended { step, ending, .. } => {
                 *ending != Ending::Succeeded || of(step).is_none_or(|tells| tells.by_ending)
@@ -152,7 +153,7 @@ impl Rehearsed {
         }
     }
 
-    /// Whether time that passes tells anything.
+    /// Returns `true` if the passage of time carries information about the world.
     fn is_telling(&self) -> bool {
         let mut under_way = self.steps.values();
         self.rehearsal.tells_by_itself()
@@ -184,7 +185,7 @@ impl Rehearsed {
         }
     }
 
-    /// Takes note of changes of the facts that are watched.
+    /// Records changes of the watched facts.
     fn watch(&mut self, moment: &Moment<'_>) {
         let task = moment.belief.task();
         let rehearsal = &self.rehearsal;
@@ -207,12 +208,13 @@ impl Rehearsed {
         }
     }
 
-    /// Whether it is to be tried out what does best. `kept` is what whoever executes says.
+    /// Returns `true` if a rehearsal is to be made now. `kept` is the decision of the present
+    /// executor.
     fn is_occasion(&mut self, moment: &Moment<'_>, kept: &Decided) -> bool {
         let may_matter = |news: &News| !matches!(news, News::Started { .. });
         let is_due = |looked: &Rational| *moment.now >= looked + &self.period;
         let is_due = self.looked.as_ref().is_none_or(is_due);
-        // What was tried out in the same samples of the same world would come out the same.
+        // A rehearsal with the same samples of an unchanged world has the same result.
         let may_differ = !self.is_settled || is_due && self.is_telling();
         let is_occasion = self.is_owed
             || self.is_new
@@ -225,7 +227,7 @@ impl Rehearsed {
         is_occasion && !is_busy && !is_over
     }
 
-    /// The tickets of the steps that whoever executes knows of; its numbers.
+    /// Returns the tickets of the running steps, by the step numbers of the present executor.
     fn running(&mut self, belief: &Progression) -> BTreeMap<StepId, Ticket> {
         for commanded in self.steps.values_mut() {
             let mut running = belief.running().iter();
@@ -241,7 +243,8 @@ impl Rehearsed {
             .collect()
     }
 
-    /// What to do, tried out. `before` is whoever executes, as it was before it decided `kept`.
+    /// Returns the decision that does best in a rehearsal. `before` is the present executor before
+    /// it decided `kept`.
     fn rehearse(
         &mut self,
         moment: &Moment<'_>,
@@ -306,7 +309,8 @@ impl Rehearsed {
         }
     }
 
-    /// Another executor takes up what is left; what it says.
+    /// Hands the remaining plan over to another executor. Returns its decision, or `None` if it
+    /// cannot adopt the plan.
     fn hand_over(
         &mut self,
         moment: &Moment<'_>,
@@ -327,8 +331,8 @@ impl Rehearsed {
         Some(self.outward(decided, moment.now))
     }
 
-    /// A decision of whoever executes, in the run's numbers; it waits no longer than until it is
-    /// looked ahead again.
+    /// Translates a decision of the present executor to the run's step numbers. A wait ends at the
+    /// latest when the next rehearsal is due.
     fn outward(&mut self, mut decided: Decided, now: &Rational) -> Decided {
         match &mut decided.decision {
             Decision::Start(orders) => {

@@ -1,4 +1,4 @@
-//! Whether a plan that was made for where another one was expected to lead works from where it did.
+//! Fitting of a finished plan from the expected situation to the real one.
 
 use std::collections::BTreeSet;
 
@@ -12,22 +12,23 @@ use super::Search;
 use crate::event::Ticket;
 use crate::executor::StepId;
 
-/// A plan, from where it begins, with the tickets of what is running there.
+/// A plan, its initial situation, and the tickets of the actions that are running there.
 pub(in crate::run) type Begun = (TimeTriggeredPlan, Situation, Vec<Ticket>);
 
 impl Run<'_> {
-    /// Which start the step of the plan before was.
+    /// Returns the ticket of a step of the earlier plan.
     fn start_of(&self, search: &Search, step: StepId) -> Option<Ticket> {
         let left_behind = search.left_behind.get(&step).copied();
         left_behind.or_else(|| self.account.ticket(step))
     }
 
-    /// The plan from here: without what has been done of it, and as much later as it is late.
+    /// Returns the plan from the present situation: without the executed steps, and shifted by its
+    /// delay.
     pub(super) fn fitted(&self, search: &Search, plan: &TimeTriggeredPlan) -> Option<Begun> {
         let first = search.expected.first().map(|it| it.ticket);
         let mut done = BTreeSet::new();
         let mut left: Vec<Step> = Vec::new();
-        // What was expected to be under way, and is not.
+        // Actions that were expected to be running, and are not.
         for (ticket, step) in search.running.iter().zip(&plan.steps) {
             let is_expected = first.is_some_and(|first| *ticket >= first);
             let expected = search.expected.iter().find(|it| it.ticket == *ticket);
@@ -43,7 +44,7 @@ impl Run<'_> {
                 }
             }
         }
-        // What was expected to be over.
+        // Actions that were expected to have ended.
         let is_over = |it: &&Expected| !search.running.contains(&it.ticket);
         for it in search.expected.iter().filter(is_over) {
             match self.start_of(search, it.step) {
@@ -53,7 +54,7 @@ impl Run<'_> {
                 None => left.push(it.as_step(it.duration.clone())),
             }
         }
-        // What was begun besides may be what the plan has, too.
+        // Other actions that were started may also be steps of the plan.
         let before = search.left_behind.values();
         let before = before.filter_map(|it| Some((*it, self.account.get(*it)?)));
         let besides = self.account.of_plan().chain(before);
@@ -77,7 +78,7 @@ impl Run<'_> {
         if let Some(rest) = rest_of(&search.task, &situation, left.clone()) {
             return Some((rest, situation, running));
         }
-        // What takes longer than was expected may be waited for.
+        // The plan may wait for actions that take longer than expected.
         let ends = situation.running.iter();
         let ends = ends.filter_map(|it| Some(&it.start + it.duration.lower.value()?));
         let late = ends.max()? - &search.situation.time + self.task.epsilon();

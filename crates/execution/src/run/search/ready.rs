@@ -1,9 +1,8 @@
-//! Plans that are made ready beside the run: what goes on meanwhile, and how they take over.
+//! Background preparation of plans: execution meanwhile, and the switch to the new plan.
 //!
-//! A plan is made ready from a moment, with what is under way then. It takes over as if it had been taken
-//! up at that moment, and its executor hears at once what has begun and ended since. So the executor's own
-//! check of times and amounts decides whether the plan can bear what has happened; nothing else is taken
-//! for granted.
+//! A plan is prepared for a moment, with the actions running then. It takes over as if it had been
+//! adopted at that moment, and its executor is notified at once of all starts and ends since. So
+//! the executor's own checks of times and amounts decide whether the plan is still feasible.
 
 use std::sync::Arc;
 
@@ -23,33 +22,33 @@ use crate::record::Entry;
 use crate::request::RequestId;
 use crate::run::intake::Remark;
 
-/// So many times a plan is made to fit again, and made ready again, because something unexpected was
-/// reported meanwhile. After that, its executor is told: a run to which something happens all the time
-/// does not wait for ever.
+/// Number of times that a plan is fitted and prepared again because of unexpected reports. After
+/// that, its executor is notified of them, so that a run with frequent unexpected events does not
+/// wait forever.
 const MOST_TRIES: usize = 2;
 
-/// A plan that is being made ready.
+/// Background preparation of a plan.
 pub(super) struct Readying {
     request: RequestId,
-    /// The prepared plan, until it is taken in.
+    /// The prepared plan, until it is processed.
     answer: Option<Result<Mission, PrepareError>>,
     plan: TimeTriggeredPlan,
-    /// From where.
+    /// The situation from which it starts.
     situation: Situation,
-    /// What is under way there.
+    /// The actions running there.
     running: Vec<Ticket>,
-    /// How many actions had been started until then: those after them belong to the plan.
+    /// Number of actions started until then. Later ones belong to the plan.
     started: usize,
-    /// Since when it is ready.
+    /// The time at which it was ready, if it is.
     since: Option<Rational>,
-    /// Whether something has happened since that nobody expected.
+    /// `true` if an unexpected event has happened since.
     disagrees: bool,
-    /// Whether it was made to fit.
+    /// `true` if the plan was fitted to the present situation.
     is_fitted: bool,
 }
 
 impl Readying {
-    /// Returns whether the prepared plan has arrived, and is not noted yet.
+    /// Returns `true` if the prepared plan has arrived, and is not recorded yet.
     pub(super) fn has_arrived(&self) -> bool {
         self.answer.is_some() && self.since.is_none()
     }
@@ -79,7 +78,7 @@ impl Search {
 }
 
 impl Run<'_> {
-    /// Begins to make a plan ready from there.
+    /// Begins to prepare a fitted plan.
     pub(super) fn make_ready(&mut self, mut search: Search, fit: Begun, is_fitted: bool) {
         let (plan, situation, running) = fit;
         let request = self.request_preparation(&search.task, &plan, &situation, &running);
@@ -98,7 +97,7 @@ impl Run<'_> {
         self.search = Some(search);
     }
 
-    /// The plan is ready.
+    /// Records that the plan is prepared.
     pub(in crate::run) fn note_plan_ready(&mut self) -> Remark {
         let search = self.search.as_mut();
         match search.and_then(|search| search.readying.as_mut()) {
@@ -110,7 +109,7 @@ impl Run<'_> {
         }
     }
 
-    /// Something has happened with which the plan that is being made ready does not reckon.
+    /// Records an event that the plan being prepared does not account for.
     pub(in crate::run) fn note_disagreement(&mut self) {
         self.note_unforeseen();
         let search = self.search.as_mut();
@@ -119,26 +118,26 @@ impl Run<'_> {
         }
     }
 
-    /// Amounts were measured, of which the executor of the next plan is told no more than what became of
-    /// them.
+    /// Records that amounts were measured. The executor of the next plan does not receive them,
+    /// only the resulting values.
     pub(in crate::run) fn note_measured(&mut self, measured: &[Measured]) {
         if !measured.is_empty() {
             self.note_disagreement();
         }
     }
 
-    /// When something about a plan that is made ready is to be decided, whatever happens.
+    /// Returns the time of the next decision about the preparation if no event comes before.
     pub(super) fn next_of_readying(&self, readying: &Readying) -> Rational {
         match &readying.since {
             Some(since) => (since + Rational::from(WORD)).max(&self.now + self.task.epsilon()),
             None if self.now < readying.situation.time => readying.situation.time.clone(),
-            // Whoever makes it ready says so.
+            // The preparer reports when it is finished.
             None => self.settings.time_limit.clone(),
         }
     }
 
-    /// Whether these can be started while a plan is made ready: it has them, too, and nothing that it does
-    /// before them touches what they touch.
+    /// Returns `true` if these actions can be started while a plan is being prepared: the plan also
+    /// has them, and no earlier step of it interferes with them.
     pub(in crate::run) fn may_start(&self, orders: &[Order]) -> bool {
         let readying = self.search.as_ref().and_then(|it| it.readying.as_ref());
         let Some(readying) = readying else {
@@ -163,7 +162,7 @@ impl Run<'_> {
         })
     }
 
-    /// Sees to a plan that is made ready; whether the executor is not to be asked.
+    /// Continues a preparation. Returns `true` if the executor is not to be asked.
     pub(super) fn tend_readying(&mut self) -> Result<bool, Stop> {
         let Some(search) = &self.search else {
             return Ok(false);
@@ -173,7 +172,7 @@ impl Run<'_> {
         };
         let Some(since) = &readying.since else {
             let goes_on = search.course != Goes::UnderWay;
-            // Nothing of the plan begins before the time from which it is.
+            // No step of the plan begins before its start time.
             if goes_on && self.now >= readying.situation.time {
                 return Ok(false);
             }
@@ -193,14 +192,14 @@ impl Run<'_> {
         Ok(true)
     }
 
-    /// Whether something that was begun meanwhile has not said that it has started.
+    /// Returns `true` if an action was started meanwhile and its start has not been reported.
     fn is_silent(&self, readying: &Readying) -> bool {
         let has_ended = |it: Ticket| self.account.get(it).is_none_or(|it| it.ended.is_some());
         let mut begun = begun_since(readying, self.account.started());
         begun.any(|it| !has_ended(it) && !self.belief.running().contains_key(&it))
     }
 
-    /// A plan that is ready takes over, if what has happened meanwhile was to be expected.
+    /// Switches to a prepared plan if the events meanwhile were as expected.
     fn take_over_ready(&mut self) -> Result<(), Stop> {
         let Some(mut search) = self.search.take() else {
             return Ok(());
@@ -243,7 +242,7 @@ impl Run<'_> {
             }
         } else if !agrees && (search.tries <= MOST_TRIES || !begun.is_empty()) {
             search = match self.fit_again(search)? {
-                // Its executor is told.
+                // Its executor is notified instead.
                 Some(search) if begun.is_empty() => search,
                 Some(search) => return self.search_again(&search.reason),
                 None => return Ok(()),
@@ -271,8 +270,8 @@ impl Run<'_> {
         self.begin_with(course, &search.goals, &mission)
     }
 
-    /// What has happened while a plan was made ready was not to be expected: it is made to fit again, or
-    /// another one is made. If its executor is to be told instead, the search is given back.
+    /// Fits the plan again after unexpected events during its preparation, or requests another one.
+    /// Returns the search if the executor of the plan is to be notified instead.
     fn fit_again(&mut self, mut search: Search) -> Result<Option<Search>, Stop> {
         if let Some(turn) = search.kept_for.take() {
             self.keep_again(turn)?;
@@ -299,7 +298,7 @@ impl Run<'_> {
         Ok(Some(search))
     }
 
-    /// Makes the rest of the present plan ready for other goals.
+    /// Prepares the remaining plan for other goals.
     pub(in crate::run) fn make_rest_ready(&mut self, turn: Turn, rest: Begun) {
         let may_go_on = !self.lost.plan
             && self.settings.running == super::super::RunningRule::Keep
@@ -333,7 +332,7 @@ impl Run<'_> {
         }
     }
 
-    /// The rest of the plan is outdated: it is looked at again, or another plan is made.
+    /// Fits the remaining plan again because it is outdated, or makes another plan.
     fn keep_again(&mut self, turn: Turn) -> Result<(), Stop> {
         self.lost.kept += 1;
         if self.lost.kept > MOST_TRIES {
@@ -343,7 +342,8 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// What is begun of the present plan belongs to no step of it any more; what it has changed is told.
+    /// Detaches the started actions from the steps of the present plan. Their effects are reported
+    /// as news.
     pub(in crate::run) fn forget_steps(&mut self) {
         for it in std::mem::take(&mut self.news) {
             let (step, is_end) = match &it {
@@ -367,12 +367,12 @@ impl Run<'_> {
     }
 }
 
-/// What was started since it was begun.
+/// Returns the starts since the preparation began.
 fn begun_since(readying: &Readying, started: usize) -> impl Iterator<Item = Ticket> + use<> {
     (readying.started..started).map(|number| Ticket(number as u64))
 }
 
-/// Whether it may matter which of two actions comes first.
+/// Returns `true` if the order of two actions may matter.
 fn touch(task: &Task, one: &Action, other: &Action) -> bool {
     let prints = |action: &Action| {
         let mut all = vec![

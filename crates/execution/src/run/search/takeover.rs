@@ -1,4 +1,4 @@
-//! How a plan that is there takes over.
+//! Switch to a finished plan.
 
 use std::sync::Arc;
 
@@ -14,9 +14,9 @@ use super::{Goes, Search, WORD};
 use crate::executor::News;
 
 impl Run<'_> {
-    /// A plan takes over where nothing was started since it was asked for. Where things stand otherwise
-    /// than expected, it begins from here if it works from here; else what has happened is told to the
-    /// executor, which finds whether it can bear that.
+    /// Switches to a plan if nothing was started since the plan was requested. If the situation is
+    /// not as expected, the plan is fitted to the real one, if possible. Otherwise the events are
+    /// reported to the executor, which decides whether the plan is still feasible.
     pub(super) fn take_over_from_nothing(
         &mut self,
         search: Search,
@@ -31,7 +31,7 @@ impl Run<'_> {
             && let Some(fit) = self.fitted(&search, plan)
         {
             if self.settings.readies_aside {
-                // All that has happened is in it.
+                // The fitted plan includes all events so far.
                 self.news.clear();
                 self.make_ready(search, fit, true);
                 return Ok(());
@@ -46,7 +46,7 @@ impl Run<'_> {
         self.take_over_as_made(search, plan)
     }
 
-    /// The same with the plan as it was made.
+    /// Switches to the plan as it was made.
     pub(in crate::run) fn take_over_as_made(
         &mut self,
         search: Search,
@@ -58,7 +58,8 @@ impl Run<'_> {
         let is_known = |ticket| search.running.contains(&ticket);
         let knows_all = self.account.open_tickets().all(is_known);
         if !is_as_expected && (!knows_all || !search.expected.is_empty()) {
-            // It continues what was never started, or knows nothing of what still goes on.
+            // The plan continues actions that were never started, or does not contain all running
+            // actions.
             return self.search_again(&search.reason);
         }
         if self.settings.readies_aside {
@@ -76,16 +77,16 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Has the executor of the next plan told what has happened. Steps of another plan mean nothing to
-    /// it.
+    /// Reports the events until now to the executor of the next plan, without the starts and ends
+    /// of steps of other plans.
     pub(super) fn tell_what_happened(&mut self) {
         let mut surprises = std::mem::take(&mut self.news);
         surprises.retain(|it| !matches!(it, News::Started { .. } | News::Ended { .. }));
         self.agenda.push(super::Todo::Tell(surprises));
     }
 
-    /// A plan that is there takes over from the present one when it is time for that, or is made ready;
-    /// whether the executor is not to be asked.
+    /// Switches to a finished plan when it is due, or prepares it. Returns `true` if the executor
+    /// is not to be asked.
     pub(super) fn take_over_if_due(&mut self) -> Result<bool, Stop> {
         let Some(search) = &self.search else {
             return Ok(false);
@@ -94,11 +95,11 @@ impl Run<'_> {
             return Ok(false);
         };
         let is_begun = |it: &Expected| self.account.ticket(it.step).is_some();
-        // What is yet to begin is part of a plan that is made ready meanwhile.
+        // With background preparation, steps that have not begun are part of the prepared plan.
         let is_due = self.settings.readies_aside
             || self.now >= search.situation.time
             || search.expected.iter().all(is_begun);
-        // What was told to start and has not said that it has, cannot be planned with.
+        // A plan cannot include commanded actions whose start has not been reported.
         let is_told = |ticket| self.belief.running().contains_key(&ticket);
         let waits_for_word =
             !self.account.open_tickets().all(is_told) && self.now < since + Rational::from(WORD);
@@ -113,7 +114,7 @@ impl Run<'_> {
         Ok(true)
     }
 
-    /// The plan takes over as it was made to fit, or is made ready; if it does not fit, it is outdated.
+    /// Switches to the fitted plan, or prepares it. Without a fit, the plan is outdated.
     fn take_over_as(&mut self, search: Search, fit: Option<Begun>) -> Result<(), Stop> {
         if let Some(fit) = fit {
             if self.settings.readies_aside {

@@ -1,12 +1,12 @@
-//! Whether the amounts of a world file are about anything that actions do.
+//! Check that the amounts of a world file match effects of actions.
 
 use elbowroom_model::Problem;
 use elbowroom_model::problem::{Body, Change, Effect, FunctionId, Schema};
 
 use super::Amount;
 
-/// Why no action that is meant changes, at its start or end, a fluent that is meant; `None` if one
-/// does. What is looked at are names: objects cannot be known before there are actions.
+/// Returns the reason if no matching action changes a matching fluent at its start or end; `None`
+/// if one does. Only names are compared, because objects are unknown before grounding.
 pub(super) fn is_in_vain(amount: &Amount, problem: &Problem) -> Option<String> {
     let is_meant = |function: FunctionId| {
         let function = &problem.functions[function.index()];

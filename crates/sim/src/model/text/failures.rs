@@ -1,4 +1,4 @@
-//! Failures of actions, and what they leave behind.
+//! Failures of actions, and their outcomes.
 
 use elbowroom_model::problem::{Schema, TypeId, Variable};
 use elbowroom_num::Rational;
@@ -10,7 +10,7 @@ use crate::model::outcome::Word;
 use crate::model::{Becoming, Failing, Failure, Outcome, OutcomeChange, Template};
 use crate::pattern::{ActionPattern, Names};
 
-/// How a number changes a fluent.
+/// Operation of a number on a fluent.
 #[derive(Clone, Copy)]
 enum How {
     Assign,
@@ -48,7 +48,7 @@ impl Reader<'_> {
         for outcome in given.outcome.iter().flat_map(Spanned::get_ref) {
             let found = self.outcome(outcome, &action)?;
             sum += found.probability;
-            // Tenths do not add up to 1 in binary.
+            // Decimal fractions do not add up to exactly 1 in binary.
             if sum > 1.0 + 1e-9 {
                 let message = format!(
                     "with this outcome the probabilities add up to {sum}: they are shares of the \
@@ -130,7 +130,7 @@ impl Reader<'_> {
         })
     }
 
-    /// A fact or a fluent with objects and parameters of the action: `(at ?box table)`.
+    /// Reads a fact or a fluent with objects and parameters of the action: `(at ?box table)`.
     fn template(
         &self,
         text: &Spanned<String>,
@@ -149,7 +149,7 @@ impl Reader<'_> {
             return wrong("name one fact or fluent, with its objects".to_owned());
         }
         let words: Vec<String> = words.collect();
-        // Whether there is such a predicate or function, and how many objects it has.
+        // Checks that the predicate or function exists, with that number of arguments.
         let blanks = vec!["_"; words.len()].join(" ");
         let pattern = format!("({name} {blanks})");
         ActionPattern::read(&pattern, names, self.problem)
@@ -216,7 +216,8 @@ impl Reader<'_> {
         schemas.find(|schema| schema.name.eq_ignore_ascii_case(name))
     }
 
-    /// The place of a parameter among those of an action, if some object fits both it and `types`.
+    /// Returns the index of a parameter of an action, if some object fits both the parameter and
+    /// `types`.
     fn argument(&self, word: &str, schema: &Schema, types: &[TypeId]) -> Result<usize, String> {
         let mut parameters = schema.parameters.iter();
         let place = parameters.position(|parameter| parameter.name.eq_ignore_ascii_case(word));
@@ -237,7 +238,7 @@ impl Reader<'_> {
             ));
         };
         let mut objects = self.problem.objects_of(&schema.parameters[place].types);
-        // Where there are no objects at all, nothing is started either.
+        // Without any objects, no action is started.
         let fits = objects.any(|object| self.problem.has_type(object, types));
         if fits
             || self

@@ -1,4 +1,4 @@
-//! Rates at which facts change by themselves.
+//! Rates of spontaneous changes of facts.
 
 use elbowroom_num::Rational;
 use elbowroom_text::Span;
@@ -51,7 +51,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Whether the facts of a predicate are the world's to change, and not too many.
+    /// Checks that the facts of a predicate can change by themselves, and are not too many.
     fn can_have_rates(&self, name: &str, at: &Span) -> Read<()> {
         let Some(predicate) = self.problem.predicate(name) else {
             return Ok(());

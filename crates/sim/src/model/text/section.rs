@@ -1,4 +1,4 @@
-//! World files as they stand, and what may stand where.
+//! Structure of world files, and the keys that each section permits.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -6,7 +6,7 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::Spanned;
 
-/// The file as it stands.
+/// The contents of a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
@@ -58,10 +58,10 @@ pub(super) struct Section {
     pub(super) contradicted: Option<Spanned<f64>>,
 }
 
-/// Names of facts or fluents where they stand, and numbers.
+/// Names of facts or fluents with their positions, and numbers.
 pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<f64>>;
 
-/// What a failure may leave behind.
+/// An outcome of a failure.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct OutcomeSection {
@@ -75,7 +75,7 @@ pub(super) struct OutcomeSection {
     pub(super) reported: Option<Spanned<bool>>,
 }
 
-/// The numbers of a distribution.
+/// The parameters of a distribution.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Shape {
@@ -88,7 +88,7 @@ pub(super) struct Shape {
     pub(super) maximum: Option<Spanned<f64>>,
 }
 
-/// The keys that say how a quantity is distributed: the distributions, then their limits.
+/// The keys of distributions, then those of their limits.
 const DISTRIBUTION: &[&str] = &[
     "constant",
     "normal",
@@ -101,7 +101,7 @@ const DISTRIBUTION: &[&str] = &[
 ];
 
 impl Section {
-    /// Everything that stands in it, and where.
+    /// Returns all keys that are present, with their positions.
     fn given(&self) -> Vec<(&'static str, Range<usize>)> {
         fn at<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
@@ -144,8 +144,8 @@ impl Section {
             .collect()
     }
 
-    /// The first thing in it, if any, that is neither of `own` nor, where it has one, of its
-    /// distribution: where it stands, and what to do.
+    /// Returns the first superfluous key, if any, with its position and a message. Permitted are
+    /// `own` and, if `is_distributed`, the keys of distributions.
     pub(super) fn excess(
         &self,
         name: &str,
@@ -162,13 +162,13 @@ impl Section {
         Some((span, message))
     }
 
-    /// Whether it says how something is distributed.
+    /// Returns `true` if it contains a distribution.
     pub(super) fn is_distributed(&self) -> bool {
         let mut given = self.given().into_iter();
         given.any(|(key, _)| DISTRIBUTION.contains(&key))
     }
 
-    /// Where its distribution stands.
+    /// Returns the position of its distribution.
     pub(super) fn place(&self) -> Option<Range<usize>> {
         let is_limit = |key: &str| key == "minimum" || key == "maximum";
         let mut given = self.given().into_iter();

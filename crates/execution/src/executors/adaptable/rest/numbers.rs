@@ -1,7 +1,7 @@
-//! Starts whose conditions on numbers or duration bounds do not hold.
+//! Starts with unmet numeric conditions or duration bounds.
 //!
-//! The search for orders takes conditions for granted if their numbers depend on times. They are read here before each
-//! start, in the believed state.
+//! The search for orders assumes that conditions hold if their numbers depend on times. They are
+//! evaluated here before each start, in the believed state.
 
 use elbowroom_model::ground::Condition;
 use elbowroom_num::Rational;
@@ -13,7 +13,7 @@ use crate::dispatch::{in_words, replan};
 use crate::executor::{Decided, Moment};
 use crate::reason::{About, Cause, Reason};
 
-/// A start whose conditions on numbers or duration bounds do not hold.
+/// A start with unmet numeric conditions or duration bounds.
 pub(super) struct Lack {
     instance: InstanceId,
     condition: Condition,
@@ -23,7 +23,8 @@ pub(super) struct Lack {
 }
 
 impl Rest {
-    /// Returns what is lacking if this happening is a start that is due; `None` if it can start as far as numbers go.
+    /// Returns the unmet conditions if this happening is a start that is due; `None` if the numbers
+    /// allow the start.
     pub(super) fn lack(
         &self,
         next: &NextHappening,
@@ -47,7 +48,8 @@ impl Rest {
         })
     }
 
-    /// Returns `true` if another order is to be searched for: no waiting changes what is lacking.
+    /// Returns `true` if the conditions will not become true by waiting, so that another order is
+    /// needed.
     pub(super) fn is_lacking_for_good(
         &self,
         next: &NextHappening,
@@ -58,7 +60,8 @@ impl Rest {
         lack.is_some_and(|lack| !lack.is_moving)
     }
 
-    /// Waits for numbers that change with time, or for what is running; if nothing is, the plan is abandoned.
+    /// Waits for numbers that change with time, or for the end of a running action. If no action is
+    /// running, the plan is abandoned.
     pub(super) fn await_numbers(
         &mut self,
         lack: &Lack,
@@ -71,7 +74,7 @@ impl Rest {
         let unmet = belief.unmet_on_arrival(&lack.condition, Some(&lack.duration));
         let about = About::Conditions(in_words(belief, &unmet));
         if self.chooser.is_table() || !self.awaits_ends(now) {
-            // A table knows no numbers: from now on, orders are executed.
+            // A table does not contain numbers, so orders are executed from now on.
             self.is_table_circling |= self.chooser.is_table();
             let reason = Reason::new(Cause::Condition).of(name).about(about);
             return replan(reason.since(moment.now.clone()));
