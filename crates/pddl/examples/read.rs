@@ -1,4 +1,4 @@
-//! Reads a domain, a problem and perhaps a plan, and prints what is found wrong with them.
+//! Reads a domain, a problem and optionally a plan, and prints the diagnostics.
 //!
 //! `cargo run -p elbowroom-pddl --example read DOMAIN PROBLEM [PLAN]`
 

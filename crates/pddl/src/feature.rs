@@ -1,4 +1,4 @@
-//! Features of PDDL that are understood but not executed.
+//! Features of PDDL that are recognized but not supported.
 
 use elbowroom_text::{Diagnostic, Diagnostics};
 
@@ -15,14 +15,14 @@ pub enum Feature {
     MixedTimes,
     /// `:modules` with external code
     Modules,
-    /// Sections that say nothing about validity, such as `:length`
+    /// Sections without influence on validity, such as `:length`
     OtherSections,
-    /// Requirement flags that are not known
+    /// Unknown requirement flags
     UnknownRequirements,
 }
 
 impl Feature {
-    /// All of them, in the order in which documents list them.
+    /// All features, in the order of the documentation.
     pub const ALL: &[Self] = &[
         Self::ObjectFluents,
         Self::NonlinearTime,
@@ -33,7 +33,7 @@ impl Feature {
         Self::UnknownRequirements,
     ];
 
-    /// The name of the feature.
+    /// Returns the name of the feature.
     pub fn name(self) -> &'static str {
         match self {
             Self::ObjectFluents => "object fluents",
@@ -46,7 +46,7 @@ impl Feature {
         }
     }
 
-    /// Its identifier: the [`code`](Diagnostic::code) of diagnostics about it.
+    /// Returns its identifier: the [`code`](Diagnostic::code) of diagnostics about it.
     pub fn code(self) -> &'static str {
         match self {
             Self::ObjectFluents => "object-fluents",
@@ -59,14 +59,15 @@ impl Feature {
         }
     }
 
-    /// The feature that a diagnostic refuses or ignores; `None` for a mistake in the text.
+    /// Returns the feature that a diagnostic refuses or ignores, or `None` for a mistake in the
+    /// text.
     pub fn of(diagnostic: &Diagnostic) -> Option<Self> {
         let code = diagnostic.code?;
         let mut all = Self::ALL.iter().copied();
         all.find(|feature| feature.code() == code)
     }
 
-    /// Its syntax, and how it is treated.
+    /// Returns a description of its syntax and its treatment.
     pub fn summary(self) -> &'static str {
         match self {
             Self::ObjectFluents => {
@@ -87,7 +88,8 @@ impl Feature {
     }
 }
 
-/// Whether the texts are right as far as we can tell, and only use what is not executed.
+/// Returns `true` if all errors are unsupported features, that is, the texts contain no known
+/// mistakes.
 pub fn is_unsupported(diagnostics: &Diagnostics) -> bool {
     let mut errors = diagnostics.errors();
     errors.all(|error| Feature::of(error).is_some())

@@ -1,21 +1,21 @@
-//! PDDL and plan text to the model, and back.
+//! Conversion of PDDL and plan text to the model, and back.
 //!
-//! In: texts, as [`Source`]s. Out: a [`Problem`](elbowroom_model::Problem), a
-//! [`TimeTriggeredPlan`](elbowroom_model::TimeTriggeredPlan), and [`Diagnostic`]s that say with
-//! line, column and excerpt what is wrong and what was expected.
+//! The inputs are texts, as [`Source`]s. The outputs are a [`Problem`](elbowroom_model::Problem), a
+//! [`TimeTriggeredPlan`](elbowroom_model::TimeTriggeredPlan), and [`Diagnostic`]s that report
+//! errors and expectations with line, column and excerpt.
 //!
-//! The way through the crate:
+//! Structure of the crate:
 //!
-//! 1. `syntax`: text to words to nested lists, each with its place. Deep nesting is refused
-//!    here, so that everything after may recurse.
-//! 2. `lower`: lists to the model, names resolved. One file for each part of the language.
-//!    After a mistake, reading goes on and reports the next one.
-//! 3. `plan_text`: what planners print, to a plan and back.
+//! 1. `syntax`: text to words to nested lists, each with its position. Deep nesting is refused
+//!    here, so that all later steps may recurse.
+//! 2. `lower`: lists to the model, with names resolved. One file for each part of the language.
+//!    After a mistake, the reader continues and reports further mistakes.
+//! 3. `plan_text`: output of planners to a plan, and back.
 //! 4. `problem_text`: a problem, also one in mid-execution, back to text.
 //!
-//! PDDL 2.1 levels 1 to 4, PDDL 2.2 and PDDL+ are read. What we do not execute ([`Feature`]) is refused
-//! by name and place, or ignored with a warning where it cannot affect validity. No bytes make
-//! the readers panic. They open no files: the caller gives each text its name.
+//! PDDL 2.1 levels 1 to 4, PDDL 2.2 and PDDL+ are read. Unsupported features ([`Feature`]) are
+//! refused by name and position, or ignored with a warning where they cannot affect validity. The
+//! readers do not panic on any input. They open no files: the caller names each text.
 //!
 //! ```
 //! use elbowroom_model::Task;

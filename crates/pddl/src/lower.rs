@@ -1,4 +1,4 @@
-//! From nested lists to the model.
+//! Conversion of nested lists to the model.
 
 mod action;
 mod autonomous;
@@ -43,9 +43,8 @@ use elbowroom_text::{Diagnostic, Diagnostics};
 /// Returns the problem with the warnings, if any.
 ///
 /// # Errors
-/// When the texts contain mistakes, or features that are not executed
-/// ([`is_unsupported`](crate::is_unsupported)). All that were found are in the diagnostics, and the
-/// warnings too.
+/// Returns all errors and warnings if the texts contain mistakes or unsupported features
+/// ([`is_unsupported`](crate::is_unsupported)).
 pub fn read_problem(
     domain: &Source,
     problem: &Source,
@@ -64,13 +63,13 @@ pub fn read_problem(
     reader.finish()
 }
 
-/// Reads a goal for a problem that is known already: one condition, as it stands behind `:goal`.
+/// Reads a goal for a problem that is already known: one condition, as it is written after `:goal`.
 ///
 /// Returns the condition with the warnings, if any.
 ///
 /// # Errors
-/// When the text is no condition on what the problem has. All mistakes that were found are in the
-/// diagnostics.
+/// Returns all mistakes that were found if the text is not a condition over the problem's
+/// predicates, functions and objects.
 pub fn read_goal(
     goal: &Source,
     problem: &Problem,
@@ -84,7 +83,7 @@ pub fn read_goal(
         start: 0,
         end: goal.text().len(),
     };
-    // A preference would need a metric that counts it.
+    // A preference would require a metric that counts it.
     let mut scope = Scope {
         without_preferences: 1,
         ..Scope::default()
@@ -119,27 +118,27 @@ pub fn read_goal(
     Diagnostics::outcome(condition, reader.report.into_diagnostics())
 }
 
-/// The problem as far as it is read, with what is needed to read on.
+/// Reader of a domain and a problem, with the part of the problem read so far.
 ///
-/// After a mistake, reading goes on with some harmless value in the place of what is wrong: the
-/// outcome is an error anyway, and further mistakes are worth reporting.
+/// After a mistake, the reader substitutes a harmless value and continues, in order to report
+/// further mistakes. The result is an error in any case.
 struct Reader {
     report: Report,
     problem: Problem,
     names: Names,
-    /// How much text was copied because it stands around more than one effect.
+    /// Amount of text copied because it encloses more than one effect.
     copied: usize,
     /// The types resolved last.
     resolved_types: Option<(TypeNames, Vec<TypeId>)>,
-    /// Where each schema's name stands.
+    /// Position of each schema's name.
     schema_spans: Vec<Span>,
-    /// Where each process's name stands.
+    /// Position of each process's name.
     process_spans: Vec<Span>,
-    /// Where each event's name stands.
+    /// Position of each event's name.
     event_spans: Vec<Span>,
-    /// Where each rule's head stands.
+    /// Position of each rule's head.
     rule_spans: Vec<Span>,
-    /// Where the section of each constraint stands.
+    /// Position of each constraint's section.
     constraint_spans: Vec<Span>,
 }
 

@@ -1,4 +1,4 @@
-//! Plans as planners print them.
+//! Plans in the notations of planners.
 
 mod duration;
 mod form;

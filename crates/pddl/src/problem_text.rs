@@ -1,9 +1,9 @@
-//! From a problem, or what is left of one in mid-execution, to the text of a problem file.
+//! Writer of problem files: from a problem, or the remaining problem in mid-execution, to text.
 //!
-//! Programs that only read files can plan from any [`Situation`] that way: time 0 of the text is
-//! [`Situation::time`], the timed initials to come keep their distance from now, and an action
-//! under way becomes timed initials that do at its end what the action would do. What those cannot
-//! say, that nobody may break the conditions of an action under way, is left to the judge.
+//! With it, programs that only read files can plan from any [`Situation`]. Time 0 of the text is
+//! [`Situation::time`], future timed initials keep their distance from now, and a running action
+//! becomes timed initials with its end effects. Timed initials cannot protect the conditions of a
+//! running action; the validator checks these.
 
 mod insertion;
 mod running;
@@ -20,22 +20,22 @@ pub use insertion::with_initials;
 pub use running::end_times;
 use running::ends_of_running;
 
-/// A problem to be written as PDDL text.
+/// Settings for writing a problem as PDDL text.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProblemText {
     /// For each running action, the time on the task's clock at which it will end; see
     /// [`end_times`].
     pub ends: Vec<Rational>,
-    /// Numbers without a finite decimal are rounded to so many digits. Without it they are written
-    /// as `p/q`, exactly, which [`read_problem`](crate::read_problem) reads and other programs may
-    /// not.
+    /// Number of digits to which numbers without a finite decimal are rounded. If `None`, they are
+    /// written exactly as `p/q`, which [`read_problem`](crate::read_problem) reads but other
+    /// programs may not.
     pub digits: Option<u32>,
 }
 
-/// A situation that a problem file cannot describe.
+/// Reason why a situation cannot be written as a problem file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WriteProblemError {
-    /// Not as many ends as running actions.
+    /// The number of ends differs from that of running actions.
     #[error("{running} actions are running, but {ends} ends are given for them")]
     EndCount {
         /// The number of actions that are running.
@@ -43,20 +43,20 @@ pub enum WriteProblemError {
         /// The number of ends given.
         ends: usize,
     },
-    /// An action ends now, or should have ended.
+    /// An action ends now, or is overdue.
     #[error("{action} would end now or earlier: let its end happen, and plan from the state after")]
     EndsNow {
         /// The action.
         action: String,
     },
-    /// The end is not among those that are still possible.
+    /// The end is not possible.
     #[error("{action} cannot end at {end}: it may take {possible} from its start")]
     Impossible {
         /// The action.
         action: String,
         /// The end.
         end: Rational,
-        /// The durations that are possible.
+        /// The possible durations.
         possible: String,
     },
     /// The course of the plan is constrained, and has begun.
@@ -78,17 +78,18 @@ pub enum WriteProblemError {
     },
 }
 
-/// The text of a problem file for `task`'s domain that begins in `situation`. Read back
-/// ([`read_problem`](crate::read_problem)), it gives the same problem, up to the order of facts.
+/// Returns the text of a problem file for `task`'s domain that begins in `situation`. When
+/// [`read_problem`](crate::read_problem) reads the text, it returns the same problem, up to the
+/// order of facts.
 ///
-/// Facts that follow from rules are not written. The goal's preferences stand among the
-/// constraints. In mid-execution, preferences about the course of the plan are left out, and so is
-/// a metric that counts violations: what has been violated cannot be said.
+/// Facts that follow from rules are not written. The goal's preferences are written among the
+/// constraints. In mid-execution, preferences about the course of the plan are omitted, as is a
+/// metric that counts violations, because the file cannot state past violations.
 ///
 /// # Errors
-/// When an action under way cannot be expressed: it changes numbers while it runs, it has
-/// conditional effects that are still open, or it ends at no time later than now. And when
-/// constraints must be kept on a course that has begun.
+/// If a running action cannot be expressed: it changes numbers while it runs, it has conditional
+/// effects that are still open, or it ends at no time later than now. Also if hard constraints
+/// apply to a course that has already begun.
 ///
 /// ```
 /// use elbowroom_model::{Situation, Task};
@@ -155,7 +156,7 @@ pub fn write_problem(
     Ok(text)
 }
 
-/// Whether a metric depends on preferences.
+/// Returns `true` if a metric depends on preferences.
 fn counts_violations(metric: &problem::Expression) -> bool {
     let mut counts = false;
     metric.visit_leaves(&mut |leaf| {
@@ -164,7 +165,7 @@ fn counts_violations(metric: &problem::Expression) -> bool {
     counts
 }
 
-/// Whether what is left of a constraint does not depend on what has been.
+/// Returns `true` if the constraint does not depend on the past.
 fn looks_ahead(constraint: &Constraint) -> bool {
     match constraint {
         Constraint::Modal(modal) => matches!(modal, Modal::AtEnd(_)),
@@ -173,7 +174,7 @@ fn looks_ahead(constraint: &Constraint) -> bool {
     }
 }
 
-/// Whether nothing in it must be kept.
+/// Returns `true` if the constraint consists of preferences only.
 fn is_soft(constraint: &Constraint) -> bool {
     match constraint {
         Constraint::Modal(_) => false,
@@ -183,13 +184,13 @@ fn is_soft(constraint: &Constraint) -> bool {
     }
 }
 
-/// How a deletion is written.
+/// Notation of a deletion.
 enum Deleted {
-    /// As what it is.
+    /// As the deletion of a fact.
     Fact,
-    /// As a value that an object function loses.
+    /// As the loss of an object function's value, in this notation.
     Value(String),
-    /// Not at all.
+    /// Not written.
     Nothing,
 }
 
@@ -200,7 +201,7 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// `:objects`, without the domain's constants. Types are written if any object has one.
+    /// Writes `:objects`, without the domain's constants. Types are written if any object has one.
     fn objects(&self, text: &mut String) {
         let problem = self.task.problem();
         let own = problem.objects.get(problem.constants..).unwrap_or(&[]);
@@ -232,7 +233,7 @@ impl Writer<'_> {
         }
     }
 
-    /// `:constraints`, without the domain's.
+    /// Writes `:constraints`, without the domain's.
     fn constraints(&self, is_begun: bool, text: &mut String) -> Result<(), WriteProblemError> {
         let problem = self.task.problem();
         let (of_domain, own) = problem
@@ -267,7 +268,7 @@ impl Writer<'_> {
                 },
                 Change::Update { fluent, value, .. } => {
                     let Expression::Constant(value) = value else {
-                        // Timed initials assign numbers, and so do the ends made from running
+                        // Timed initials only assign numbers, and so do the ends made from running
                         // actions.
                         continue;
                     };
@@ -282,8 +283,8 @@ impl Writer<'_> {
         }
     }
 
-    /// What is to be said of a deletion: of an object function's value, that there is none any
-    /// more, unless the happening gives it another.
+    /// Returns the notation of a deletion. If the fact is the value of an object function, the
+    /// function becomes undefined unless the happening assigns another value.
     fn undefined(&self, fact: FactId, happening: &TimedHappening) -> Deleted {
         let problem = self.task.problem();
         let (predicate, arguments) = self.task.atom(fact);
@@ -310,7 +311,8 @@ impl Writer<'_> {
         ))
     }
 
-    /// The number as a decimal where that is exact, else as [`ProblemText::digits`] says.
+    /// Returns the number as a decimal if that is exact, otherwise rounded to
+    /// [`ProblemText::digits`].
     fn number(&self, value: &Rational) -> String {
         let is_exact = |text: &String| text.parse().is_ok_and(|read: Rational| read == *value);
         let exact = [12, 60].map(|digits| value.to_decimal(digits));

@@ -1,4 +1,4 @@
-//! Collects diagnostics while texts are read.
+//! Collection of diagnostics while texts are read.
 
 use crate::feature::Feature;
 use crate::source::{FileId, Span};
@@ -6,16 +6,16 @@ use elbowroom_text::Source;
 use elbowroom_text::nearest;
 use elbowroom_text::{Diagnostic, Label, Severity};
 
-/// The limit on mistakes reported: a text with more of them is not PDDL.
+/// Maximum number of diagnostics: a text with more mistakes is not PDDL.
 const MOST_DIAGNOSTICS: usize = 200;
 
-/// The texts being read, and what was found in them so far.
+/// The texts being read, and the diagnostics found so far.
 #[derive(Debug)]
 pub(crate) struct Report {
     domain: Source,
     problem: Source,
     diagnostics: Vec<Diagnostic>,
-    /// Takes the place of diagnostics beyond the last that is kept.
+    /// Replaces the diagnostics beyond the limit.
     surplus: Option<Diagnostic>,
     is_failed: bool,
 }
@@ -31,18 +31,18 @@ impl Report {
         }
     }
 
-    /// Notes a mistake.
+    /// Adds an error.
     pub(crate) fn error(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
         self.is_failed = true;
         self.add(Severity::Error, span, message.into())
     }
 
-    /// Notes something odd that does not matter.
+    /// Adds a warning about a harmless oddity.
     pub(crate) fn warning(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
         self.add(Severity::Warning, span, message.into())
     }
 
-    /// Refuses a feature.
+    /// Reports an unsupported feature as an error.
     pub(crate) fn unsupported(
         &mut self,
         feature: Feature,
@@ -54,7 +54,7 @@ impl Report {
         diagnostic.label("not supported")
     }
 
-    /// Ignores a feature, which must not affect validity.
+    /// Reports a feature that is ignored because it does not affect validity.
     pub(crate) fn ignored(
         &mut self,
         feature: Feature,
@@ -66,7 +66,7 @@ impl Report {
         diagnostic.label("ignored")
     }
 
-    /// Adds a label to what was noted last.
+    /// Adds a label to the last diagnostic.
     pub(crate) fn attach(&mut self, label: Label) {
         let last = self.surplus.as_mut().or(self.diagnostics.last_mut());
         if let Some(last) = last {
@@ -74,7 +74,8 @@ impl Report {
         }
     }
 
-    /// The candidate most like `name`, unless there are so many diagnostics that none is needed.
+    /// Returns the candidate most similar to `name`. Returns `None` once the number of diagnostics
+    /// has reached the limit.
     pub(crate) fn nearest<'a>(
         &self,
         name: &str,
@@ -87,7 +88,7 @@ impl Report {
         }
     }
 
-    /// Whether there was an error.
+    /// Returns `true` if there was an error.
     pub(crate) fn is_failed(&self) -> bool {
         self.is_failed
     }
@@ -96,7 +97,7 @@ impl Report {
         self.diagnostics
     }
 
-    /// A label for another place that explains the mistake.
+    /// Returns a label for another position that explains the mistake.
     pub(crate) fn label(&self, span: Span, text: impl Into<String>) -> Label {
         Label {
             source: self.source(span.file).clone(),
@@ -115,8 +116,8 @@ impl Report {
     fn add(&mut self, severity: Severity, span: Span, message: String) -> &mut Diagnostic {
         let source = self.source(span.file);
         let diagnostic = Diagnostic::new(severity, source, span.start..span.end, message);
-        // An error that is not kept must not turn the outcome into a success: the first error
-        // is kept even when warnings have used up the room.
+        // An error that is not kept must not turn the result into a success: the first error is
+        // kept even if warnings have reached the limit.
         let is_first_error = severity == Severity::Error
             && !self
                 .diagnostics

@@ -1,9 +1,9 @@
-//! Places in the texts that are read together.
+//! Positions in the texts that are read together.
 
-/// A stretch of one of the texts being read.
+/// A range of one of the texts being read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Span {
-    /// Which of the texts.
+    /// The text that contains the span.
     pub(crate) file: FileId,
     /// First byte.
     pub(crate) start: usize,

@@ -1,4 +1,4 @@
-//! From text to nested lists of words.
+//! Conversion of text to nested lists of words.
 
 mod lexer;
 mod tree;

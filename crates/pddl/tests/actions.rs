@@ -1,25 +1,25 @@
-//! Actions, instantaneous and durative, as the model gets them.
+//! Actions, instantaneous and durative, as converted to the model.
 
 mod reading;
 
 use insta::assert_snapshot;
 use reading::{mistakes, only_action, read_actions};
 
-/// A durative action with this condition.
+/// Reads a durative action with this condition.
 fn condition(text: &str) -> String {
     only_action(&format!(
         "(:durative-action a :parameters (?b - ball ?r - room) :duration () :condition {text})"
     ))
 }
 
-/// A durative action with this effect.
+/// Reads a durative action with this effect.
 fn effect(text: &str) -> String {
     only_action(&format!(
         "(:durative-action a :parameters (?b - ball ?r - room) :duration () :effect {text})"
     ))
 }
 
-/// A durative action with this duration.
+/// Reads a durative action with this duration.
 fn duration(text: &str) -> String {
     only_action(&format!(
         "(:durative-action a :parameters (?b - ball) :duration {text})"

@@ -1,4 +1,4 @@
-//! What becomes of the benchmark set.
+//! Test on the benchmark set.
 
 #[allow(dead_code, reason = "the test needs a part of what the example shows")]
 #[path = "../examples/pddl_support/document.rs"]

@@ -1,4 +1,4 @@
-//! Constraints on the course of a plan, and what the judge makes of them.
+//! Constraints on the course of a plan, and the validator's verdicts on them.
 
 #![allow(
     clippy::format_push_string,
@@ -26,7 +26,7 @@ const DOMAIN: &str = "(define (domain d)
 (:action open :parameters (?r - room) :precondition () :effect (open ?r)))
 ";
 
-/// What the judge says about a plan under these sections of a problem.
+/// Returns the validator's verdict on a plan for a problem with these sections.
 fn said(sections: &str, plan: &str) -> String {
     let problem = problem(&format!("(:init (in b1 kitchen) (in B2 hall)) {sections}"));
     let task = task(&Source::new("domain.pddl", DOMAIN), &problem);

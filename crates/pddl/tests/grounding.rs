@@ -1,4 +1,4 @@
-//! Grounds the benchmark set, where it is at hand.
+//! Grounds the benchmark set, if it is available.
 
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
@@ -11,11 +11,11 @@ use elbowroom_model::reachability::{Answer, Settings, ground};
 use elbowroom_pddl::{Source, read_plan, read_problem};
 use skipped::skipped;
 
-/// `pddl` in the folder that `ELBOWROOM_SHARED` names, or beside the workspace.
+/// Returns `pddl` in the folder that `ELBOWROOM_SHARED` names, or next to the workspace.
 fn benchmarks() -> Option<PathBuf> {
     let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared");
     let shared = std::env::var_os("ELBOWROOM_SHARED").map_or(beside.into(), PathBuf::from);
-    // Both layouts: the data folder itself, or what contains it.
+    // Both layouts: the data folder itself, or its parent.
     let folder = [shared.join("data/pddl"), shared.join("pddl")]
         .into_iter()
         .find(|folder| folder.join("manifest.csv").exists());
@@ -58,7 +58,7 @@ fn all_readable_instances_are_grounded_within_the_limits() {
             panic!("{} passes a limit", row[4]);
         };
         grounded += 1;
-        // What these instances ask for, the actions of the domain as published do not bring about.
+        // The actions of the published domain cannot achieve the goals of these instances.
         let is_known = row[4].starts_with("upf-concurrency/allen-algebra/");
         if !grounding.unreachable_goals.is_empty() && !is_known {
             hopeless.push(row[4].clone());
@@ -69,7 +69,7 @@ fn all_readable_instances_are_grounded_within_the_limits() {
         hopeless,
         [
             "rosplan/test_domain/instances/test_problem_no_solution.pddl",
-            // The car is horizontal, and asked for in another row.
+            // The car is horizontal, but the goal requires another row.
             "tfd/rushhour/instances/p03.pddl",
             // Nothing moves a package.
             "unified-planning/object_fluents/instances/problem.pddl",
@@ -114,7 +114,7 @@ fn each_action_of_a_valid_plan_is_reached() {
     assert!(compared > 50, "only {compared} plans could be compared");
 }
 
-/// What the property asks of the benchmarks, of the cases that come with the project.
+/// Checks the property of the benchmark test on the cases of the repository.
 #[test]
 fn each_action_of_our_own_plans_is_reached() {
     let cases = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases"));

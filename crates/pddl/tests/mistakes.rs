@@ -1,4 +1,4 @@
-//! What is said about texts that are wrong.
+//! Diagnostics for texts with mistakes.
 
 mod reading;
 
@@ -210,7 +210,7 @@ const ROOM: &str = "(define (domain room)
   (:functions (speed) (level))
   (:action measure :parameters () :effect (assign (level) 3)))";
 
-/// What is said of a problem with these sections.
+/// Returns the diagnostics for a problem with these sections.
 fn said_of(sections: &str) -> String {
     let problem = format!("(define (problem p) (:domain room) {sections})");
     let read = read_problem(

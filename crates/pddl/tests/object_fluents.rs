@@ -1,4 +1,4 @@
-//! Functions whose values are objects: as predicates with one argument more.
+//! Functions whose values are objects, as predicates with one more argument.
 
 mod reading;
 

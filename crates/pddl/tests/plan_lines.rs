@@ -25,7 +25,7 @@ fn read(text: &str) -> Result<(TimeTriggeredPlan, Vec<Diagnostic>), Diagnostics>
     read_plan(&Source::new("plan", text), &house())
 }
 
-/// The plan in a text, written out again on one line.
+/// Returns the plan in a text, written again on one line.
 fn plan(text: &str) -> String {
     match read(text) {
         Ok((plan, _)) => write_plan(&house(), &plan).trim_end().replace('\n', "; "),
@@ -33,14 +33,14 @@ fn plan(text: &str) -> String {
     }
 }
 
-/// The messages of the warnings.
+/// Returns the messages of the warnings.
 fn notes(text: &str) -> String {
     let (_, notes) = read(text).unwrap_or_else(|found| panic!("{}", found.render(false)));
     let messages: Vec<_> = notes.into_iter().map(|note| note.message).collect();
     messages.join("\n")
 }
 
-/// Line and message of the errors.
+/// Returns line and message of the errors.
 fn errors(text: &str) -> String {
     let Err(found) = read(text) else {
         return "none".to_owned();
@@ -52,7 +52,7 @@ fn errors(text: &str) -> String {
     errors.join("\n")
 }
 
-/// Lines that resemble an action: prefix, time, separator, action, suffix.
+/// Generates lines that resemble an action: prefix, time, separator, action, suffix.
 fn nearly_an_action() -> impl Strategy<Value = String> {
     let before = prop::sample::select(vec![
         "",
@@ -138,7 +138,7 @@ const PLAN: [&str; 3] = [
     "7: (snap b1)",
 ];
 
-/// Text that planners print before and after plans.
+/// Generates text that planners print before and after plans.
 fn log_text() -> impl Strategy<Value = &'static str> {
     prop::sample::select(vec![
         "",
@@ -171,7 +171,7 @@ proptest! {
         head in log_text(),
         tail in log_text(),
     ) {
-        // Words that are no action, and no number: log text.
+        // Words that are neither an action nor a number are log text.
         prop_assume!(!line.contains("launch") || line.contains(|c: char| c.is_ascii_digit()));
         prop_assume!(!line.trim_start().starts_with(';'));
         let mut lines = vec![head];

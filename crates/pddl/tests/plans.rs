@@ -7,8 +7,8 @@ use elbowroom_pddl::{Diagnostic, Diagnostics, Source, read_plan, write_plan};
 use insta::assert_snapshot;
 use reading::{domain, problem, task};
 
-/// Two rooms and two balls; `walk` takes the time that the domain says, `wait` what the plan
-/// says, `snap` none.
+/// Returns a task with two rooms and two balls. The domain gives the duration of `walk`, the plan
+/// that of `wait`; `snap` is instantaneous.
 fn house() -> Task {
     let domain = domain(
         "(:durative-action walk :parameters (?from ?to - room) :duration (= ?duration (* 2 (speed))))
@@ -26,7 +26,7 @@ fn read(text: &str) -> Result<(TimeTriggeredPlan, Vec<Diagnostic>), Diagnostics>
     read_plan(&Source::new("plan", text), &house())
 }
 
-/// The plan in a text, written out again.
+/// Returns the plan in a text, written again.
 fn rewritten(text: &str) -> String {
     let task = house();
     match read_plan(&Source::new("plan", text), &task) {
@@ -211,7 +211,7 @@ fn numbers_survive_writing_and_reading() {
     assert_eq!(again, plan);
 }
 
-/// What is said of a plan that is read all the same.
+/// Returns the warnings for a plan that is read successfully.
 fn remarks(text: &str) -> String {
     let (_, warnings) = read(text).unwrap_or_else(|wrong| panic!("{wrong}"));
     let lines: Vec<String> = warnings.iter().map(ToString::to_string).collect();
@@ -224,7 +224,7 @@ fn what_is_read_leniently_is_said() {
     assert_snapshot!(remarks("0: (wait) [9 min]"), @"plan:1:14: warning: `min` is ignored; a duration is a number in brackets, in the domain's unit: `[10.000]`");
     // No brackets.
     assert_snapshot!(remarks("0: (walk hall kitchen) 4"), @"plan:1:5: warning: read as the terminal of PlanSys2 prints plans: time, action, duration; the usual form is `0.000: (action argument …) [10.000]`");
-    // No duration at all, said once.
+    // No duration at all, reported once.
     assert_snapshot!(remarks("0: (walk hall kitchen)\n9: (walk kitchen hall)"), @"plan:1:5: warning: `walk` has no duration here: 4 is taken, as the domain says; write it behind the action, as in `[10.000]`; this is said once for all");
     // No times.
     assert_snapshot!(remarks("(snap b1)\n(snap b2)"), @"plan:1:2: warning: no action has a time: each starts when the one before it has ended, and 1 later if that takes no time; write the time before the action: `0.000: (action argument …) [10.000]`");

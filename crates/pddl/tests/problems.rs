@@ -36,7 +36,7 @@ fn timed_initials_that_contradict_each_other_at_one_time_are_refused() {
         "(at 10 (not (lit))) (at 20 (= (level) 1)) (at 10.0 (lit))"
     ));
     assert!(!is_read("(at 10 (= (level) 1)) (at 10 (= (level) 2))"));
-    // Saying the same twice is no contradiction, nor is another time.
+    // Repetition is no contradiction, nor is a change at another time.
     assert!(is_read(
         "(at 10 (lit)) (at 10 (lit)) (at 10.001 (not (lit)))"
     ));

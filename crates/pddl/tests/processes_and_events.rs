@@ -1,4 +1,4 @@
-//! Processes and events: read, and what the judge makes of them.
+//! Processes and events: their reading and their validation.
 
 mod reading;
 
@@ -8,7 +8,8 @@ use elbowroom_pddl::{Source, read_plan};
 use insta::assert_snapshot;
 use reading::{mistakes, read_actions, task};
 
-/// A domain with these processes, events and actions, and a problem with these sections.
+/// Returns the task of a domain with these processes, events and actions, and a problem with these
+/// sections.
 fn plus(domain: &str, sections: &str) -> Task {
     let frame = "(define (domain d)
 (:predicates (on) (off) (broken) (done) (p) (q))
@@ -26,7 +27,7 @@ fn plus(domain: &str, sections: &str) -> Task {
     )
 }
 
-/// The verdict in words; of a valid plan the values in the end.
+/// Returns the verdict in words, with the final values for a valid plan.
 fn verdict(task: &Task, plan: &str, settings: &Settings) -> String {
     let (plan, _) = read_plan(&Source::new("plan", plan), task).expect("a plan");
     match validate(task, &plan, settings) {
@@ -56,7 +57,7 @@ fn a_process_is_at_work_while_its_condition_holds() {
         said(FILLING, init, "1: (switch-on)\n3.5: (switch-off)\n9: (switch-on)"),
         @"at 9.000: the goal (>= (x) 6) does not hold: (x) = 5, short by 1"
     );
-    // From the very beginning, and until the goal is read.
+    // From the very beginning until the evaluation of the goal.
     let init = "(:init (on) (= (x) 0)) (:goal (= (x) 4))";
     assert_snapshot!(said(FILLING, init, "2: (switch-off)"), @"valid (x) = 4");
 }
@@ -98,7 +99,7 @@ fn an_event_on_a_strict_bound_happens_right_after_it() {
         (:event e :precondition (and (> (x) 3) (on)) :effect (and (p) (not (on))))";
     let init = "(:init (on) (= (x) 0)) (:goal (and))";
     assert_snapshot!(said(strict, init, "5: (look)"), @"valid (x) = 3");
-    // Up to the bound itself it has not happened.
+    // Exactly at the bound, it has not happened.
     assert_snapshot!(said(strict, init, "3: (look)"), @"at 3.000: (look) needs (p): (p) is false");
 }
 

@@ -1,4 +1,4 @@
-//! Which actions grounding reaches: one sentence each.
+//! Actions that grounding reaches, one sentence each.
 
 use elbowroom_model::Task;
 use elbowroom_model::reachability::{Answer, Grounding, Settings, ground};
@@ -39,7 +39,7 @@ impl World {
         }
     }
 
-    /// The names of the reached actions.
+    /// Returns the names of the reached actions.
     fn reached(&self) -> String {
         let (_, grounding) = self.ground();
         let names: Vec<_> = grounding.actions.iter().map(|a| a.name.as_str()).collect();

@@ -1,11 +1,11 @@
-//! What is understood but refused, by name and position.
+//! Features that are parsed but refused, reported by name and position.
 
 mod reading;
 
 use elbowroom_pddl::{Diagnostics, Feature, is_unsupported};
 use reading::read_actions;
 
-/// The refused features with their lines; panics if there is a mistake among them.
+/// Returns the refused features with their lines. Panics if there is a mistake among them.
 fn refused<T: std::fmt::Debug>(read: Result<T, Diagnostics>) -> Vec<(Feature, usize)> {
     let diagnostics = read.expect_err("refused");
     assert!(is_unsupported(&diagnostics), "{diagnostics}");
@@ -15,7 +15,7 @@ fn refused<T: std::fmt::Debug>(read: Result<T, Diagnostics>) -> Vec<(Feature, us
         .collect()
 }
 
-/// The refused features of a durative action's effect.
+/// Returns the refused features of a durative action's effect.
 fn of_effect(text: &str) -> Vec<(Feature, usize)> {
     refused(read_actions(&format!(
         "(:durative-action a :duration () :effect {text})"

@@ -29,7 +29,7 @@ const PROBLEM: &str = "(define (problem p) (:domain d) (:objects b1 b2 - ball)
 
 const PLAN: &str = "; Plan found with metric 3\n0.000: (throw b1 hall) [0.001]\n0.001: (ROLL b1) [D:2.0; C:1]\n2.1: (roll b2)";
 
-/// Reads everything there is to read in these texts.
+/// Reads these texts in all ways.
 fn read_all(domain: &[u8], problem: &[u8], plan: &[u8]) {
     let domain = Source::from_bytes("domain", domain);
     let problem = Source::from_bytes("problem", problem);
@@ -164,12 +164,12 @@ fn large_texts_full_of_mistakes_are_read_quickly() {
     read_changed(2, steps.replace('\n', " ").as_bytes());
 }
 
-/// A text for each number, one after the other.
+/// Returns a text for each number, concatenated.
 fn repeated(numbers: std::ops::Range<u32>, text: impl Fn(u32) -> String) -> String {
     numbers.map(text).collect::<Vec<_>>().concat()
 }
 
-/// A text with some of its bytes replaced, and stretches of it copied to other places.
+/// Generates a text with some bytes replaced, and parts of it copied to other positions.
 fn mutated(text: &'static str) -> impl Strategy<Value = Vec<u8>> {
     let replaced = prop::collection::vec((any::<Index>(), any::<u8>()), 0..4);
     let copied = prop::collection::vec((any::<Index>(), any::<Index>(), 0..80_usize), 0..4);

@@ -1,5 +1,5 @@
-//! Small changes of a domain with processes, events, control parameters and object fluents: whatever
-//! becomes of it is read or refused, and what is read is judged and written.
+//! Small changes of a domain with processes, events, control parameters and object fluents. Each
+//! changed text is either read or refused; texts that are read are validated and written.
 
 use elbowroom_model::validate::{Settings, Verdict, validate};
 use elbowroom_model::{Situation, Task};
@@ -25,7 +25,7 @@ const PROBLEM: &str = "(define (problem evening) (:domain flat) (:objects r1 - r
 
 const PLAN: &str = "0.1: (pour kettle 0.5) [1]\n4: (carry r1 kettle hall)\n";
 
-/// The verdict, if the texts are understood.
+/// Returns the verdict, if the texts are understood.
 fn judged(domain: &str, problem: &str, plan: &str) -> Option<Verdict> {
     let domain = Source::new("domain.pddl", domain);
     let problem = match read_problem(&domain, &Source::new("problem.pddl", problem)) {
@@ -50,7 +50,7 @@ fn judged(domain: &str, problem: &str, plan: &str) -> Option<Verdict> {
     Some(validate(&task, &plan, &Settings::default()))
 }
 
-/// Judges with each of the three texts changed.
+/// Validates with each of the three texts changed.
 fn each(change: &dyn Fn(&str, usize) -> Option<String>) -> usize {
     let texts = [DOMAIN, PROBLEM, PLAN];
     let mut understood = 0;
@@ -68,7 +68,7 @@ fn each(change: &dyn Fn(&str, usize) -> Option<String>) -> usize {
     understood
 }
 
-/// The words of a text with where they begin, parentheses among them.
+/// Returns the word or parenthesis that begins at a position of a text.
 fn word_at(text: &str, at: usize) -> Option<&str> {
     let is_word = |character: char| !character.is_whitespace() && !"()".contains(character);
     let rest = &text[at..];

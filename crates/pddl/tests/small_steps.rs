@@ -1,8 +1,8 @@
-//! Processes and events against a slow twin: very many small steps of time.
+//! Processes and events compared with a slow reference simulation in very many small time steps.
 //!
-//! The twin knows nothing of polynomials: in each step it adds rate times step, exactly, then lets
-//! events happen whose conditions hold. Bounds are such that its steps never hit one, so that it
-//! sees each change at most a step too late.
+//! The reference does not use polynomials. In each step it adds rate times step, exactly, and then
+//! applies the events whose conditions hold. Bounds are chosen such that its steps never hit one,
+//! so it detects each change at most one step too late.
 
 #![allow(
     clippy::format_push_string,
@@ -20,7 +20,7 @@ const FACTS: usize = 3;
 const STEPS: i64 = 512;
 const HORIZON: i64 = 6;
 
-/// Pseudo-random numbers, the same each time.
+/// Pseudo-random numbers with a fixed seed.
 struct Dice(u64);
 
 impl Dice {
@@ -77,8 +77,8 @@ struct State {
     facts: Vec<bool>,
 }
 
-/// A process changes one number; an event turns the fact of its condition, and so cannot happen
-/// again at once, and adds to a number.
+/// Processes that each change one number, and events that each negate the fact of their own
+/// condition, so that they cannot happen again at once, and add to a number.
 struct World {
     processes: Vec<(Condition, usize, i64)>,
     events: Vec<(Condition, usize, i64)>,
@@ -153,7 +153,8 @@ impl World {
         }
     }
 
-    /// The state at the horizon, step by step; `None` if events go on without end.
+    /// Simulates step by step and returns the state at the horizon. Returns `None` if the events
+    /// never stop.
     fn live(mut self) -> Option<State> {
         let step = Rational::new(1, STEPS);
         self.happen()?;
@@ -199,7 +200,7 @@ fn the_judge_comes_to_the_state_that_small_steps_come_to() {
         let (plan, _) = read_plan(&plan, &task).expect("a plan");
         let verdict = validate(&task, &plan, &Settings::default());
         let Verdict::Valid(report) = verdict else {
-            // Events without end, or that interfere; processes that chatter.
+            // Infinitely many events, interfering events, or chattering processes.
             others += 1;
             continue;
         };

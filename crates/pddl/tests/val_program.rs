@@ -1,6 +1,6 @@
-//! The judge beside VAL itself: the program that `ELBOWROOM_VAL` names.
+//! Compares the validator with VAL, the program that `ELBOWROOM_VAL` names.
 //!
-//! What the two disagree on, and why, is told in `docs/val-agreement.md`.
+//! `docs/val-agreement.md` lists the disagreements and their causes.
 
 #![allow(
     clippy::format_push_string,

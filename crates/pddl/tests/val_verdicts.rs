@@ -1,6 +1,6 @@
-//! The judge against the recorded verdicts of VAL, on all plans of the benchmark set.
+//! The validator against the recorded verdicts of VAL, on all plans of the benchmark set.
 //!
-//! What the two disagree on, and why, is told in `docs/val-agreement.md`.
+//! `docs/val-agreement.md` lists the disagreements and their causes.
 
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
@@ -13,7 +13,7 @@ use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, is_unsupported, read_plan, read_problem};
 use skipped::skipped;
 
-/// See the document.
+/// Known disagreements, which the document explains.
 const DISAGREEMENTS: [&str; 5] = [
     "auv-missions/pandora-tactical/plans/mission201.popf.plan at 0.0001",
     "val-samples/sleeping-beauty-with-magnetic-window-alarm/plans/sleepingbeauty-problem.src.plan at 0.00001",
@@ -24,7 +24,7 @@ const DISAGREEMENTS: [&str; 5] = [
 
 const DOCUMENT: &str = include_str!("../../../docs/val-agreement.md");
 
-/// The benchmark set; `None` where it is not installed.
+/// Returns the benchmark set, or `None` if it is not installed.
 fn benchmarks() -> Option<PathBuf> {
     let shared = std::env::var_os("ELBOWROOM_SHARED").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
@@ -34,7 +34,7 @@ fn benchmarks() -> Option<PathBuf> {
     root.join("plans.csv").is_file().then_some(root)
 }
 
-/// What VAL answered to one plan, by tolerance.
+/// VAL's verdicts on one plan, by tolerance.
 struct Row<'a> {
     domain: &'a str,
     problem: &'a str,
@@ -74,7 +74,7 @@ impl<'a> Row<'a> {
     }
 }
 
-/// A problem with its plan, as far as they can be read.
+/// A problem with its plan, if they can be read.
 enum Reading {
     Read(Box<Task>, elbowroom_model::TimeTriggeredPlan),
     Mistaken,
@@ -94,8 +94,8 @@ fn read(row: &Row<'_>, load: impl Fn(&str) -> Source) -> Reading {
     }
 }
 
-/// Our verdict in VAL's words. VAL stops with an error, recorded as `type-error`, where a file
-/// cannot be read, and also where a fluent is read that has no value.
+/// Returns our verdict in VAL's terms. VAL stops with an error, recorded as `type-error`, if a file
+/// cannot be read, and also if a fluent without a value is read.
 fn answer(reading: &Reading, tolerance: Rational) -> &'static str {
     let Reading::Read(task, plan) = reading else {
         return "type-error";

@@ -18,7 +18,7 @@ use insta::assert_snapshot;
 use reading::task;
 use skipped::skipped;
 
-/// What a problem says, whatever the order in which it says it.
+/// Returns the problem in a normal form that does not depend on the order of its parts.
 fn normalized(mut problem: Problem) -> Problem {
     problem.initial_facts.sort();
     problem.initial_facts.dedup();
@@ -58,7 +58,7 @@ fn every_benchmark_is_the_same_problem_after_writing_and_reading() {
     assert!(count > 700, "only {count} were compared");
 }
 
-/// What the property asks of the benchmarks, of the cases that come with the project.
+/// Checks the property of the benchmark test on the cases of the repository.
 #[test]
 fn our_own_cases_are_the_same_problems_after_writing_and_reading() {
     let cases = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases");
@@ -111,8 +111,8 @@ fn rover() -> (Source, Task) {
     (domain, task)
 }
 
-/// The running action of a plan line, and where things stand `elapsed` after its start at 0, with
-/// its start's changes as given.
+/// Returns the situation at `elapsed` after the start, at 0, of the plan line's action, with the
+/// changes of its start applied.
 fn under_way(task: &Task, line: &str, elapsed: i64, duration: Interval) -> Situation {
     let (plan, _) = read_plan(&Source::new("plan", line), task).expect("a plan");
     let step = plan.steps.into_iter().next().expect("one step");
@@ -183,7 +183,7 @@ fn a_plan_for_the_written_problem_is_a_plan_from_the_situation() {
     let situation = under_way(&task, "0: (drive base rock) [10]", 4, duration);
     let text = written(&task, &situation);
     let rest = reading::task(&domain, &Source::new("rest.pddl", text));
-    // The goal is read when the plan is over; that the base closes later does not count.
+    // The goal is evaluated at the end of the plan; the later closing of the base does not count.
     let strictness = Settings {
         counts_later_timed: false,
         ..Settings::default()
@@ -192,7 +192,7 @@ fn a_plan_for_the_written_problem_is_a_plan_from_the_situation() {
         let line = format!("{start}: (dig rock) [4]");
         let (plan, _) = read_plan(&Source::new("plan", line.as_str()), &rest).unwrap();
         let verdict = validate(&rest, &plan, &strictness);
-        // Base closes, and the rover is not away: the goal wants it open.
+        // If the rover is not away, the base closes before the goal is evaluated.
         assert_eq!(verdict.is_valid(), expected, "{start}: {verdict:?}");
 
         let (mut whole, _) = read_plan(&Source::new("plan", line.as_str()), &task).unwrap();

@@ -1,7 +1,7 @@
-//! Time to the first plan on the delivery and RCLL problems, and to a plan or a proof from
-//! situations in the middle of their plans.
+//! Measures the time to the first plan on the delivery and RCLL problems, and to a plan or a proof
+//! from situations in mid-execution of their plans.
 //!
-//! The problems lie beside the repository; without them nothing is measured.
+//! The problems are in a folder next to the repository; without them nothing is measured.
 #![allow(clippy::print_stdout, reason = "percentiles are printed")]
 #![allow(clippy::disallowed_methods, reason = "a benchmark looks at the clock")]
 
@@ -30,10 +30,10 @@ const PROBLEMS: &[(&str, &str)] = &[
     ),
 ];
 
-/// How many situations the latencies are taken from.
+/// Number of situations for the latencies.
 const SITUATIONS: usize = 1000;
 
-/// How many reports a search from a situation may make before it counts as unanswered.
+/// Maximum number of progress reports of a search from a situation before it counts as unanswered.
 const MOST_REPORTS: usize = 2000;
 
 fn main() {
@@ -83,7 +83,7 @@ fn time_to_first_plan(bencher: divan::Bencher<'_, '_>, problem: usize) {
         .bench_values(|task| first_plan(&task, &situation));
 }
 
-/// Numbers that look random and are the same each time (Marsaglia's xorshift).
+/// Pseudo-random numbers with a fixed seed (Marsaglia's xorshift).
 struct Dice(u64);
 
 impl Dice {
@@ -166,7 +166,8 @@ fn latencies() {
     );
 }
 
-/// Where the plan is at the time, what is running lasting up to a half longer than it should.
+/// Returns the situation of the plan at `now`. Running actions last up to half as long again as
+/// planned.
 fn situation_at(
     task: &Task,
     plan: &TimeTriggeredPlan,
@@ -225,7 +226,7 @@ fn situation_at(
     }
     situation.time = now + Rational::new(1, 1000);
     situation.running = running;
-    // Nothing may happen between the cut and the moment at which planning begins.
+    // No timed initial may take effect between the cut and the start of planning.
     let is_quiet =
         |timed: &elbowroom_model::TimedHappening| timed.time <= *now || timed.time > situation.time;
     task.timed().iter().all(is_quiet).then_some(situation)

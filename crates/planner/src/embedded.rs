@@ -1,22 +1,22 @@
 //! The embedded temporal planner.
 //!
 //! Forward search over the starts and ends of actions, in the line of CRIKEY3, POPF and COLIN
-//! (Coles, Fox, Long & Smith, AAAI 2008; Coles, Coles, Fox & Long, ICAPS 2010 and IJCAI 2009),
-//! with the queues of LAMA (Richter & Westphal, JAIR 2010).
+//! (Coles, Fox, Long & Smith, AAAI 2008; Coles, Coles, Fox & Long, ICAPS 2010 and IJCAI 2009), with
+//! the queues of LAMA (Richter & Westphal, JAIR 2010).
 //!
-//! The way through the module:
+//! Structure of the module:
 //!
-//! 1. [`plan`] grounds the task from the situation on, and compiles it (`compile`): small
-//!    numbers for facts and fluents, ticks for time, and for each happening the list of what it
-//!    must keep away from.
-//! 2. `search` chooses happenings one after the other. Only what interferes keeps that order in
-//!    time, so a sequence of choices stands for a plan in which much happens side by side. The
-//!    times that are not settled form a small network (`network`).
-//! 3. `relaxed` estimates how far the goal is.
-//! 4. `extract` turns the choices into a plan with times, and shows it to the judge.
-//! 5. `course` turns constraints on the course of a plan into conditions and goals first.
-//! 6. `run` shares the time out among searches: first for any plan, then for better ones.
-//! 7. `refine` makes better plans of the best one.
+//! 1. [`plan`] grounds the task from the situation, and compiles it (`compile`): small integers for
+//!    facts and fluents, ticks for time, and for each happening the list of happenings that must be
+//!    separated from it.
+//! 2. `search` chooses happenings one after the other. Only interfering happenings keep that order
+//!    in time, so a sequence of choices represents a plan with many concurrent actions. The times
+//!    that are not yet fixed form a small network (`network`).
+//! 3. `relaxed` estimates the distance to the goal.
+//! 4. `extract` turns the choices into a plan with times, and passes it to the validator.
+//! 5. `course` compiles constraints on the course of a plan into conditions and goals beforehand.
+//! 6. `run` divides the time among searches: first for any plan, then for better ones.
+//! 7. `refine` improves the best plan.
 
 mod answer;
 mod apply;
@@ -68,16 +68,16 @@ use reasons::Names;
 use run::{Frame, Planner, none_found};
 use symmetry::Symmetry;
 
-/// Work that is counted for grounding and compiling an action.
+/// Estimated work of grounding and compiling one action.
 const ACTION_WORK: u64 = 20_000;
 
 /// Finds a plan from `situation`.
 ///
-/// `observe` is called now and then, and for each better plan; with `Break` the search ends, and
-/// the best plan so far is the answer; so it does when the thread's computations should end early
-/// ([`work::is_stopped`]). Every plan has been found valid by
-/// [`elbowroom_model::validate_from`], exactly, with the given ε. The same input gives the same
-/// answer, and the same sequence of reports.
+/// `observe` is called regularly, and for each better plan. If it returns `Break`, or if the
+/// thread's computations should end early ([`work::is_stopped`]), the search ends and returns the
+/// best plan so far. Every plan has been found valid by [`elbowroom_model::validate_from`],
+/// exactly, with the given ε. The same input gives the same answer, and the same sequence of
+/// reports.
 pub fn plan(
     task: &Task,
     situation: &Situation,
@@ -111,8 +111,8 @@ pub fn plan(
     )
 }
 
-/// As [`plan`], of a task without constraints on the course of its plans. `constrained`: the same task with
-/// constraints, and its situation; only plans that keep them count.
+/// As [`plan`], for a task without constraints on the course of its plans. `constrained` is the
+/// same task with constraints, and its situation; plans that violate them are not accepted.
 fn search_for_plans(
     task: &Task,
     constrained: Option<(&Task, &Situation)>,
@@ -189,7 +189,8 @@ fn search_for_plans(
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
-    // What one object may do and another may not is no symmetry of the problem itself.
+    // If actions are forbidden to some objects only, symmetries of the problem are not symmetries
+    // of the restricted problem.
     let symmetry = if tuning.uses(Technique::Symmetry) && settings.without.is_empty() {
         Symmetry::of(grounded, &compiled)
     } else {

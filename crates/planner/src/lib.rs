@@ -1,9 +1,8 @@
 //! An embedded temporal planner.
 //!
-//! It reads no clock, no file and no random number: its caller says, every few milliseconds,
-//! whether to go on, and the same task gives the same plan, whatever the number of threads that it is
-//! allowed ([`Settings::threads`]). Other people's planners are run by the
-//! crate `elbowroom-external`.
+//! It reads no clock, no file and no random number. The caller decides, every few milliseconds,
+//! whether to continue. The same task gives the same plan, for any number of threads
+//! ([`Settings::threads`]). The crate `elbowroom-external` runs other planners.
 //!
 //! ```
 //! use std::ops::ControlFlow;

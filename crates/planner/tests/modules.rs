@@ -1,7 +1,7 @@
 //! The modules of the embedded planner depend on each other in one direction.
 //!
-//! What a file imports is read off its paths (`super::…`, `crate::embedded::…`); a module stands
-//! for itself and all that is below it. Tests do not count.
+//! The imports of a file are read from its paths (`super::…`, `crate::embedded::…`). A module
+//! includes all its submodules. Tests do not count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -74,7 +74,7 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The top modules that a file imports; `place` is its path below the root.
+/// Returns the top modules that a file imports; `place` is its path below the root.
 fn imports_of(place: &[String], text: &str) -> BTreeSet<String> {
     let code: String = text
         .lines()
@@ -108,7 +108,7 @@ fn imports_of(place: &[String], text: &str) -> BTreeSet<String> {
     imports
 }
 
-/// The first names of a path: one, or those between braces.
+/// Returns the first names of a path: one, or those between braces.
 fn first_names(tail: &str) -> Vec<String> {
     let name = |text: &str| {
         let end = text.find(|c: char| !c.is_alphanumeric() && c != '_');
@@ -134,8 +134,8 @@ fn first_names(tail: &str) -> Vec<String> {
     names
 }
 
-/// What is left when modules that import none of those left, or are imported by none of them, are
-/// taken away, one after the other: nothing if there is no circle.
+/// Removes the modules that import no remaining module, or that no remaining module imports, until
+/// nothing changes. Returns the remaining modules: none if there is no cycle.
 fn circle(mut imports: BTreeMap<String, BTreeSet<String>>) -> BTreeSet<String> {
     loop {
         let left: BTreeSet<String> = imports.keys().cloned().collect();

@@ -10,18 +10,18 @@ use solvable::{Outcome, Solvable, Tally, numeric_problem, outcome, outcome_with,
 /// Number of seeds; `examples/solvable` tries more.
 const SEEDS: u64 = 1_000;
 
-/// The most states per problem.
+/// Maximum number of states per problem.
 const STATES: u64 = 1_000;
 
-/// The same for problems about one changing number, which need more states.
+/// As above for problems about one changing number, which need more states.
 const NUMERIC_SEEDS: u64 = 300;
 const NUMERIC_STATES: u64 = 20_000;
 
-/// The most problems without a plan found, refused ones included.
+/// Maximum number of problems without a plan found, including unsupported ones.
 const MOST_MISSED: usize = 2;
 
-/// Plans for these problems, and returns how many have a plan found and the seeds of the others. No problem may be called
-/// unsolvable, and no plan may be invalid.
+/// Plans for these problems. Returns the number of plans found, and the seeds of the other
+/// problems. Panics if a problem is called unsolvable, or a plan is invalid.
 fn tried(seeds: u64, states: u64, problem: impl Fn(u64) -> Option<Solvable>) -> (Tally, Vec<u64>) {
     let mut tally = Tally::default();
     let mut missed = Vec::new();

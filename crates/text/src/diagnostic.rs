@@ -1,4 +1,4 @@
-//! What was found wrong, or worth a warning, and where.
+//! Errors and warnings, with their places in a text.
 
 use std::fmt;
 
@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::source::{Source, Span};
 
-/// The severity of a finding: an error makes a text unusable, a warning does not.
+/// Severity of a finding. An error makes a text unusable, a warning does not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// The text cannot be used.
     Error,
-    /// The text is used all the same.
+    /// The text can be used nevertheless.
     Warning,
 }
 
@@ -28,7 +28,7 @@ impl fmt::Display for Severity {
 /// A place in a text, and a remark about it.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Label {
-    /// The text.
+    /// The text that contains the place.
     pub source: Source,
     /// The place.
     pub span: Span,
@@ -36,7 +36,7 @@ pub struct Label {
     pub text: String,
 }
 
-/// `name:line:column: remark`; the text itself would fill the screen.
+/// Prints `name:line:column: remark`, since the text itself would fill the screen.
 impl fmt::Debug for Label {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (line, column) = self.source.position(self.span.start);
@@ -44,25 +44,25 @@ impl fmt::Debug for Label {
     }
 }
 
-/// One mistake or warning.
+/// An error or a warning.
 ///
 /// `Debug` prints what `Display` prints: `name:line:column: severity: message; advice`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// Whether the text can be used all the same.
+    /// The severity: an error makes the text unusable.
     pub severity: Severity,
-    /// For programs: the kind of finding, where a reader tells kinds apart.
+    /// The kind of finding, for programs, if the reader distinguishes kinds.
     pub code: Option<&'static str>,
     /// The message, in lower case.
     pub message: String,
-    /// Where. At least one: the first is the place itself, others explain it.
+    /// The places. There is at least one: the first is the place itself, others explain it.
     pub labels: Vec<Label>,
     /// The form that was expected, or advice.
     pub advice: Option<String>,
 }
 
 impl Diagnostic {
-    /// A finding at a place in a text.
+    /// Creates a finding at a place in a text.
     pub fn new(
         severity: Severity,
         source: &Source,
@@ -83,20 +83,20 @@ impl Diagnostic {
         }
     }
 
-    /// Sets the remark that stands beside the place itself.
+    /// Sets the remark for the place itself.
     pub fn label(&mut self, text: impl Into<String>) -> &mut Self {
         self.labels[0].text = text.into();
         self
     }
 
-    /// Sets what was expected, or what to do. An empty text is none.
+    /// Sets the expected form, or the advice. An empty text removes it.
     pub fn advise(&mut self, advice: impl Into<String>) -> &mut Self {
         let advice = advice.into();
         self.advice = (!advice.is_empty()).then_some(advice);
         self
     }
 
-    /// Adds "did you mean", if there is something to suggest.
+    /// Adds "did you mean", if there is a suggestion.
     pub fn suggest(&mut self, name: Option<&str>) -> &mut Self {
         if let Some(name) = name {
             self.advice = Some(format!("did you mean `{name}`?"));
@@ -104,22 +104,23 @@ impl Diagnostic {
         self
     }
 
-    /// The text in which it was found.
+    /// Returns the text of the finding.
     pub fn source(&self) -> &Source {
         &self.labels[0].source
     }
 
-    /// The line, from 1.
+    /// Returns the line, from 1.
     pub fn line(&self) -> usize {
         self.position().0
     }
 
-    /// The column, from 1, in characters.
+    /// Returns the column, from 1, in characters.
     pub fn column(&self) -> usize {
         self.position().1
     }
 
-    /// The number of characters that the place spans on its line; 0 where something is missing.
+    /// Returns the number of characters that the place spans on its line; 0 if something is missing
+    /// there.
     pub fn length(&self) -> usize {
         self.source().length(&self.labels[0].span)
     }
@@ -129,7 +130,7 @@ impl Diagnostic {
     }
 }
 
-/// `name:line:column: severity: message; advice`
+/// Prints `name:line:column: severity: message; advice`.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (line, column) = self.position();
@@ -148,17 +149,17 @@ impl fmt::Debug for Diagnostic {
     }
 }
 
-/// Why a text cannot be used: at least one error, and the warnings met on the way.
+/// Findings about a text that cannot be used: at least one error, and the warnings.
 ///
 /// `Debug` prints what `Display` prints, so that `main` may return it.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Diagnostics(Vec<Diagnostic>);
 
 impl Diagnostics {
-    /// A value with warnings, unless there is no value or one of the findings is an error.
+    /// Returns a value with warnings, unless there is no value or one of the findings is an error.
     ///
     /// # Errors
-    /// All findings. A reader that gives no value has to note why.
+    /// Returns all findings. A reader that returns no value must have reported an error.
     pub fn outcome<T>(
         value: Option<T>,
         found: Vec<Diagnostic>,
@@ -170,12 +171,12 @@ impl Diagnostics {
         }
     }
 
-    /// All of them, in the order in which they were found.
+    /// Returns all findings in order of detection.
     pub fn iter(&self) -> impl Iterator<Item = &Diagnostic> {
         self.0.iter()
     }
 
-    /// The errors among them.
+    /// Returns the errors.
     pub fn errors(&self) -> impl Iterator<Item = &Diagnostic> {
         self.iter().filter(|d| d.severity == Severity::Error)
     }
@@ -193,7 +194,7 @@ impl From<Diagnostics> for Vec<Diagnostic> {
     }
 }
 
-/// One line each.
+/// Prints one line for each finding.
 impl fmt::Display for Diagnostics {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (index, diagnostic) in self.iter().enumerate() {

@@ -1,8 +1,8 @@
-//! Texts, places in them, and diagnostics: what every reader of a text format needs.
+//! Texts, places in them, and diagnostics, for the readers of all text formats.
 //!
-//! In: a text with the name of its file, a [`Source`]. While a reader goes through it, it notes
-//! what is wrong in a [`Report`]. Out: the value, with warnings, or [`Diagnostics`]: each one says
-//! what is wrong, where, and what to do. All readers share one look on the terminal
+//! The input is a text with the name of its file, a [`Source`]. The reader records its findings in
+//! a [`Report`]. The output is the value, with warnings, or [`Diagnostics`]: each one states the
+//! problem, its place, and the remedy. All readers share one appearance on the terminal
 //! ([`Diagnostic::render`]) and one form for programs ([`Record`], which serializes to JSON).
 //!
 //! The crate knows no file format but TOML (feature `toml`), opens no files, and prints nothing.

@@ -4,12 +4,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::diagnostic::{Diagnostic, Diagnostics, Label, Severity};
 
-/// A [`Diagnostic`] as plain data: what `--json` prints, and what an editor needs.
+/// A [`Diagnostic`] as plain data, as printed by `--json` and used by editors.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Record {
-    /// Whether the text can be used all the same.
+    /// The severity: an error makes the text unusable.
     pub severity: Severity,
-    /// The kind of finding, where a reader tells kinds apart.
+    /// The kind of finding, if the reader distinguishes kinds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub code: Option<String>,
     /// The message, in lower case.
@@ -22,7 +22,7 @@ pub struct Record {
     pub line: usize,
     /// The column, from 1, in characters.
     pub column: usize,
-    /// How many characters the place spans on its line; 0 where something is missing.
+    /// Number of characters that the place spans on its line; 0 if something is missing there.
     pub length: usize,
     /// Remarks about this and other places.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -40,19 +40,19 @@ pub struct RecordLabel {
     pub line: usize,
     /// The column, from 1, in characters.
     pub column: usize,
-    /// How many characters the place spans on its line.
+    /// Number of characters that the place spans on its line.
     pub length: usize,
 }
 
 impl Diagnostic {
-    /// The finding as plain data, for programs.
+    /// Returns the finding as plain data, for programs.
     pub fn record(&self) -> Record {
         Record::from(self)
     }
 }
 
 impl Diagnostics {
-    /// All of them as plain data, for programs.
+    /// Returns all findings as plain data, for programs.
     pub fn records(&self) -> Vec<Record> {
         self.iter().map(Diagnostic::record).collect()
     }

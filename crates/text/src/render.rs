@@ -1,19 +1,19 @@
-//! Diagnostics as a terminal shows them.
+//! Diagnostics for terminals.
 
 use annotate_snippets::{AnnotationKind, Element, Level, Origin, Renderer, Snippet};
 
 use crate::diagnostic::{Diagnostic, Diagnostics, Label, Severity};
 use crate::source::{Source, Span};
 
-/// Columns of a terminal. Of longer lines only what stands around the place is shown.
+/// Columns of a terminal. Longer lines are cut to the part around the place.
 const WIDTH: usize = 100;
-/// Longer lines are not shown: cutting them takes time, and a machine wrote them.
+/// Maximum length of a shown line. Cutting longer ones takes time, and they are usually generated.
 const LONGEST_LINE: usize = 20_000;
-/// Most lines shown of one place.
+/// Maximum number of lines shown of one place.
 const MOST_LINES: usize = 4;
 
 impl Diagnostic {
-    /// The finding with an excerpt of the text, as a terminal shows it.
+    /// Returns the finding with an excerpt of the text, for a terminal.
     pub fn render(&self, colored: bool) -> String {
         let level = match self.severity {
             Severity::Error => Level::ERROR,
@@ -38,7 +38,7 @@ impl Diagnostic {
 }
 
 impl Diagnostics {
-    /// All of them with excerpts, as a terminal shows them.
+    /// Returns all findings with excerpts, for a terminal.
     pub fn render(&self, colored: bool) -> String {
         self.iter()
             .map(|diagnostic| diagnostic.render(colored))
@@ -47,7 +47,7 @@ impl Diagnostics {
     }
 }
 
-/// The lines around a label, or only its position where they are too long.
+/// Returns the lines around a label, or only its position if they are too long.
 fn excerpt(label: &Label, is_primary: bool) -> Element<'_> {
     let source = &label.source;
     let (first, column) = source.position(label.span.start);
@@ -78,7 +78,7 @@ fn excerpt(label: &Label, is_primary: bool) -> Element<'_> {
         .into()
 }
 
-/// The part of `span` that is shown, relative to what is shown.
+/// Returns the shown part of `span`, relative to `shown`.
 fn within(source: &Source, span: &Span, shown: &Span) -> Span {
     let start = source.boundary(span.start).clamp(shown.start, shown.end);
     let end = source.boundary(span.end).clamp(start, shown.end);

@@ -1,24 +1,24 @@
-//! Collects findings while a text is read.
+//! Collection of findings while a text is read.
 
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity};
 use crate::source::{Source, Span};
 use crate::suggest::nearest;
 
-/// The text being read, and what was found in it so far.
+/// The text being read, and the findings so far.
 #[derive(Debug)]
 pub struct Report {
     source: Source,
     found: Vec<Diagnostic>,
-    /// Takes the place of findings beyond the last that is kept.
+    /// Replaces the findings beyond the limit.
     surplus: Option<Diagnostic>,
     is_failed: bool,
 }
 
 impl Report {
-    /// The limit on findings that are kept.
+    /// Maximum number of findings that are kept.
     pub const MOST: usize = 100;
 
-    /// Nothing was found yet.
+    /// Creates a report without findings.
     pub fn new(source: &Source) -> Self {
         Self {
             source: source.clone(),
@@ -28,18 +28,18 @@ impl Report {
         }
     }
 
-    /// The text being read.
+    /// Returns the text being read.
     pub fn source(&self) -> &Source {
         &self.source
     }
 
-    /// Notes a mistake.
+    /// Adds an error.
     pub fn error(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
         self.is_failed = true;
         self.add(Severity::Error, span, message.into())
     }
 
-    /// Notes a mistake, and what to do about it if there is something to say.
+    /// Adds an error with advice, if there is any.
     pub fn mistake(
         &mut self,
         span: impl Into<Span>,
@@ -49,12 +49,12 @@ impl Report {
         self.error(span.into(), message).advice = advice.into();
     }
 
-    /// Notes something that is used all the same, and may be meant otherwise.
+    /// Adds a warning about a construct that is accepted, but may be a mistake.
     pub fn warning(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
         self.add(Severity::Warning, span, message.into())
     }
 
-    /// Notes a warning, unless one with this message is there already.
+    /// Adds a warning, unless there is already one with this message.
     pub fn warn_once(&mut self, span: Span, message: &str) -> &mut Diagnostic {
         match self.found.iter().position(|d| d.message == message) {
             Some(position) => &mut self.found[position],
@@ -62,7 +62,8 @@ impl Report {
         }
     }
 
-    /// The candidate most like `name`, unless there are so many findings that none is needed.
+    /// Returns the candidate most similar to `name`. Returns `None` once the number of findings has
+    /// reached the limit.
     pub fn nearest<'a>(
         &self,
         name: &str,
@@ -75,15 +76,16 @@ impl Report {
         }
     }
 
-    /// Whether there was an error.
+    /// Returns `true` if there was an error.
     pub fn is_failed(&self) -> bool {
         self.is_failed
     }
 
-    /// The value with the warnings, or all that was found, by position.
+    /// Returns the value with the warnings.
     ///
     /// # Errors
-    /// When there was an error. A reader without a value has to note why.
+    /// Returns all findings, by position, if there was an error. A reader without a value must have
+    /// reported an error.
     pub fn finish<T>(mut self, value: Option<T>) -> Result<(T, Vec<Diagnostic>), Diagnostics> {
         self.found.sort_by_key(|found| found.labels[0].span.start);
         Diagnostics::outcome(value, self.found)
@@ -91,8 +93,8 @@ impl Report {
 
     fn add(&mut self, severity: Severity, span: Span, message: String) -> &mut Diagnostic {
         let diagnostic = Diagnostic::new(severity, &self.source, span, message);
-        // An error that is not kept must not turn the outcome into a success: the first error
-        // is kept even when warnings have used up the room.
+        // An error that is not kept must not turn the result into a success: the first error is
+        // kept even if warnings have reached the limit.
         let is_error = |d: &Diagnostic| d.severity == Severity::Error;
         let is_first_error = severity == Severity::Error && !self.found.iter().any(is_error);
         if self.found.len() < Self::MOST || is_first_error {

@@ -7,9 +7,10 @@ use std::sync::Arc;
 /// A place in a text, in bytes: `start..end`.
 pub type Span = Range<usize>;
 
-/// A text with the name it is reported under. Cheap to clone. Lines end with `\n`, `\r\n` or `\r`.
+/// A text with the name under which it is reported. Cheap to clone. Lines end with `\n`, `\r\n` or
+/// `\r`.
 ///
-/// `Source::from("…")` makes one whose name is `text`, for texts that come from no file.
+/// `Source::from("…")` creates a source with the name `text`, for texts that are not from a file.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Source(Arc<Inner>);
 
@@ -23,12 +24,12 @@ const NAMELESS: &str = "text";
 struct Inner {
     name: String,
     text: String,
-    /// Where each line begins.
+    /// Beginning of each line.
     lines: Vec<usize>,
 }
 
 impl Source {
-    /// A text under a name, usually the path of the file it comes from.
+    /// Creates a source with a name, usually the path of the file.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         let mut text = text.into();
         if text.starts_with(BYTE_ORDER_MARK) {
@@ -50,23 +51,23 @@ impl Source {
         }))
     }
 
-    /// The same from bytes. What is not UTF-8 becomes U+FFFD, which the readers report unless it
-    /// stands in a comment.
+    /// Creates a source from bytes. Invalid UTF-8 becomes U+FFFD, which the readers report unless
+    /// it is in a comment.
     pub fn from_bytes(name: impl Into<String>, bytes: &[u8]) -> Self {
         Self::new(name, String::from_utf8_lossy(bytes))
     }
 
-    /// The name it is reported under.
+    /// Returns the name under which the text is reported.
     pub fn name(&self) -> &str {
         &self.0.name
     }
 
-    /// The text.
+    /// Returns the text.
     pub fn text(&self) -> &str {
         &self.0.text
     }
 
-    /// Line and column, both from 1, of a byte position. Columns count characters.
+    /// Returns line and column, both from 1, of a byte position. Columns count characters.
     pub fn position(&self, at: usize) -> (usize, usize) {
         let at = self.boundary(at);
         let line = self.0.lines.partition_point(|&start| start <= at);
@@ -74,7 +75,7 @@ impl Source {
         (line, self.text()[start..at].chars().count() + 1)
     }
 
-    /// The number of characters that a place spans on the line on which it begins.
+    /// Returns the number of characters that a place spans on its first line.
     pub fn length(&self, span: &Span) -> usize {
         let start = self.boundary(span.start);
         let (line, _) = self.position(start);
@@ -82,7 +83,7 @@ impl Source {
         self.text()[start..end].chars().count()
     }
 
-    /// The span of a line (from 1), without its line break. Empty past the end.
+    /// Returns the span of a line (from 1), without its line break. Empty past the end.
     pub fn line(&self, line: usize) -> Span {
         let end_of_text = self.text().len();
         let Some(&start) = self.0.lines.get(line.wrapping_sub(1)) else {
@@ -94,12 +95,12 @@ impl Source {
         start..start + line.len()
     }
 
-    /// The spans of all lines, without their line breaks.
+    /// Returns the spans of all lines, without their line breaks.
     pub fn lines(&self) -> impl Iterator<Item = Span> + '_ {
         (1..=self.0.lines.len()).map(|line| self.line(line))
     }
 
-    /// The last position not after `at` that lies between two characters of the text.
+    /// Returns the last position not after `at` that is between two characters of the text.
     pub(crate) fn boundary(&self, at: usize) -> usize {
         let mut at = at.min(self.text().len());
         while !self.text().is_char_boundary(at) {
@@ -109,7 +110,7 @@ impl Source {
     }
 }
 
-/// The name and the text.
+/// Prints the name and the text.
 impl fmt::Debug for Source {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Source")

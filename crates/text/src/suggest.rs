@@ -1,11 +1,11 @@
 //! "Did you mean …?"
 
-/// Longest name that is compared; the comparison takes quadratic time.
+/// Maximum length of a compared name; the comparison takes quadratic time.
 const LONGEST: usize = 60;
-/// The number of candidates compared at most, for the same reason.
+/// Maximum number of compared candidates, for the same reason.
 const MOST_CANDIDATES: usize = 2000;
 
-/// The candidate most like `name`, if one is like it. Ignores case.
+/// Returns the candidate most similar to `name`, if one is similar. Ignores case.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name: Vec<char> = name.to_ascii_lowercase().chars().collect();
     if name.len() > LONGEST {
@@ -26,7 +26,8 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// How many insertions, deletions, replacements and swaps of neighbours lead from `a` to `b`.
+/// Returns the number of insertions, deletions, replacements and swaps of neighbours that lead from
+/// `a` to `b`.
 fn distance(a: &[char], b: &[char]) -> usize {
     let mut before_last: Vec<usize> = vec![0; b.len() + 1];
     let mut last: Vec<usize> = (0..=b.len()).collect();

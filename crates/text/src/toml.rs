@@ -1,4 +1,4 @@
-//! Reads TOML files, with the mistakes as diagnostics.
+//! Reader of TOML files that reports mistakes as diagnostics.
 
 use serde::de::DeserializeOwned;
 
@@ -9,13 +9,13 @@ use crate::suggest::nearest;
 /// Reads a TOML file into a type.
 ///
 /// # Errors
-/// The first mistake, at the key or value that is wrong, in words that name no Rust types, and with
-/// the key that was probably meant.
+/// Returns the first mistake, at the wrong key or value. The message mentions no Rust types, and
+/// suggests the key that was probably meant.
 pub fn read<T: DeserializeOwned>(source: &Source) -> Result<T, Diagnostic> {
     toml::from_str(source.text()).map_err(|error| diagnostic(source, &error))
 }
 
-/// An error of the reader of TOML as a diagnostic.
+/// Converts an error of the TOML reader to a diagnostic.
 pub fn diagnostic(source: &Source, error: &toml::de::Error) -> Diagnostic {
     let end = source.text().trim_end().len();
     let span = error.span().unwrap_or(end..end);
@@ -43,7 +43,8 @@ pub fn diagnostic(source: &Source, error: &toml::de::Error) -> Diagnostic {
     diagnostic
 }
 
-/// The name that is not known, and those that are: "unknown field `a`, expected one of `b`, `c`".
+/// Returns the unknown name and the known ones of a message: "unknown field `a`, expected one of
+/// `b`, `c`".
 fn unknown(message: &str) -> Option<(&str, Vec<&str>)> {
     let start = ["unknown field ", "unknown variant "]
         .into_iter()
@@ -53,7 +54,7 @@ fn unknown(message: &str) -> Option<(&str, Vec<&str>)> {
     Some((name, known.split('`').skip(1).step_by(2).collect()))
 }
 
-/// The name in backquotes that follows `start` at the beginning of the message.
+/// Returns the name in backquotes that follows `start` at the beginning of the message.
 fn quoted_after<'m>(message: &'m str, start: &str) -> Option<&'m str> {
     message
         .strip_prefix(start)?
@@ -62,7 +63,7 @@ fn quoted_after<'m>(message: &'m str, start: &str) -> Option<&'m str> {
         .next()
 }
 
-/// The message of the reader of TOML, which speaks of Rust's types.
+/// Converts the message of the TOML reader, which mentions Rust types, to plain words.
 fn in_words(message: &str) -> String {
     const FOUND: [(&str, &str); 5] = [
         ("floating point `", "the number `"),

@@ -1,4 +1,4 @@
-//! The document about what is supported.
+//! Writes the document on supported PDDL features.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -7,7 +7,7 @@ use elbowroom_pddl::Feature;
 
 use crate::survey::{Domain, Survey, reason};
 
-/// What is executed, in the words of the field.
+/// Supported parts of PDDL and their scope.
 const SUPPORTED: &[(&str, &str)] = &[
     (
         "Types",
@@ -89,7 +89,7 @@ const SUPPORTED: &[(&str, &str)] = &[
     ),
 ];
 
-/// What constraints mean where papers and programs leave it open.
+/// Semantics of constraints where papers and programs leave it open.
 const CONSTRAINTS: &str = "\n## Constraints and preferences\n
 The meaning is that of Gerevini, Haslum, Long, Saetti & Dimopoulos (*Deterministic planning in the \
 fifth international planning competition*, AIJ 173, 2009): a constraint looks at the sequence of \
@@ -116,7 +116,7 @@ states that a plan goes through.
 
 ";
 
-/// What processes and events mean, and who heeds them.
+/// Semantics of processes and events, and the planners and executors that account for them.
 const AUTONOMOUS: &str = "\n## Processes and events\n
 The meaning is that of Fox & Long (*Modelling mixed discrete-continuous domains for planning*, JAIR \
 27, 2006).
@@ -146,7 +146,7 @@ The meaning is that of Fox & Long (*Modelling mixed discrete-continuous domains 
 
 ";
 
-/// The document. Without a survey it has no tables.
+/// Returns the document. Without a survey, it has no tables.
 pub(crate) fn document(survey: Option<&Survey>) -> String {
     let mut text = String::from(
         "# PDDL support\n\n\
@@ -238,7 +238,7 @@ fn benchmarks(survey: &Survey, text: &mut String) {
     }
 }
 
-/// How many instances are refused for each reason.
+/// Counts the refused instances by reason.
 pub(crate) fn reasons(survey: &Survey) -> BTreeMap<String, usize> {
     let mut reasons = BTreeMap::new();
     for domain in &survey.domains {

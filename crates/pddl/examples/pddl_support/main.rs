@@ -1,5 +1,5 @@
-//! Writes `docs/pddl-support.md`: which of PDDL is executed, refused, ignored, and what becomes
-//! of each domain of the benchmark set.
+//! Writes `docs/pddl-support.md`: the supported, refused and ignored parts of PDDL, and the results
+//! for each domain of the benchmark set.
 //!
 //! `cargo run --release -p elbowroom-pddl --example pddl_support > docs/pddl-support.md`
 

@@ -1,5 +1,5 @@
-//! Reads all problems and plans of the benchmark set, makes the problems ground, and sums up what
-//! became of them.
+//! Reads all problems and plans of the benchmark set, grounds the problems, and summarizes the
+//! results.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -9,35 +9,36 @@ use elbowroom_model::Task;
 use elbowroom_model::reachability::{self, Answer, ground};
 use elbowroom_pddl::{Diagnostic, Diagnostics, Feature, Source, read_plan, read_problem};
 
-/// What became of all texts.
+/// Results over the whole benchmark set.
 #[derive(Debug, Default)]
 pub(crate) struct Survey {
-    /// By collection and domain, in the order of the manifest.
+    /// Results by collection and domain, in the order of the manifest.
     pub(crate) domains: Vec<Domain>,
-    /// Plans of problems that were read, and plans that were read.
+    /// Number of plans of problems that were read, and number of those plans that were read.
     pub(crate) plans: (usize, usize),
 }
 
-/// What became of the instances of one domain.
+/// Results for the instances of one domain.
 #[derive(Debug, Default)]
 pub(crate) struct Domain {
     /// `collection/domain`
     pub(crate) name: String,
-    /// How many problems there are.
+    /// Number of problems.
     pub(crate) instances: usize,
-    /// How many of them were read.
+    /// Number of problems that were read.
     pub(crate) read: usize,
-    /// How many of these were made ground, within the limits.
+    /// Number of read problems that were grounded within the limits.
     pub(crate) grounded: usize,
-    /// How many ground actions can be reached in them, all together.
+    /// Total number of reachable ground actions in them.
     pub(crate) actions: usize,
-    /// The refused ones, with all errors.
+    /// Names of the refused problems, with all errors.
     pub(crate) refused: Vec<(String, Vec<Diagnostic>)>,
-    /// How often each thing was warned of.
+    /// Number of warnings by kind.
     pub(crate) warnings: BTreeMap<String, usize>,
 }
 
-/// Why a problem was refused: the names of the features it uses, or that it contains mistakes.
+/// Returns the reason why a problem was refused: the names of the unsupported features, or
+/// `mistakes`.
 pub(crate) fn reason(errors: &[Diagnostic]) -> String {
     if errors.iter().any(|error| Feature::of(error).is_none()) {
         return "mistakes".to_owned();
@@ -47,7 +48,7 @@ pub(crate) fn reason(errors: &[Diagnostic]) -> String {
     names.join(", ")
 }
 
-/// The folder of the benchmark set: below `ELBOWROOM_SHARED`, or beside the repository.
+/// Returns the folder of the benchmark set: below `ELBOWROOM_SHARED`, or next to the repository.
 pub(crate) fn folder() -> Option<PathBuf> {
     let shared = std::env::var_os("ELBOWROOM_SHARED").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared")),
@@ -56,7 +57,7 @@ pub(crate) fn folder() -> Option<PathBuf> {
     Some(shared.join("data/pddl")).filter(|folder| folder.is_dir())
 }
 
-/// Reads everything. Panics where a file of the manifest is missing.
+/// Reads the whole benchmark set. Panics if a file of the manifest is missing.
 pub(crate) fn survey(folder: &Path) -> Survey {
     let mut survey = Survey::default();
     for row in rows(&folder.join("manifest.csv")) {
@@ -107,7 +108,7 @@ fn plan_steps(plan: &Source, task: &Task) -> Result<usize, Diagnostics> {
     read_plan(plan, task).map(|(plan, _)| plan.steps.len())
 }
 
-/// The rows of a table without its head. None of its fields contains a comma.
+/// Returns the rows of a table without its head. No field contains a comma.
 pub(crate) fn rows(path: &Path) -> Vec<Vec<String>> {
     let text = fs::read_to_string(path).expect("the benchmark set has its tables");
     text.lines()

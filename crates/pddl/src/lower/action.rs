@@ -31,7 +31,7 @@ const DURATIVE: &[&str] = &[
     ":effect",
 ];
 
-/// The keywords of an action, each with its own place and what stands after it.
+/// The keywords of an action, each with its position and the node that follows it.
 pub(super) type Fields<'t, 's> = BTreeMap<&'static str, (Span, Option<&'t Node<'s>>)>;
 
 impl Reader {
@@ -80,7 +80,7 @@ impl Reader {
         });
     }
 
-    /// Pairs keywords with what stands after them.
+    /// Pairs each keyword with the node that follows it.
     pub(super) fn fields<'t, 's>(
         &mut self,
         whose: &str,
@@ -103,7 +103,7 @@ impl Reader {
             let value = nodes.next_if(|next| !is_keyword(next));
             let Some(&keyword) = allowed.iter().find(|keyword| **keyword == word) else {
                 let near = match word.as_ref() {
-                    // A durative action's are called differently; a frequent confusion.
+                    // `:condition` and `:precondition` are often confused.
                     ":precondition" => Some(":condition"),
                     ":condition" => Some(":precondition"),
                     _ => nearest(&word, allowed.iter().copied()),

@@ -67,7 +67,8 @@ impl Reader {
         self.refuse_second(&name, kind, span);
     }
 
-    /// Names of processes are unique, and so are those of events: what the judge says names them.
+    /// Reports a second process, or a second event, of the same name. Names must be unique because
+    /// the validator's messages use them.
     fn refuse_second(&mut self, name: &str, kind: &str, span: Span) {
         let count = if kind == "a process" {
             let names = self.problem.processes.iter().map(|process| &process.name);
@@ -83,7 +84,7 @@ impl Reader {
         }
     }
 
-    /// Reads a global constraint: what holds in each state.
+    /// Reads a global constraint: a condition on every state.
     pub(super) fn global_constraint(&mut self, section: &Section) {
         let Some((name, rest)) = self.named(section, "a constraint") else {
             return;
@@ -111,7 +112,8 @@ impl Reader {
         self.add_constraint(Some(constraint), section.span);
     }
 
-    /// The name in lower case, and what stands behind it; `None`, with a report, if there is none.
+    /// Returns the name in lower case and the nodes after it. Returns `None`, with a report, if
+    /// there is no name.
     fn named<'t, 's>(
         &mut self,
         section: &Section<'t, 's>,

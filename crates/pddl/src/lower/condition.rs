@@ -9,7 +9,7 @@ use crate::lower::timed::{Timed, time_specifier};
 use crate::syntax::Node;
 
 impl Reader {
-    /// A condition on one state.
+    /// Reads a condition on one state.
     pub(super) fn condition(&mut self, node: &Node, scope: &mut Scope) -> Condition {
         if node.is_empty_list() {
             return Condition::TRUE;
@@ -117,7 +117,7 @@ impl Reader {
         (variables, part)
     }
 
-    /// `(< a b)`, or `(= a b)` of numbers or of objects.
+    /// Reads `(< a b)`, or `(= a b)` of numbers or of objects.
     fn comparison(
         &mut self,
         comparison: Comparison,
@@ -152,7 +152,7 @@ impl Reader {
         )
     }
 
-    /// Whether a word denotes an object here.
+    /// Returns `true` if a word denotes an object here.
     fn is_term(&self, node: &Node, scope: &Scope) -> bool {
         node.lower().is_some_and(|word| {
             scope.variable(&word).is_some()
@@ -161,7 +161,7 @@ impl Reader {
         })
     }
 
-    /// Whether something can only be a number here.
+    /// Returns `true` if the node can only denote a number here.
     fn is_number(&self, node: &Node, scope: &Scope) -> bool {
         match node.lower() {
             Some(word) => {
@@ -190,7 +190,7 @@ impl Reader {
     }
 }
 
-/// Runs `read` where leaving out a preference would change what must hold.
+/// Runs `read` in a context where ignoring a preference would change the hard conditions.
 pub(super) fn without_preferences<T>(scope: &mut Scope, read: impl FnOnce(&mut Scope) -> T) -> T {
     scope.without_preferences += 1;
     let read = read(scope);
@@ -198,7 +198,7 @@ pub(super) fn without_preferences<T>(scope: &mut Scope, read: impl FnOnce(&mut S
     read
 }
 
-/// The comparison that a symbol denotes.
+/// Returns the comparison of a symbol.
 pub(super) fn comparison(symbol: &str) -> Option<Comparison> {
     Some(match symbol {
         "<" => Comparison::Less,

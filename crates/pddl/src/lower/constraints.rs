@@ -1,4 +1,4 @@
-//! `:constraints`, and preferences wherever they stand (PDDL 3).
+//! `:constraints`, and preferences in all their contexts (PDDL 3).
 
 use elbowroom_model::problem::{
     ActionPreference, Condition, Constraint, Modal, PreferenceId, SchemaId, Variable,
@@ -13,7 +13,7 @@ use crate::lower::timed::Timed;
 use crate::syntax::Node;
 use elbowroom_text::nearest;
 
-/// How constraints on the course of a plan are written.
+/// Syntax of the constraints on the course of a plan.
 const MODALS: &[(&str, &str)] = &[
     ("always", "(always condition)"),
     ("sometime", "(sometime condition)"),
@@ -26,10 +26,10 @@ const MODALS: &[(&str, &str)] = &[
     ("hold-after", "(hold-after time condition)"),
 ];
 
-/// The name of preferences without one.
+/// Name of preferences without a name.
 const ANONYMOUS: &str = "anonymous";
 
-/// Where forms of that name belong, which is not among the conditions on a state.
+/// Returns the place where forms of that name belong if they are not conditions on a state.
 pub(super) fn belongs_elsewhere(name: &str) -> Option<&'static str> {
     if name == "preference" {
         return Some("preferences stand among conditions, in goals and under `:constraints`");
@@ -42,9 +42,9 @@ pub(super) fn belongs_elsewhere(name: &str) -> Option<&'static str> {
 #[derive(Debug)]
 pub(super) struct Soft {
     preference: PreferenceId,
-    /// The variables of the quantifiers around it.
+    /// Variables of the enclosing quantifiers.
     variables: Vec<Variable>,
-    /// A condition without time specifiers is filed under the start.
+    /// A condition without time specifiers is stored as that of the start.
     condition: Timed,
 }
 
@@ -197,12 +197,12 @@ impl Reader {
             );
     }
 
-    /// A condition in which no preference can stand.
+    /// Reads a condition that must not contain preferences.
     fn hard_condition(&mut self, node: &Node, scope: &mut Scope) -> Condition {
         without_preferences(scope, |scope| self.condition(node, scope))
     }
 
-    /// A time, from the beginning of the plan or from another moment.
+    /// Reads a time, relative to the beginning of the plan or to another moment.
     fn moment(&mut self, node: &Node) -> Rational {
         let time = self.constant(node);
         if time.is_negative() {
@@ -211,7 +211,7 @@ impl Reader {
         time
     }
 
-    /// The name and the content of `(preference name content)`.
+    /// Returns the name and the content of `(preference name content)`.
     fn preference_parts<'t, 's>(
         &mut self,
         node: &'t Node<'s>,
@@ -245,7 +245,7 @@ impl Reader {
         }))
     }
 
-    /// A preference in a condition, whose content `read` reads.
+    /// Reads a preference in a condition; `read` reads its content.
     pub(super) fn preference(
         &mut self,
         node: &Node,
@@ -264,7 +264,7 @@ impl Reader {
         });
     }
 
-    /// The preferences found in an action's conditions.
+    /// Adds the preferences found in an action's conditions.
     pub(super) fn action_preferences(&mut self, found: Vec<Soft>, schema: SchemaId) {
         for soft in found {
             self.problem.action_preferences.push(ActionPreference {
@@ -278,7 +278,7 @@ impl Reader {
         }
     }
 
-    /// The preferences found in the goal: constraints on its end.
+    /// Adds the preferences found in the goal, as constraints on the end of the plan.
     pub(super) fn goal_preferences(&mut self, found: Vec<Soft>, span: crate::source::Span) {
         for soft in found {
             let at_end = Constraint::Modal(Modal::AtEnd(soft.condition.start));
@@ -290,7 +290,7 @@ impl Reader {
         }
     }
 
-    /// `(is-violated name)` in the metric.
+    /// Reads `(is-violated name)` in the metric.
     pub(super) fn violations(&mut self, node: &Node, parts: &[Node]) -> Option<PreferenceId> {
         let [name] = parts else {
             self.report

@@ -1,4 +1,4 @@
-//! Rates of continuous change: what stands with `#t`.
+//! Rates of continuous change: the expressions with `#t`.
 
 use elbowroom_model::problem::{Expression, UpdateOperator};
 use elbowroom_num::Rational;
@@ -15,7 +15,8 @@ struct Linear {
 }
 
 impl Reader {
-    /// The rate of a continuous effect, sign included. `None`, with a report, if there is none.
+    /// Returns the rate of a continuous effect, including its sign. Returns `None`, with a report,
+    /// if there is none.
     pub(super) fn rate(
         &mut self,
         value: &Node,
@@ -43,7 +44,7 @@ impl Reader {
         let rate = rate?;
         Some(match (operator, rate) {
             (UpdateOperator::Increase, rate) => rate,
-            // Not worked out even if it is a number, so that it stays visible what was written.
+            // Not evaluated even if it is a number, so that the text as written stays visible.
             (_, rate) => Expression::Negate(Box::new(rate)),
         })
     }
@@ -122,7 +123,7 @@ impl Linear {
         }
     }
 
-    /// The product, where at most one of the two has a rate.
+    /// Returns the product. At most one factor may have a rate.
     fn times(self, other: Self) -> Self {
         let (timed, factor) = if other.rate.is_some() {
             (other, self.constant)
@@ -167,7 +168,7 @@ fn times(left: Expression, right: Expression) -> Expression {
     }
 }
 
-/// Whether `#t` occurs in it.
+/// Returns `true` if `#t` occurs in the node.
 pub(super) fn mentions_time(node: &Node) -> bool {
     match &node.kind {
         Kind::Word(word) => word.eq_ignore_ascii_case("#t"),

@@ -11,7 +11,7 @@ use crate::source::Span;
 use crate::syntax::Node;
 
 impl Reader {
-    /// `:constants` or `:objects`.
+    /// Reads `:constants` or `:objects`.
     pub(super) fn objects(&mut self, section: &Section) {
         for entry in self.typed_list(section.content) {
             let Some(name) = entry.node.word() else {
@@ -39,7 +39,7 @@ impl Reader {
         }
     }
 
-    /// An object declared again: as a constant and as an object, or with one more type.
+    /// Warns of an object that is declared again, and adds the new types.
     fn redeclare(&mut self, id: ObjectId, types: Vec<TypeId>, name: &str, span: Span) {
         self.report
             .warning(span, format!("`{name}` is declared already"));
@@ -49,7 +49,7 @@ impl Reader {
         own.dedup();
     }
 
-    /// `:predicates`
+    /// Reads `:predicates`.
     pub(super) fn predicates(&mut self, section: &Section) {
         for node in section.content {
             let Some((name, parameters)) = self.declared_head(node) else {
@@ -84,7 +84,7 @@ impl Reader {
         }
     }
 
-    /// `:functions`
+    /// Reads `:functions`.
     pub(super) fn functions(&mut self, section: &Section) {
         for entry in self.typed_list(section.content) {
             let Some((name, parameters)) = self.declared_head(entry.node) else {
@@ -110,7 +110,8 @@ impl Reader {
         }
     }
 
-    /// A function whose values are objects: a predicate with the value as its last argument.
+    /// Adds a function whose values are objects, as a predicate with the value as its last
+    /// argument.
     fn object_function(&mut self, name: String, mut parameters: Vec<Variable>, entry: &Typed) {
         if let Some((_, span)) = entry.types.iter().find(|(ty, _)| ty == "number") {
             self.report
@@ -143,7 +144,7 @@ impl Reader {
         });
     }
 
-    /// `(name parameter …)` of a predicate or function.
+    /// Reads `(name parameter …)` of a predicate or function.
     fn declared_head<'t, 's>(&mut self, node: &'t Node<'s>) -> Option<(String, &'t [Node<'s>])> {
         if let Some((name, parameters)) = node.form()
             && !name.starts_with(['?', ':'])
@@ -156,7 +157,7 @@ impl Reader {
         None
     }
 
-    /// `:synth-parameters`, of the domain or of an action; perhaps with `- number`.
+    /// Reads `:synth-parameters` of the domain or of an action, optionally with `- number`.
     pub(super) fn unknowns(&mut self, nodes: &[Node]) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for entry in self.typed_list(nodes) {

@@ -9,7 +9,7 @@ use crate::lower::stratify::negative_circles;
 use crate::source::Span;
 use crate::syntax::Node;
 
-/// A rule whose head is read.
+/// A rule whose head has been read.
 pub(super) struct Head<'t, 's> {
     predicate: PredicateId,
     parameters: Vec<Variable>,
@@ -41,7 +41,7 @@ impl Reader {
             })
         });
         let Some(predicate) = predicate else {
-            // This reports what is wrong with the name or the number of arguments.
+            // Reports a wrong name or a wrong number of arguments.
             let scope = Scope {
                 variables: parameters_read,
                 ..Scope::default()
@@ -69,7 +69,7 @@ impl Reader {
         })
     }
 
-    /// Reads the bodies of rules, and refuses those that negate themselves.
+    /// Reads the bodies of rules, and refuses rules that depend on their own negation.
     pub(super) fn rules(&mut self, heads: Vec<Head>) {
         for head in heads {
             let mut scope = Scope {

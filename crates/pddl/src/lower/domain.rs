@@ -24,7 +24,7 @@ const SECTIONS: &[&str] = &[
     ":modules",
 ];
 
-/// Requirement flags, here or in the problem. All of them are always on.
+/// Requirement flags of domains and problems. All of them are always enabled.
 const REQUIREMENTS: &[&str] = &[
     ":strips",
     ":typing",
@@ -119,7 +119,7 @@ impl Reader {
         }
     }
 
-    /// Refuses a section of another dialect, by the name of what it declares.
+    /// Reports a section of another dialect as unsupported, with the name that it declares.
     fn refuse(&mut self, section: &Section) {
         let feature = Feature::Modules;
         let name = section.content.first().and_then(Node::word);
@@ -135,7 +135,7 @@ impl Reader {
         );
     }
 
-    /// Ignores a section that is not known, or says so if its name is misspelt.
+    /// Ignores an unknown section, or reports it if its name is misspelt.
     pub(super) fn skip(&mut self, section: &Section, known: &[&str]) {
         let keyword = &section.keyword;
         let is_known = known.contains(&keyword.as_ref());

@@ -11,7 +11,7 @@ use crate::syntax::{Kind, Node};
 use elbowroom_text::nearest;
 
 impl Reader {
-    /// The constraints on a duration; none for `()`.
+    /// Reads the constraints on a duration; none for `()`.
     pub(super) fn duration(
         &mut self,
         node: &Node,
@@ -91,7 +91,7 @@ impl Reader {
     }
 }
 
-/// The comparison with its sides exchanged.
+/// Returns the comparison with its sides exchanged.
 fn mirrored(comparison: Comparison) -> Comparison {
     match comparison {
         Comparison::Less => Comparison::Greater,

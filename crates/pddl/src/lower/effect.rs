@@ -11,7 +11,7 @@ use crate::lower::timed::{Time, Timed, both, near_specifier, time_specifier};
 use crate::source::Span;
 use crate::syntax::Node;
 
-/// Most text that is copied, over all effects, because it stands around more than one of them.
+/// Upper limit on the text copied, over all effects, because it encloses more than one of them.
 const MOST_COPIED: usize = 20_000_000;
 
 /// The time at which an effect takes place.
@@ -37,7 +37,7 @@ pub(super) struct Effects {
     pub(super) continuous: Vec<ContinuousEffect>,
 }
 
-/// The quantifiers and conditions that stand around an effect.
+/// The quantifiers and conditions that enclose an effect.
 #[derive(Debug, Default)]
 pub(super) struct Around {
     pub(super) variables: Vec<Variable>,
@@ -46,7 +46,7 @@ pub(super) struct Around {
 
 #[derive(Debug)]
 pub(super) struct When {
-    /// Parts without time specifier are filed under the time of the `at` around them.
+    /// Parts without a time specifier belong to the time of the enclosing `at`.
     condition: Timed,
     /// The number of variables that were in scope.
     scope: usize,
@@ -54,7 +54,7 @@ pub(super) struct When {
 }
 
 impl Reader {
-    /// Reads an effect, and all inside it, into `effects`.
+    /// Reads an effect and its nested effects into `effects`.
     pub(super) fn effect(
         &mut self,
         node: &Node,
@@ -211,7 +211,7 @@ impl Reader {
         }
     }
 
-    /// `(p …)` or `(not (p …))`
+    /// Reads `(p …)` or `(not (p …))`.
     fn literal(
         &mut self,
         head: &str,
@@ -239,7 +239,7 @@ impl Reader {
         Some(change(atom))
     }
 
-    /// `(increase (f …) value)`
+    /// Reads `(increase (f …) value)`.
     fn update(
         &mut self,
         operator: UpdateOperator,
@@ -285,8 +285,8 @@ impl Reader {
         }
     }
 
-    /// What the `when`s around an effect mean at its moment. `None`, with a report, if the
-    /// effect would have to look into the future.
+    /// Returns the conditions of the enclosing `when`s at the moment of the effect. Returns `None`,
+    /// with a report, if the effect would depend on the future.
     pub(super) fn guard(
         &mut self,
         around: &Around,

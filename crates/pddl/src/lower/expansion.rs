@@ -1,7 +1,7 @@
-//! How large conditions and effects become when quantifiers are expanded.
+//! Size of conditions and effects after the expansion of quantifiers.
 //!
-//! The model expands quantifiers over objects. A few nested ones over many objects would use up
-//! all memory there, so they are refused here, where the text can be shown.
+//! The model expands quantifiers over objects. A few nested quantifiers over many objects would
+//! exhaust the memory, so they are refused here, where the text can be shown.
 
 use std::collections::BTreeMap;
 
@@ -11,18 +11,19 @@ use elbowroom_model::problem::{Body, Condition, Constraint, Effect, Guard, TypeI
 use crate::lower::Reader;
 use crate::source::Span;
 
-/// Most parts that one condition, or the effects of one action, may have when expanded.
+/// Maximum number of parts of one condition, or of the effects of one action, after expansion.
 const MOST_PARTS: u64 = 10_000_000;
 
-/// Counts parts.
+/// Counter of the parts after expansion.
 struct Sizes<'a> {
     problem: &'a Problem,
-    /// How many objects each set of types has.
+    /// Number of objects for each set of types.
     objects: BTreeMap<&'a [TypeId], u64>,
 }
 
 impl Reader {
-    /// Reports what is too large when expanded. Objects must have been read.
+    /// Reports conditions and effects that are too large when expanded. Objects must have been
+    /// read.
     pub(super) fn check_expansion(&mut self, goal: Option<Span>) {
         let problem = &self.problem;
         let mut sizes = Sizes {
@@ -175,7 +176,7 @@ impl<'a> Sizes<'a> {
         }
     }
 
-    /// The number of ways to choose objects for the variables.
+    /// Returns the number of ways to choose objects for the variables.
     fn combinations(&mut self, variables: &'a [Variable]) -> u64 {
         let problem = self.problem;
         variables.iter().fold(1, |product: u64, variable| {

@@ -8,10 +8,10 @@ use crate::lower::Reader;
 use crate::lower::scope::{Scope, position};
 use crate::syntax::Node;
 
-/// The placeholder for an expression that cannot be understood.
+/// Placeholder for an expression that is not understood.
 pub(super) const WRONG: Expression = Expression::Constant(Rational::ZERO);
 
-/// The number that a word is, if it looks like one at all.
+/// Returns the number that a word represents, if it looks like a number.
 pub(super) fn number(node: &Node) -> Option<Rational> {
     let word = node.word()?;
     let digits = word.trim_start_matches(['-', '+', '.']);
@@ -22,7 +22,7 @@ pub(super) fn number(node: &Node) -> Option<Rational> {
 }
 
 impl Reader {
-    /// A numeric expression.
+    /// Reads a numeric expression.
     pub(super) fn expression(&mut self, node: &Node, scope: &Scope) -> Expression {
         if let Some(word) = node.lower() {
             return self.number_or_name(&word, node, scope);
@@ -118,7 +118,7 @@ impl Reader {
         }
     }
 
-    /// `?name` where a number is expected.
+    /// Reads `?name` where a number is expected.
     fn unknown(&mut self, word: &str, node: &Node, scope: &Scope) -> Expression {
         if let Some(unknown) = scope.unknown(word) {
             return Expression::Unknown(unknown);
@@ -139,7 +139,7 @@ impl Reader {
         WRONG
     }
 
-    /// A number that can be computed without a state: `3`, `(- 3)`, `(/ 1 3)`.
+    /// Reads a number that can be computed without a state: `3`, `(- 3)`, `(/ 1 3)`.
     pub(super) fn constant(&mut self, node: &Node) -> Rational {
         let expression = self.expression(node, &Scope::default());
         value(&expression).unwrap_or_else(|| {
@@ -162,7 +162,7 @@ impl Reader {
     }
 }
 
-/// The value of an expression without fluents and other names.
+/// Returns the value of an expression without fluents and other names.
 fn value(expression: &Expression) -> Option<Rational> {
     expression.evaluate(&mut |_| None)
 }

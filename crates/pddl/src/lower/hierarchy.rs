@@ -8,11 +8,12 @@ use crate::lower::Reader;
 use crate::lower::sections::Section;
 use crate::source::Span;
 
-/// Most ways up from one type to `object`: who asks for supertypes may walk them all.
+/// Maximum number of paths from one type to `object`, since computing the supertypes may walk them
+/// all.
 const MOST_PATHS: u64 = 1000;
-/// In larger hierarchies it is not looked for types that could do for two others.
+/// In larger hierarchies, [`Reader::can_fit`] does not search for common subtypes.
 const MOST_COMPARED: usize = 1000;
-/// Longest way up.
+/// Maximum length of a path to `object`.
 const HIGHEST: u32 = 200;
 
 impl Reader {
@@ -48,7 +49,7 @@ impl Reader {
                 let parent = self.names.types[parent];
                 let child = self.names.types[name.as_ref()];
                 let parents = &mut self.problem.types[child.index()].parents;
-                // `object - object` is written now and then.
+                // Some domains contain `object - object`.
                 if child != TypeId::OBJECT && child != parent && !parents.contains(&parent) {
                     parents.push(parent);
                 }
@@ -73,7 +74,7 @@ impl Reader {
         }
     }
 
-    /// A supertype need not be declared, but it may be a slip of the pen.
+    /// Warns of a supertype that is not declared. PDDL permits it, but it may be a typing error.
     fn warn_of_undeclared_parent(
         &mut self,
         name: &str,
@@ -96,7 +97,7 @@ impl Reader {
         }
     }
 
-    /// Reports circles and hierarchies too tangled to walk, and flattens them.
+    /// Reports cycles and hierarchies with too many paths, and flattens them.
     fn check_hierarchy(&mut self, declared: &BTreeMap<String, Span>, section: Span) {
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); self.problem.types.len()];
         let mut missing: Vec<usize> = Vec::new();
@@ -148,7 +149,8 @@ impl Reader {
         }
     }
 
-    /// Whether every object of one of `own` is of one of `asked`.
+    /// Returns `true` if every object of one of the types in `own` is of one of the types in
+    /// `asked`.
     pub(super) fn always_fits(&self, own: &[TypeId], asked: &[TypeId]) -> bool {
         own.iter().all(|&own| {
             asked
@@ -157,7 +159,7 @@ impl Reader {
         })
     }
 
-    /// Whether some object can be of one of `own` and one of `asked`.
+    /// Returns `true` if some object can be of one of the types in `own` and of one in `asked`.
     pub(super) fn can_fit(&self, own: &[TypeId], asked: &[TypeId]) -> bool {
         if self.problem.types.len() > MOST_COMPARED {
             return true;
@@ -169,7 +171,7 @@ impl Reader {
         })
     }
 
-    /// `a` or `either a b`, to name types in messages.
+    /// Returns `a` or `either a b`, for messages.
     pub(super) fn type_list(&self, types: &[TypeId]) -> String {
         let names: Vec<_> = types
             .iter()

@@ -1,4 +1,4 @@
-//! `:init`: facts and numbers at time 0, and those that come later.
+//! `:init`: facts and numbers at time 0, and timed initials.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::lower::sections::Section;
 use crate::source::Span;
 use crate::syntax::Node;
 
-/// The place in the list of initial values of each fluent that has one.
+/// Index in the list of initial values of each fluent that has one.
 type Valued = BTreeMap<(FunctionId, Vec<ObjectId>), usize>;
 
 /// The subject of a timed initial.
@@ -32,7 +32,7 @@ fn subject(change: &TimedChange) -> Subject<'_> {
 }
 
 impl Reader {
-    /// Reads the initial state and what happens to it.
+    /// Reads the initial state and the timed initials.
     pub(super) fn init(&mut self, section: &Section) {
         let mut valued = Valued::new();
         for node in section.content {
@@ -41,8 +41,8 @@ impl Reader {
         self.initial_cost(section.span, &valued);
     }
 
-    /// Costs begin at 0 (PDDL 3.1 has them say so); where a problem forgets to say it, nothing
-    /// that costs anything could ever be done.
+    /// Sets `total-cost` to 0 if the problem gives it no initial value, since otherwise no action
+    /// with a cost would be applicable. PDDL 3.1 requires problems to state the value.
     fn initial_cost(&mut self, init: Span, valued: &Valued) {
         let Some(cost) = self.problem.function("total-cost") else {
             return;
@@ -90,14 +90,15 @@ impl Reader {
                 self.initial_object(node);
             }
             _ => match self.initial_change(node) {
-                // What is not said to be true is false anyway.
+                // Facts that are not listed are false anyway.
                 None | Some(TimedChange::Delete(..)) => {}
                 Some(change) => self.initially(change, node.span, valued),
             },
         }
     }
 
-    /// Whether `(at …)` begins with a number, as only timed initials do, and not with an object.
+    /// Returns `true` if `(at …)` begins with a number, as only timed initials do, and not with an
+    /// object.
     fn is_broken_timed(&self, parts: &[Node]) -> bool {
         let Some((first, [_, ..])) = parts.split_first() else {
             return false;
@@ -106,7 +107,7 @@ impl Reader {
         number(first).is_some() && !first.lower().is_some_and(|word| is_object(&word))
     }
 
-    /// `(at time (p …))`, `(at time (not (p …)))`, `(at time (= (f …) number))`
+    /// Reads `(at time (p …))`, `(at time (not (p …)))` or `(at time (= (f …) number))`.
     fn timed_initial(&mut self, time_node: &Node, content: &Node, valued: &mut Valued) {
         if let Some((head, parts)) = content.form()
             && head == "and"
@@ -144,8 +145,8 @@ impl Reader {
         }
     }
 
-    /// Two changes of one time have no order (PDDL 2.1's rule of no moving targets), so one fact
-    /// cannot become both true and false, nor one fluent get two values.
+    /// Refuses contradictory changes at one time. They have no order (PDDL 2.1's rule of no moving
+    /// targets), so one fact cannot become both true and false, nor one fluent get two values.
     pub(super) fn refuse_contradiction(
         &mut self,
         time: &Rational,
@@ -169,8 +170,8 @@ impl Reader {
         );
     }
 
-    /// What becomes so, at time 0 or later. `None`, with a report unless an object fluent is
-    /// the reason, if it cannot be understood.
+    /// Reads a change at time 0 or later. Returns `None` if it is not understood; this is reported
+    /// unless an object fluent is the cause.
     fn initial_change(&mut self, node: &Node) -> Option<TimedChange> {
         let scope = Scope::default();
         if let Some((head, parts)) = node.form() {
@@ -181,8 +182,8 @@ impl Reader {
                     let arguments = Self::objects_only(&fluent.arguments)?;
                     return Some(TimedChange::Assign(fluent.function, arguments, value));
                 }
-                // Generated problems list what is false, too; saying so about a predicate that
-                // the domain has not got is true.
+                // Generated problems also list false facts. For a predicate that the domain does
+                // not declare, such a statement is true.
                 ("not", [atom]) if self.is_undeclared(atom) => {
                     self.report
                         .warning(atom.span, format!("unknown predicate `{}`", atom.quote()))

@@ -1,4 +1,4 @@
-//! Which names are declared, and what they stand for.
+//! The declared names and their meanings.
 
 use std::collections::BTreeMap;
 
@@ -14,14 +14,14 @@ pub(super) struct Names {
     pub(super) predicates: BTreeMap<String, Vec<PredicateId>>,
     /// As for predicates.
     pub(super) functions: BTreeMap<String, Vec<FunctionId>>,
-    /// Functions whose values are objects: the predicates that stand for them, which may share a
+    /// Functions whose values are objects, as the predicates that represent them. They may share a
     /// name as functions may.
     pub(super) object_functions: BTreeMap<String, Vec<PredicateId>>,
     pub(super) schemas: BTreeMap<String, SchemaId>,
 }
 
 impl Names {
-    /// The names of a problem that was read before.
+    /// Returns the names of a problem that was read before.
     pub(super) fn of(problem: &Problem) -> Self {
         let mut names = Self::default();
         for (id, named) in (0..).zip(&problem.types) {

@@ -1,8 +1,8 @@
 //! Functions whose values are objects (PDDL 3.1), as predicates with the value as last argument.
 //!
 //! `(= (f a) v)` is a fact, and an assignment deletes all values and adds one. In conditions, the
-//! value of such a function may stand as an argument: `(p (f a))` says that some value of `(f a)`
-//! has `p`.
+//! value of such a function may be used as an argument: `(p (f a))` means that some value of
+//! `(f a)` has `p`.
 
 use elbowroom_model::problem::{
     Atom, Change, Condition, Effect, ObjectId, PredicateId, Term, TimedChange, TimedInitial,
@@ -17,21 +17,22 @@ use crate::lower::scope::Scope;
 use crate::source::Span;
 use crate::syntax::Node;
 
-/// What a function has for a value that has none (PDDL 3.1).
+/// The value of a function that has no value (PDDL 3.1).
 pub(super) const UNDEFINED: &str = "undefined";
 
 impl Reader {
-    /// Whether an object function is applied here.
+    /// Returns `true` if the node applies an object function.
     pub(super) fn is_application(&self, node: &Node) -> bool {
         !self.names.object_functions.is_empty()
             && node.form().is_some_and(|(head, _)| {
                 self.names.object_functions.contains_key(head.as_ref())
-                    // A predicate of that name has one argument more or less, or stands elsewhere.
+                    // A predicate of that name has one argument more or less, or is used in another
+                    // place.
                     && !self.names.functions.contains_key(head.as_ref())
             })
     }
 
-    /// The predicate of an application, and its arguments without the value.
+    /// Returns the predicate of an application, and its arguments without the value.
     fn application(&mut self, node: &Node, scope: &Scope) -> Option<(PredicateId, Vec<Term>)> {
         let (name, arguments) = node.form()?;
         let overloads = self.names.object_functions.get(name.as_ref())?;
@@ -42,14 +43,15 @@ impl Reader {
         Some((predicate, arguments))
     }
 
-    /// Of the functions of one name, that with so many arguments.
+    /// Returns the function of that name with the given number of arguments, or the first one if
+    /// none matches.
     fn overload(&self, overloads: &[PredicateId], arguments: usize) -> PredicateId {
         let count = |id: PredicateId| self.problem.predicates[id.index()].parameters.len();
         let fits = |id: &&PredicateId| count(**id) == arguments + 1;
         *overloads.iter().find(fits).unwrap_or(&overloads[0])
     }
 
-    /// The variable that stands for the value of a function.
+    /// Returns the variable for the value of a function.
     fn value_variable(&self, predicate: PredicateId) -> Variable {
         let parameters = &self.problem.predicates[predicate.index()].parameters;
         parameters
@@ -58,7 +60,7 @@ impl Reader {
             .clone()
     }
 
-    /// The value that a function is compared with, or gets.
+    /// Reads the value that a function is compared with or gets.
     fn given_value(&mut self, fluent: &Node, value: &Node, scope: &Scope) -> Option<Term> {
         let given = self.term(value, scope)?;
         let (name, arguments) = fluent.form()?;
@@ -69,7 +71,7 @@ impl Reader {
         Some(given)
     }
 
-    /// Reads a condition in which object functions may be applied where arguments stand.
+    /// Reads a condition whose arguments may be applications of object functions.
     pub(super) fn with_values<'n, 's: 'n>(
         &mut self,
         parts: impl IntoIterator<Item = &'n Node<'s>>,
@@ -94,7 +96,8 @@ impl Reader {
         Condition::Exists(variables, Box::new(Condition::And(all)))
     }
 
-    /// Gives each value in a node a variable, inner ones first, and says whose value it is.
+    /// Introduces a variable for each function value in a node, inner ones first, and adds the
+    /// condition that defines it.
     fn name_values(&mut self, node: &Node, scope: &mut Scope, all: &mut Vec<Condition>) {
         for part in node.list().unwrap_or_default() {
             self.name_values(part, scope, all);
@@ -117,7 +120,7 @@ impl Reader {
         }));
     }
 
-    /// `(= (f a) v)`, or `(= (f a) undefined)`
+    /// Reads `(= (f a) v)`, or `(= (f a) undefined)`.
     pub(super) fn has_value(
         &mut self,
         fluent: &Node,
@@ -152,7 +155,7 @@ impl Reader {
         })
     }
 
-    /// Refuses the value of a function where only names can stand.
+    /// Refuses the value of a function where only names are permitted.
     pub(super) fn refuse_value(&mut self, node: &Node) {
         self.report
             .unsupported(
@@ -163,8 +166,8 @@ impl Reader {
             .advise("add a parameter `?x` and the condition `(= (f …) ?x)`, and write `?x` here");
     }
 
-    /// `(assign (f a) v)`, or `(change (f a) v)` of TFD: without a time specifier, from the start of
-    /// a durative action until its end there is no value.
+    /// Reads `(assign (f a) v)`, or `(change (f a) v)` of TFD. Without a time specifier, the
+    /// function has no value from the start of a durative action until its end.
     pub(super) fn object_assignment(
         &mut self,
         head: &str,
@@ -250,7 +253,7 @@ impl Reader {
         });
     }
 
-    /// The function, its arguments, and the value that it gets; no value for `undefined`.
+    /// Returns the function, its arguments, and its new value; no value for `undefined`.
     fn object_value(
         &mut self,
         node: &Node,
@@ -270,7 +273,7 @@ impl Reader {
         }
     }
 
-    /// `(= (f a) v)` in the initial state.
+    /// Reads `(= (f a) v)` in the initial state.
     pub(super) fn initial_object(&mut self, node: &Node) {
         let Some((predicate, mut arguments, value)) = self.object_value(node) else {
             return;
@@ -289,7 +292,7 @@ impl Reader {
         }
     }
 
-    /// `(at 10 (= (f a) v))`: all other values are lost then.
+    /// Reads `(at 10 (= (f a) v))`: all other values are lost at that time.
     pub(super) fn timed_object(&mut self, time: &Rational, span: Span, node: &Node) {
         if time.is_zero() {
             self.report
@@ -320,7 +323,7 @@ impl Reader {
 }
 
 impl Effects {
-    /// The effects of a moment that has some at once.
+    /// Returns the effects of a moment.
     fn at(&mut self, moment: Moment) -> &mut Vec<Effect> {
         match moment {
             Moment::Start => &mut self.start,

@@ -63,7 +63,7 @@ impl Reader {
         }
     }
 
-    /// Whether the problem is of this domain.
+    /// Checks that the problem belongs to this domain.
     fn domain_name(&mut self, sections: &Sections) {
         let Some(section) = sections.only(":domain", &mut self.report) else {
             self.report
@@ -122,8 +122,8 @@ impl Reader {
         }
     }
 
-    /// The names of the fluents that a ground condition reads, and to which neither the initial
-    /// state nor an action or a timed initial gives a value.
+    /// Collects the names of the fluents that a ground condition reads and that never get a value:
+    /// not from the initial state, an action or a timed initial.
     fn undefined(&self, condition: &Condition, found: &mut Vec<String>) {
         match condition {
             Condition::Compare(_, left, right) => {

@@ -7,12 +7,12 @@ use crate::source::{FileId, Span};
 use crate::syntax::Node;
 use elbowroom_text::nearest;
 
-/// A file taken apart into its sections.
+/// A file split into its sections.
 #[derive(Debug)]
 pub(super) struct Sections<'t, 's> {
     /// The name of the domain or problem.
     pub(super) name: &'s str,
-    /// Where the name stands.
+    /// Position of the name.
     pub(super) name_span: Span,
     all: Vec<Section<'t, 's>>,
 }
@@ -24,12 +24,12 @@ pub(super) struct Section<'t, 's> {
     pub(super) keyword: Cow<'s, str>,
     /// The nodes after the keyword.
     pub(super) content: &'t [Node<'s>],
-    /// Where the keyword stands.
+    /// Position of the keyword.
     pub(super) span: Span,
 }
 
 impl<'t, 's> Sections<'t, 's> {
-    /// Finds the frame; `None`, with a report, if there is none.
+    /// Finds the frame. Returns `None`, with a report, if there is none.
     pub(super) fn find(file: FileId, nodes: &'t [Node<'s>], report: &mut Report) -> Option<Self> {
         let kind = kind(file);
         let defined = nodes
@@ -71,7 +71,7 @@ impl<'t, 's> Sections<'t, 's> {
         Some(found)
     }
 
-    /// The section of that keyword; a second one is reported.
+    /// Returns the section of that keyword. Reports a second one.
     pub(super) fn only(&self, keyword: &str, report: &mut Report) -> Option<&Section<'t, 's>> {
         let mut same = self.all(keyword);
         let first = same.next()?;
@@ -85,13 +85,13 @@ impl<'t, 's> Sections<'t, 's> {
         Some(first)
     }
 
-    /// The sections of that keyword.
+    /// Returns the sections of that keyword.
     pub(super) fn all(&self, keyword: &str) -> impl Iterator<Item = &Section<'t, 's>> {
         self.iter()
             .filter(move |section| section.keyword == keyword)
     }
 
-    /// All sections.
+    /// Returns all sections.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Section<'t, 's>> {
         self.all.iter()
     }
@@ -111,7 +111,8 @@ impl<'t, 's> Sections<'t, 's> {
         }
     }
 
-    /// A list outside of `(define …)`: what comes after one `)` too many.
+    /// Reports a list outside of `(define …)`, usually due to a superfluous `)` before it, and adds
+    /// it if it is a section.
     fn add_from_outside(&mut self, node: &'t Node<'s>, report: &mut Report) {
         report
             .error(
@@ -125,7 +126,7 @@ impl<'t, 's> Sections<'t, 's> {
     }
 }
 
-/// Whether this is the time before an action of a plan, `0.000:`.
+/// Returns `true` for the time before an action of a plan, `0.000:`.
 fn is_time(node: &Node) -> bool {
     let word = node.word().and_then(|word| word.strip_suffix(':'));
     word.is_some_and(|word| word.parse::<f64>().is_ok())

@@ -1,11 +1,11 @@
-//! Renumbering variables.
+//! Renumbering of variables.
 //!
 //! The guard of a conditional effect is read before the variables of `forall`s inside the effect
-//! are known. In the model they come before the variables that the guard itself binds.
+//! are known. In the model, these precede the variables that the guard itself binds.
 
 use elbowroom_model::problem::{Atom, Condition, Expression, Fluent, Term};
 
-/// The condition with the variables from number `first` on moved up by `by`.
+/// Returns the condition with the variables from number `first` on increased by `by`.
 pub(super) fn shift(condition: Condition, first: usize, by: usize) -> Condition {
     if by == 0 {
         return condition;

@@ -1,10 +1,9 @@
-//! Whether the rules of derived predicates have a meaning: no predicate may depend on its own
-//! negation.
+//! Stratification of the rules of derived predicates: no predicate may depend on its own negation.
 
 use elbowroom_model::Problem;
 use elbowroom_model::problem::Condition;
 
-/// The rules that negate a predicate which depends on the rule's own head.
+/// Returns the rules that negate a predicate which depends on the rule's own head.
 pub(super) fn negative_circles(problem: &Problem) -> Vec<usize> {
     let mut edges: Vec<Vec<usize>> = vec![Vec::new(); problem.predicates.len()];
     let mut negated: Vec<Vec<usize>> = Vec::with_capacity(problem.rules.len());
@@ -27,7 +26,7 @@ pub(super) fn negative_circles(problem: &Problem) -> Vec<usize> {
         .collect()
 }
 
-/// Calls `found` for each predicate of a condition, with whether it stands under a negation.
+/// Calls `found` for each predicate of a condition. The flag is `true` if the predicate is negated.
 fn visit(condition: &Condition, is_negated: bool, found: &mut impl FnMut(usize, bool)) {
     match condition {
         Condition::Atom(atom) => found(atom.predicate.index(), is_negated),
@@ -42,8 +41,8 @@ fn visit(condition: &Condition, is_negated: bool, found: &mut impl FnMut(usize, 
     }
 }
 
-/// The strongly connected component of each node, by Kosaraju's algorithm. Without recursion,
-/// because a chain of rules can be long.
+/// Returns the strongly connected component of each node, by Kosaraju's algorithm. It uses no
+/// recursion, because a chain of rules can be long.
 fn components(edges: &[Vec<usize>]) -> Vec<usize> {
     let mut reversed: Vec<Vec<usize>> = vec![Vec::new(); edges.len()];
     for (from, targets) in edges.iter().enumerate() {
@@ -68,7 +67,7 @@ fn components(edges: &[Vec<usize>]) -> Vec<usize> {
     component
 }
 
-/// Adds what is reachable from `root` and not seen before to `finished`, in postorder.
+/// Adds the nodes that are reachable from `root` and not yet seen to `finished`, in postorder.
 fn walk(root: usize, edges: &[Vec<usize>], seen: &mut [bool], finished: &mut Vec<usize>) {
     if std::mem::replace(&mut seen[root], true) {
         return;

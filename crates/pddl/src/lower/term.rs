@@ -1,4 +1,4 @@
-//! Objects and variables as arguments, and what they are arguments of.
+//! Atoms, fluents and their arguments: objects and variables.
 
 use elbowroom_model::problem::{Atom, Fluent, FunctionId, ObjectId, PredicateId, Term, Variable};
 
@@ -11,7 +11,7 @@ use crate::source::Span;
 use crate::syntax::Node;
 
 impl Reader {
-    /// `(predicate term …)`. `None`, with a report, if it cannot be understood.
+    /// Reads `(predicate term …)`. Returns `None`, with a report, if it is not understood.
     pub(super) fn atom(&mut self, node: &Node, scope: &Scope) -> Option<Atom> {
         let Some((name, arguments)) = node.form() else {
             self.report
@@ -35,8 +35,8 @@ impl Reader {
         })
     }
 
-    /// `(function term …)`, or the bare name of a function without arguments. `None`, with a
-    /// report unless it is an object fluent, if it cannot be understood.
+    /// Reads `(function term …)`, or the bare name of a function without arguments. Returns `None`
+    /// if it is not understood, with a report unless it is an object fluent.
     pub(super) fn fluent(&mut self, node: &Node, scope: &Scope) -> Option<Fluent> {
         let no_arguments: &[Node] = &[];
         let form = node.form().or_else(|| Some((node.lower()?, no_arguments)));
@@ -62,7 +62,7 @@ impl Reader {
         })
     }
 
-    /// A variable or an object. `None`, with a report, if it is neither.
+    /// Reads a variable or an object. Returns `None`, with a report, if it is neither.
     pub(super) fn term(&mut self, node: &Node, scope: &Scope) -> Option<Term> {
         let Some(word) = node.lower() else {
             if let Some(value) = scope.values.get(&(node.span.start, node.span.end)) {
@@ -122,7 +122,7 @@ impl Reader {
         None
     }
 
-    /// The arguments, as many and of the types that the parameters ask for.
+    /// Reads the arguments. Their number and types must match the parameters.
     pub(super) fn arguments(
         &mut self,
         name: &str,
@@ -157,7 +157,7 @@ impl Reader {
         Some(terms)
     }
 
-    /// Warns when an argument need not be of the parameter's type.
+    /// Warns of an argument that may not be of the parameter's type.
     pub(super) fn check_type(
         &mut self,
         term: Term,
@@ -192,7 +192,7 @@ impl Reader {
         self.report.warning(span, message);
     }
 
-    /// Only objects, for places where no variable can be in scope.
+    /// Returns the terms as objects, in contexts without variables.
     pub(super) fn objects_only(terms: &[Term]) -> Option<Vec<ObjectId>> {
         terms
             .iter()
@@ -270,7 +270,7 @@ impl Reader {
         }
     }
 
-    /// Reports an effect on, or an initial value of, what rules define.
+    /// Reports an effect on, or an initial value of, a derived predicate.
     pub(super) fn refuse_derived(&mut self, predicate: PredicateId, span: Span) {
         let predicate = &self.problem.predicates[predicate.index()];
         if predicate.is_derived {
@@ -295,7 +295,7 @@ fn count(arguments: usize) -> String {
     }
 }
 
-/// The number that is meant by one with a decimal comma.
+/// Returns the number with a decimal point instead of a decimal comma.
 fn with_point(word: &str) -> Option<String> {
     let (whole, fraction) = word.split_once(',')?;
     let is_number =

@@ -17,7 +17,7 @@ pub(super) enum Time {
     End,
 }
 
-/// A condition, by the moment at which its parts are read. All three must hold.
+/// A condition, split by the moment at which its parts are read. All three parts must hold.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Timed {
     pub(super) start: Condition,
@@ -25,7 +25,7 @@ pub(super) struct Timed {
     pub(super) end: Condition,
 }
 
-/// `(at start x)`, `(over all x)` or `(at end x)`, taken apart.
+/// Splits `(at start x)`, `(over all x)` or `(at end x)`.
 pub(super) fn time_specifier<'t, 's>(node: &'t Node<'s>) -> Option<(Time, &'t Node<'s>)> {
     let [at, when, what] = node.list()? else {
         return None;
@@ -59,7 +59,7 @@ impl Timed {
         }
     }
 
-    /// Each part changed.
+    /// Returns the condition with `change` applied to each part.
     pub(super) fn map(self, mut change: impl FnMut(Condition) -> Condition) -> Self {
         Self {
             start: change(self.start),
@@ -68,7 +68,7 @@ impl Timed {
         }
     }
 
-    /// The only moment at which something is read; `None` if there are several.
+    /// Returns the only moment at which something is read, or `None` if there are several.
     fn only_time(&self) -> Option<Time> {
         match (
             self.start.is_trivial(),
@@ -83,7 +83,7 @@ impl Timed {
     }
 }
 
-/// The conjunction, without superfluous nesting.
+/// Returns the conjunction, without superfluous nesting.
 pub(super) fn both(left: Condition, right: Condition) -> Condition {
     match (left, right) {
         (left, right) if right.is_trivial() => left,
@@ -101,7 +101,7 @@ pub(super) fn both(left: Condition, right: Condition) -> Condition {
 }
 
 impl Reader {
-    /// The condition of a durative action.
+    /// Reads the condition of a durative action.
     pub(super) fn timed_condition(&mut self, node: &Node, scope: &mut Scope) -> Timed {
         if let Some((time, condition)) = time_specifier(node) {
             return Timed::at(time, self.condition(condition, scope));
@@ -169,7 +169,7 @@ impl Reader {
         }
     }
 
-    /// `or`, `not`, `imply` over parts that all are read at the same time.
+    /// Reads `or`, `not`, `imply` over parts that are all read at the same time.
     fn at_one_time(&mut self, head: &str, node: &Node, parts: &[Node], scope: &mut Scope) -> Timed {
         let parts: Vec<Timed> = without_preferences(scope, |scope| {
             parts
@@ -222,7 +222,7 @@ impl Reader {
     }
 }
 
-/// The time specifier that a list like `(at strat x)` is probably meant to begin with.
+/// Returns the time specifier that a list like `(at strat x)` probably means.
 pub(super) fn near_specifier(node: &Node) -> Option<&'static str> {
     let [at, when, what] = node.list()? else {
         return None;

@@ -8,14 +8,14 @@ use crate::lower::Reader;
 use crate::source::Span;
 use crate::syntax::Node;
 
-/// Longest `either`; the list is kept once for each name it types.
+/// Maximum length of an `either`; the list is stored for each name that it types.
 const LONGEST_EITHER: usize = 100;
 
-/// Names of types in lower case, with their places; none if nothing is said. Shared by all
+/// Names of types in lower case, with their positions; empty if there are none. Shared by all
 /// entries typed together.
 pub(super) type TypeNames = Rc<[(String, Span)]>;
 
-/// Most variables in one list; looking them up takes linear time.
+/// Maximum number of variables in one list, since their lookup takes linear time.
 pub(super) const MOST_VARIABLES: usize = 1000;
 
 /// An entry of a typed list.
@@ -27,7 +27,7 @@ pub(super) struct Typed<'t, 's> {
 }
 
 impl Reader {
-    /// Takes a typed list apart.
+    /// Reads a typed list.
     pub(super) fn typed_list<'t, 's>(&mut self, nodes: &'t [Node<'s>]) -> Vec<Typed<'t, 's>> {
         let untyped: TypeNames = Rc::new([]);
         let mut entries: Vec<Typed> = Vec::new();
@@ -65,7 +65,7 @@ impl Reader {
         entries
     }
 
-    /// `type` or `(either type …)`.
+    /// Reads `type` or `(either type …)`.
     fn type_names(&mut self, node: &Node) -> TypeNames {
         if let Some(name) = node.lower() {
             return Rc::new([(name.into_owned(), node.span)]);
@@ -92,9 +92,9 @@ impl Reader {
         }
     }
 
-    /// The ids of the types; `object` if there are none. Reports those not declared.
+    /// Returns the ids of the types, or `object` if there are none. Reports undeclared ones.
     pub(super) fn resolve_types(&mut self, types: &TypeNames) -> Vec<TypeId> {
-        // Entries typed together share one report, too.
+        // Entries typed together also share one report.
         match &self.resolved_types {
             Some((last, ids)) if Rc::ptr_eq(last, types) => return ids.clone(),
             _ => {}
@@ -120,7 +120,7 @@ impl Reader {
         ids
     }
 
-    /// A list of variables: parameters, or what a quantifier binds.
+    /// Reads a list of variables: parameters, or the variables of a quantifier.
     pub(super) fn variables(&mut self, nodes: &[Node]) -> Vec<Variable> {
         let mut variables: Vec<Variable> = Vec::new();
         for entry in self.typed_list(nodes) {
@@ -158,7 +158,7 @@ impl Reader {
         variables
     }
 
-    /// The variables of `node`, which should be a list of them.
+    /// Reads the variables of `node`, which should be a list of variables.
     pub(super) fn variable_list(&mut self, node: &Node) -> Vec<Variable> {
         if let Some(nodes) = node.list() {
             return self.variables(nodes);

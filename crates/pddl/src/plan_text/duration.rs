@@ -9,10 +9,10 @@ use elbowroom_model::problem::{
 };
 use elbowroom_num::Rational;
 
-/// The duration of an action that the domain fixes to one number, the same in every state.
+/// Returns the duration of an action if the domain gives one number, the same in every state.
 ///
 /// # Errors
-/// Says why there is no such number.
+/// Returns the reason why there is no such number.
 pub(super) fn only_duration(
     task: &Task,
     schema: &Schema,
@@ -35,7 +35,7 @@ pub(super) fn only_duration(
     Ok(value)
 }
 
-/// The functions that some effect or timed initial changes.
+/// Returns the functions that some effect or timed initial changes.
 pub(super) fn changing_functions(problem: &Problem) -> BTreeSet<FunctionId> {
     let mut changing = BTreeSet::new();
     for schema in &problem.schemas {
@@ -74,7 +74,7 @@ pub(super) fn changing_functions(problem: &Problem) -> BTreeSet<FunctionId> {
     changing
 }
 
-/// The value of a fluent that nothing changes.
+/// Returns the value of a fluent that never changes.
 fn static_value(
     task: &Task,
     fluent: &Fluent,
@@ -102,7 +102,7 @@ fn static_value(
         })
 }
 
-/// The value of an expression, given those of its fluents.
+/// Returns the value of an expression, given the values of its fluents.
 fn value(
     expression: &Expression,
     of: &impl Fn(&Fluent) -> Result<Rational, String>,

@@ -24,7 +24,8 @@ pub(super) enum Form {
 }
 
 impl Form {
-    /// The tool that prints plans so, and how they are read; `None` for the usual notation.
+    /// Returns the tool that uses this notation, and how it is read, or `None` for the usual
+    /// notation.
     pub(super) fn note(self) -> Option<&'static str> {
         Some(match self {
             Self::Ipc => return None,
@@ -54,12 +55,13 @@ impl Form {
         })
     }
 
-    /// Returns `true` for one of the two ends of an action.
+    /// Returns `true` for the notation of one end of an action.
     pub(super) fn is_happening(self) -> bool {
         matches!(self, Self::Start | Self::End)
     }
 
-    /// Returns `true` if the position in the text, not the number before the action, gives its time.
+    /// Returns `true` if the position in the text determines an action's time, not the number
+    /// before it.
     pub(super) fn is_sequential(self) -> bool {
         matches!(self, Self::Ff | Self::ContingentFf | Self::FastDownward)
     }

@@ -1,4 +1,4 @@
-//! One line of a plan, or of a planner's log. The domain is not known here.
+//! Parser of one line of a plan, or of a planner's log. It does not know the domain.
 
 mod cursor;
 
@@ -13,22 +13,22 @@ use cursor::Cursor;
 /// between; separators and noise end it. [`read_plan`](crate::read_plan) reads such a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineKind {
-    /// Nothing, or a comment that says nothing.
+    /// Nothing, or a comment without information.
     Blank,
-    /// It announces a plan, or another one.
+    /// The start of a plan, or of the next plan.
     Separator,
-    /// Anything else a planner may say.
+    /// Any other output of a planner.
     Noise,
     /// Actions with times.
     Timed,
-    /// It begins like an action with a time, but may be none: the domain decides.
+    /// A line that begins like an action with a time. The domain decides if it is one.
     Broken,
     /// Actions without times: a classical plan, or something else in parentheses.
     Untimed,
 }
 
 impl LineKind {
-    /// The kind of this line.
+    /// Returns the kind of this line.
     pub fn of(text: &str) -> Self {
         match line(text.trim_end(), 0) {
             Line::Blank | Line::Rule => Self::Blank,
@@ -48,21 +48,22 @@ impl LineKind {
 /// The kind of a line.
 #[derive(Debug, PartialEq)]
 pub(super) enum Line<'s> {
-    /// Nothing, or a comment that says nothing.
+    /// Nothing, or a comment without information.
     Blank,
-    /// The line begins another plan of the same log. The place of the heading's own words.
+    /// The line begins another plan of the same log. The range is that of the heading's own words.
     Heading(Range<usize>),
     /// A ruler, such as `-----`.
     Rule,
-    /// Anything else a planner may say.
+    /// Any other output of a planner.
     Noise,
     /// Actions.
     Steps(Vec<RawStep<'s>>),
-    /// It begins like an action, but is none: where, and what is expected there.
+    /// A line that begins like an action but is none: the position of the error, and the expected
+    /// text.
     Broken(usize, &'static str),
 }
 
-/// An action as written. Places are bytes from the beginning of the text.
+/// An action as written. Positions are bytes from the beginning of the text.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RawStep<'s> {
     /// The notation.
@@ -73,14 +74,14 @@ pub(super) struct RawStep<'s> {
     pub(super) words: Vec<Word<'s>>,
     /// The duration.
     pub(super) duration: Option<Word<'s>>,
-    /// The unit behind the duration, which is not read.
+    /// The unit after the duration, which is ignored.
     pub(super) unit: Option<Word<'s>>,
     /// Counter of equal actions in happenings.
     pub(super) counter: Option<Word<'s>>,
 }
 
 impl RawStep<'_> {
-    /// The place of the action's name and arguments.
+    /// Returns the range of the action's name and arguments.
     pub(super) fn range(&self) -> Range<usize> {
         let first = self.words.first().map_or(0, |word| word.range.start);
         first..self.words.last().map_or(first, |word| word.range.end)
@@ -94,7 +95,7 @@ pub(super) struct Word<'s> {
     pub(super) range: Range<usize>,
 }
 
-/// Takes a line apart that begins at byte `start` of its text.
+/// Parses a line that begins at byte `start` of its text.
 pub(super) fn line(text: &str, start: usize) -> Line<'_> {
     let mut cursor = Cursor::new(text, start);
     cursor.skip_space();
@@ -149,10 +150,10 @@ fn is_rule(text: &str) -> bool {
         .any(|&sign| text.len() >= 3 && text.chars().all(|c| c == sign))
 }
 
-/// Returns `true` for the comments that POPF and OPTIC print before each plan: `;;;; Solution Found`,
-/// `; Plan found with metric 5.0`, `; States evaluated: 12`, `; States evaluated so far: 12`; and for `; Plan found`,
-/// which this project's program for the engines of unified-planning prints. Any other comment is about the steps
-/// around it, whatever its words.
+/// Returns `true` for the comments that POPF and OPTIC print before each plan: `;;;; Solution
+/// Found`, `; Plan found with metric 5.0`, `; States evaluated: 12`, `; States evaluated so far:
+/// 12`; and for `; Plan found`, which this project's program for the engines of unified-planning
+/// prints. Any other comment concerns the steps around it.
 fn is_heading_comment(text: &str) -> bool {
     const BEFORE_NUMBERS: &[&str] = &[
         "; Plan found with metric ",
@@ -167,10 +168,11 @@ fn is_heading_comment(text: &str) -> bool {
     matches!(text, ";;;; Solution Found" | "; Plan found") || numbers.any(is_number)
 }
 
-/// Returns the words that planners print before a plan, or between a plan and a better one, relative to the beginning of
-/// `text`, which is no comment. An action may stand beside them: `Solution found: film`.
+/// Returns the range of the words that planners print before a plan, or between a plan and a better
+/// one, relative to the beginning of `text`, which is not a comment. An action may follow them:
+/// `Solution found: film`.
 fn heading(text: &str) -> Option<Range<usize>> {
-    /// Beginnings, behind signs.
+    /// Beginnings of headings, after signs.
     const BEGINNINGS: &[&str] = &[
         "all goal deadlines now no later than",
         "ff: found legal plan",
@@ -185,7 +187,7 @@ fn heading(text: &str) -> Option<Range<usize>> {
         "solution number",
         "timetriggeredplan:",
     ];
-    /// Whole lines, without signs.
+    /// Headings that are whole lines, without signs.
     const LINES: &[&str] = &["plan", "rescheduled plan"];
     let whole = text.trim_end();
     let mut text = whole.trim_start();

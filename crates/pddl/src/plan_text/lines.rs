@@ -1,8 +1,8 @@
-//! The lines of a text that form its last plan.
+//! Selection of the lines that form the last plan of a text.
 //!
 //! Each line that is not blank is one of: a comment, a heading that begins another plan, a step, a
-//! mistake, or log text. Log text is skipped before the first and after the last step only, and
-//! only if it holds nothing that may be an action.
+//! mistake, or log text. Log text is skipped only before the first and after the last step, and
+//! only if it contains nothing that may be an action.
 
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ pub(super) struct LastPlan<'s> {
     pub(super) mistakes: Vec<Misread>,
     /// The number of plans in the text.
     pub(super) plans: usize,
-    /// The text has other lines than comments and headings.
+    /// `true` if the text has other lines than comments and headings.
     pub(super) has_text: bool,
 }
 
@@ -31,11 +31,11 @@ pub(super) struct Misread {
 }
 
 pub(super) enum Misreading {
-    /// It begins like an action; the expected form.
+    /// It begins like an action. The text is the expected form.
     Broken(&'static str),
-    /// It may hold an action.
+    /// It may contain an action.
     Possible,
-    /// It stands between two actions.
+    /// It is between two actions.
     Between,
 }
 
@@ -76,7 +76,7 @@ pub(super) fn last_plan<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Last
     plan
 }
 
-/// The lines between headings.
+/// Returns the lines between headings.
 fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s>>> {
     let text = source.text();
     let mut sections = vec![Vec::new()];
@@ -113,8 +113,8 @@ fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s
     sections
 }
 
-/// The parts of a line between the other signs that Unicode defines as line breaks. An editor may show a
-/// line break there, so a comment ends there.
+/// Splits a line at the other signs that Unicode defines as line breaks. An editor may show a line
+/// break there, so a comment ends there.
 fn parts(text: &str, line: Span) -> Vec<Span> {
     const BREAKS: [char; 5] = ['\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}'];
     let mut parts = Vec::new();
@@ -127,7 +127,7 @@ fn parts(text: &str, line: Span) -> Vec<Span> {
     parts
 }
 
-/// Log text, unless it may hold an action.
+/// Returns log text, unless it may contain an action.
 fn noise<'s>(text: &'s str, range: Range<usize>, vocabulary: &Vocabulary) -> Entry<'s> {
     match possible_action(&text[range.clone()], vocabulary) {
         Some(place) => possible(&range, &place),
@@ -135,7 +135,7 @@ fn noise<'s>(text: &'s str, range: Range<usize>, vocabulary: &Vocabulary) -> Ent
     }
 }
 
-/// An action on the line of a heading, beside the heading's `own` words.
+/// Returns an action on the line of a heading, next to the heading's `own` words.
 fn beside_heading<'s>(
     text: &'s str,
     line: &Range<usize>,
@@ -149,7 +149,7 @@ fn beside_heading<'s>(
     })
 }
 
-/// A line that may hold an action, at a place relative to the line.
+/// Returns a line that may contain an action, at a position relative to the line.
 fn possible<'s>(line: &Range<usize>, place: &Range<usize>) -> Entry<'s> {
     Entry::Misread(Misread {
         range: line.start + place.start..line.start + place.end,
@@ -157,8 +157,8 @@ fn possible<'s>(line: &Range<usize>, place: &Range<usize>) -> Entry<'s> {
     })
 }
 
-/// Marks a single word on the line before or behind the steps of a plan without times: there it may be an action
-/// without arguments.
+/// Marks a single word on the line before or after the steps of a plan without times, where it may
+/// be an action without arguments.
 fn name_words_beside_steps(source: &Source, section: &mut [Entry<'_>]) {
     let text = source.text();
     let is_untimed = |entry: &Entry<'_>| match entry {
@@ -193,12 +193,12 @@ fn name_words_beside_steps(source: &Source, section: &mut [Entry<'_>]) {
     }
 }
 
-/// The lines of a plan without log text before the first and after the last step.
+/// Returns the lines of a plan without log text before the first and after the last step.
 fn without_log(mut section: Vec<Entry<'_>>) -> Vec<Entry<'_>> {
     let is_step = |entry: &Entry<'_>| matches!(entry, Entry::Steps(_));
     let first = section.iter().position(is_step);
     let last = section.iter().rposition(is_step);
-    // Contingent-FF rules off the levels of its tree.
+    // Contingent-FF separates the levels of its tree by rulers.
     let is_tree = section.iter().any(|entry| match entry {
         Entry::Steps(steps) => steps.iter().any(|step| step.form == Form::ContingentFf),
         _ => false,

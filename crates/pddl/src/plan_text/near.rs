@@ -10,8 +10,8 @@ use super::form::Form;
 use super::line::{LineKind, RawStep, Word};
 use super::vocabulary::Vocabulary;
 
-/// Phrases of planners that may hold the name of an action or words in parentheses, in lower case. They
-/// are blanked before the line is searched.
+/// Phrases of planners that may contain the name of an action or words in parentheses, in lower
+/// case. They are blanked before the line is searched.
 const HARMLESS: &[&str] = &[
     "(ignoring no-moving-targets-rule)",
     "(real) bound",
@@ -107,17 +107,18 @@ impl Piece<'_> {
     }
 }
 
-/// Returns the place of a possible action in `text`, relative to its beginning.
+/// Returns the range of a possible action in `text`, relative to its beginning.
 ///
 /// Possible actions are:
 ///
 /// - an action of the domain ([`known`]);
-/// - a line that begins with the name of an action, and has one of the objects, or nothing but numbers;
+/// - a line that begins with the name of an action, and has one of the objects, or nothing but
+///   numbers;
 /// - words in parentheses on a line with a number;
 /// - a number, words, and a number in brackets;
 /// - words and a whole number in parentheses, or a word and nothing but objects;
 /// - a row of a table with objects and one other word;
-/// - the name of an action without parameters at the beginning or end of prose, or behind a colon.
+/// - the name of an action without parameters at the beginning or end of prose, or after a colon.
 pub(super) fn possible_action(text: &str, vocabulary: &Vocabulary) -> Option<Range<usize>> {
     let text = &without_phrases(text);
     let pieces = pieces(text);
@@ -131,8 +132,9 @@ pub(super) fn possible_action(text: &str, vocabulary: &Vocabulary) -> Option<Ran
         .or_else(|| name_in_prose(text, &pieces, vocabulary))
 }
 
-/// Returns the place of a possible action in the text before or behind a heading's own words: one that
-/// [`possible_action`] finds by its name or its objects, the name of any action, or an action with a time.
+/// Returns the range of a possible action in the text before or after a heading's own words: one
+/// that [`possible_action`] finds by its name or its objects, the name of any action, or an action
+/// with a time.
 pub(super) fn action_beside_heading(text: &str, vocabulary: &Vocabulary) -> Option<Range<usize>> {
     let text = &without_phrases(text);
     let pieces = pieces(text);
@@ -151,7 +153,8 @@ pub(super) fn action_beside_heading(text: &str, vocabulary: &Vocabulary) -> Opti
         .or_else(timed)
 }
 
-/// Returns the place of a text that is a single word, such as the name of an action without arguments.
+/// Returns the range of a text that is a single word, such as the name of an action without
+/// arguments.
 pub(super) fn single_word(text: &str) -> Option<Range<usize>> {
     match pieces(text)[..] {
         [Piece::Word { text, at }] if text.starts_with(char::is_alphabetic) => {
@@ -161,8 +164,8 @@ pub(super) fn single_word(text: &str) -> Option<Range<usize>> {
     }
 }
 
-/// Returns the place of the name of an action that has a number or a bracket anywhere on the line, or as many objects
-/// behind it as it has parameters.
+/// Returns the range of the name of an action that has a number or a bracket anywhere on the line,
+/// or as many objects after it as it has parameters.
 fn known(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
     let is_sign = |piece: &Piece<'_>| match piece {
         Piece::Open { .. } | Piece::Close | Piece::Bracket => true,
@@ -170,7 +173,7 @@ fn known(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> 
         Piece::Separator | Piece::Other => false,
     };
     let has_sign = pieces.iter().any(is_sign);
-    // Counted once, so that long lines are read in time in proportion to their length.
+    // Counted once, so that reading takes linear time in the length of a line.
     let mut objects = pieces.iter().filter(|it| it.is_object(vocabulary)).count();
     pieces.iter().find_map(|piece| {
         objects -= usize::from(piece.is_object(vocabulary));
@@ -193,13 +196,14 @@ fn is_numbered(word: &str, vocabulary: &Vocabulary) -> bool {
         && !vocabulary.is_joined(word, true)
 }
 
-/// Returns `true` for a number that sticks to the name of an action: `6snap`.
+/// Returns `true` for a number attached to the name of an action: `6snap`.
 fn is_stuck(word: &str, vocabulary: &Vocabulary) -> bool {
     let name = word.trim_start_matches(|c: char| !c.is_alphabetic());
     is_number(word) && vocabulary.parameters(name).is_some()
 }
 
-/// An action at the beginning of the line with a part of its arguments: `charge [3]`, `go: r1`.
+/// Returns an action at the beginning of the line with a part of its arguments: `charge [3]`,
+/// `go: r1`.
 fn leading_name(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
     let first = pieces.iter().position(Piece::is_word)?;
     let Piece::Word { text, at } = pieces[first] else {
@@ -213,7 +217,7 @@ fn leading_name(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<u
     (has_object || has_numbers_only).then_some(at..at + text.len())
 }
 
-/// `jump high (1)`: Fast Downward prints the cost behind each action.
+/// Returns the range of `jump high (1)`: Fast Downward prints the cost after each action.
 fn words_and_cost(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
     let (before, cost) = text.trim_end().strip_suffix(')')?.rsplit_once('(')?;
     let is_cost = !cost.is_empty() && cost.bytes().all(|byte| byte.is_ascii_digit());
@@ -225,8 +229,9 @@ fn words_and_cost(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
     (is_cost && is_name && before.chars().all(is_plain)).then_some(at..at + text.len())
 }
 
-/// `jump r1 l2`, `- jump(r1, l2)`, `40.0 jump r1 l2`: every word behind the first is an object. A bullet or a number may
-/// stand before it, and brackets and commas between.
+/// Returns the range of `jump r1 l2`, `- jump(r1, l2)` or `40.0 jump r1 l2`: every word after the
+/// first is an object. A bullet or a number may precede it, and brackets and commas may separate
+/// the words.
 fn word_and_objects(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
     let is_before = |piece: &Piece<'_>| match piece {
         Piece::Word { text, .. } => is_number(text),
@@ -246,7 +251,7 @@ fn word_and_objects(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Ran
     is_action.then_some(at..at + text.len())
 }
 
-/// `|40|jump|r1 l2|20|`: apart from numbers, every word but one is an object.
+/// Returns the range of `|40|jump|r1 l2|20|`: apart from numbers, every word but one is an object.
 fn table_row(text: &str, pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
     let is_row = text.contains('|') && !pieces.iter().any(|it| matches!(it, Piece::Other));
     if !is_row || !pieces.iter().any(|piece| piece.is_object(vocabulary)) {
@@ -261,7 +266,7 @@ fn table_row(text: &str, pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Optio
     others.next().filter(|_| others.next().is_none())
 }
 
-/// `executing: film`, `then film`, `film again`
+/// Returns the range of a name in prose: `executing: film`, `then film`, `film again`.
 fn name_in_prose(
     text: &str,
     pieces: &[Piece<'_>],
@@ -281,14 +286,14 @@ fn name_in_prose(
     })
 }
 
-/// Words in parentheses on a line with a number.
+/// Returns the range of words in parentheses on a line with a number.
 fn words_and_number(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
     let mut group = None;
     let mut has_number = false;
     for piece in pieces {
         match *piece {
             Piece::Open { at, is_attached } => {
-                // Up to the next parenthesis, so that all groups together are read once.
+                // Up to the next parenthesis, so that all groups together take linear time.
                 let inside = text[at + 1..].split(['(', ')']).next().unwrap_or("");
                 let behind = text[at + 1 + inside.len()..].strip_prefix(')');
                 let begin = inside.trim_start_matches(|c: char| !c.is_alphanumeric());
@@ -310,7 +315,7 @@ fn words_and_number(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
     group.filter(|_| has_number)
 }
 
-/// `6 launch rocket [3]`
+/// Returns the range of `6 launch rocket [3]`.
 fn words_and_duration(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
     let mut words = pieces.iter().filter_map(|piece| match *piece {
         Piece::Word { text, at } => Some((text, at)),
@@ -323,8 +328,8 @@ fn words_and_duration(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> 
     (is_action && has_duration).then_some(at..at + name.len())
 }
 
-/// The whole text as the step of a plan without times: `name argument …`, perhaps with a cost as
-/// Fast Downward prints it, `(1)`.
+/// Reads the whole text as the step of a plan without times: `name argument …`, optionally with a
+/// cost in the notation of Fast Downward, `(1)`.
 pub(super) fn classical<'s>(
     text: &'s str,
     start: usize,
@@ -366,7 +371,8 @@ pub(super) fn classical<'s>(
     })
 }
 
-/// The text with blanks in place of planners' phrases and of POPF's progress, `b (10.000 | 0.100)`. Places stay.
+/// Returns the text with blanks in place of planners' phrases and of POPF's progress,
+/// `b (10.000 | 0.100)`. Positions are preserved.
 fn without_phrases(text: &str) -> String {
     let mut shown = text.to_owned();
     let lower = text.to_ascii_lowercase();
@@ -393,7 +399,7 @@ fn pieces(text: &str) -> Vec<Piece<'_>> {
     let mut pieces = Vec::new();
     let mut word: Option<usize> = None;
     for (at, character) in text.char_indices().chain([(text.len(), ' ')]) {
-        // Names are of letters, digits and signs of ASCII; any other sign separates them.
+        // Names consist of letters, digits and signs of ASCII; any other sign separates them.
         let is_part = character.is_alphanumeric()
             || character.is_ascii_graphic() && !"()[]{}<>,;:=\"'`|#*".contains(character);
         if is_part {
@@ -403,7 +409,7 @@ fn pieces(text: &str) -> Vec<Piece<'_>> {
         let mut is_attached = false;
         if let Some(from) = word.take() {
             let whole = &text[from..at];
-            // A full stop, a bullet or a dash is no part of a name.
+            // A full stop, a bullet or a dash is not part of a name.
             let trimmed = whole.trim_end_matches(['.', '!', '?']);
             if trimmed.chars().any(char::is_alphanumeric) {
                 is_attached = trimmed.len() == whole.len();
@@ -426,7 +432,7 @@ fn pieces(text: &str) -> Vec<Piece<'_>> {
     pieces
 }
 
-/// Returns `true` if the word is a number, perhaps with a sign before and a unit behind.
+/// Returns `true` if the word is a number, optionally with a sign before and a unit after it.
 fn is_number(word: &str) -> bool {
     word.trim_start_matches(|c: char| !c.is_alphanumeric())
         .starts_with(char::is_numeric)

@@ -8,7 +8,8 @@ use elbowroom_num::Rational;
 use crate::plan_text::line::Word;
 use crate::plan_text::timing::{Start, TimedStep};
 
-/// Number of significant digits that count. The floating-point numbers of many planners have no more.
+/// Number of significant digits that count. The floating-point numbers of many planners are no more
+/// precise.
 const SIGNIFICANT_DIGITS: i32 = 15;
 
 /// A plan with the numbers of its text and their precision.
@@ -16,24 +17,24 @@ const SIGNIFICANT_DIGITS: i32 = 15;
 pub struct PrintedPlan {
     /// The plan with the numbers of the text.
     pub plan: TimeTriggeredPlan,
-    /// For each step of the plan, its place and precision.
+    /// The position and precision of each step of the plan.
     pub steps: Vec<PrintedStep>,
 }
 
-/// Place and precision of one step of a printed plan.
+/// Position and precision of one step of a printed plan.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PrintedStep {
-    /// The place of the action in the text, in bytes.
+    /// The range of the action in the text, in bytes.
     pub place: Range<usize>,
     /// One unit of the last printed digit of the start time. 0 for a number that the text gives
-    /// exactly: a fraction, or a time that it leaves out.
+    /// exactly (a fraction), or omits.
     pub start_unit: Rational,
-    /// The same of the duration.
+    /// As [`start_unit`](Self::start_unit), for the duration.
     pub duration_unit: Rational,
 }
 
 impl PrintedPlan {
-    /// The steps in the [order](Step::order) of plans.
+    /// Sorts the steps into the [order](Step::order) of plans.
     pub(super) fn new(mut steps: Vec<(Step, PrintedStep)>) -> Self {
         steps.sort_by(|(one, _), (other, _)| one.order(other));
         let (plan, steps) = steps.into_iter().unzip();
@@ -73,8 +74,8 @@ impl PrintedStep {
     }
 }
 
-/// One unit of the last digit of a decimal, of the fifteenth significant one at least; `None` for a
-/// fraction.
+/// Returns one unit of the last digit of a decimal, but at least of the fifteenth significant one.
+/// Returns `None` for a fraction.
 fn unit(text: &str) -> Option<Rational> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),

@@ -1,4 +1,4 @@
-//! From a planner's output to a plan.
+//! Reader of plans in a planner's output.
 
 use std::collections::BTreeSet;
 
@@ -21,19 +21,19 @@ const EXPECTED: &str = "expected `time: (action argument …) [duration]`";
 
 /// Reads a plan: `0.000: (action argument …) [10.000]` on each line.
 ///
-/// The plan has all actions of the text: log text is skipped before the first and after the last
-/// action, unless it may hold an action; any other text that is not read is an error. Of several
-/// plans in one log, separated by a planner's headings, the last is read.
+/// The plan contains all actions of the text. Log text is skipped before the first and after the
+/// last action, unless it may contain an action; any other text that is not read is an error. If a
+/// log contains several plans, separated by a planner's headings, the last one is read.
 ///
 /// Other notations are read with a warning that names them: `PlanSys2`'s terminal, FF,
 /// Contingent-FF, Fast Downward, unified-planning, Aries, and the happenings of vscode-pddl.
-/// Actions without times happen one after the other. A duration that is not given is taken from
-/// the domain if it is one fixed number there. The steps come
-/// [in order](TimeTriggeredPlan::in_order), whatever the order of the lines.
+/// Actions without times happen one after the other. A missing duration is taken from the domain if
+/// it is one fixed number there. The steps are [in order](TimeTriggeredPlan::in_order), regardless
+/// of the order of the lines.
 ///
 /// # Errors
-/// When actions, objects, types or numbers do not fit the task, when a line cannot be read, or when
-/// there is no action although something has to be done.
+/// If actions, objects, types or numbers do not fit the task, if a line cannot be read, or if there
+/// is no action although the goal does not hold yet.
 pub fn read_plan(
     source: &Source,
     task: &Task,
@@ -42,7 +42,7 @@ pub fn read_plan(
     Ok((printed.plan, warnings))
 }
 
-/// Reads a plan as [`read_plan`] does, and keeps how exactly each number is printed.
+/// Reads a plan as [`read_plan`] does, and keeps the precision of each printed number.
 ///
 /// # Errors
 /// As for [`read_plan`].
@@ -127,7 +127,7 @@ fn report_lines(report: &mut Report, lines: &LastPlan<'_>) {
             .warning(place, format!("{} plans in one text", lines.plans))
             .label("the last one is read, from here");
     }
-    // Behind `step 0: A`, FF prints `1: B`, which looks like a time.
+    // After `step 0: A`, FF prints `1: B`, which looks like a time.
     let is_ff = lines.steps.iter().any(|step| step.form == Form::Ff);
     let steps = lines.steps.iter();
     let steps = steps.filter(|step| !is_ff || step.form != Form::Words);
@@ -154,7 +154,7 @@ fn report_lines(report: &mut Report, lines: &LastPlan<'_>) {
 /// A line, for advice.
 const USUAL: &str = "0.000: (action argument …) [10.000]";
 
-/// Reports a text without actions. It is an empty plan if nothing has to be done.
+/// Reports a text without actions. It is an empty plan if the goal already holds.
 fn report_no_action(report: &mut Report, task: &Task, has_text: bool) {
     let nothing = TimeTriggeredPlan::default();
     let is_refuted = || {

@@ -20,10 +20,10 @@ use crate::report::Report;
 use crate::source::{FileId, Span};
 use elbowroom_text::Source;
 
-/// Longest duration that planners print for an action which has none.
+/// Longest duration that planners print for an instantaneous action.
 const NEGLIGIBLE: (i64, i64) = (1, 100);
 
-/// Reader of the actions of a plan. It reports their mistakes.
+/// Reader of the actions of a plan, which reports their mistakes.
 pub(super) struct StepReader<'a> {
     task: &'a Task,
     pub(super) report: Report,
@@ -32,7 +32,7 @@ pub(super) struct StepReader<'a> {
     actions: BTreeMap<(SchemaId, Vec<ObjectId>), Arc<Action>>,
     /// Functions that change, computed at the first missing duration.
     changing: OnceCell<BTreeSet<FunctionId>>,
-    /// A missing duration has been reported.
+    /// `true` if a missing duration has been reported.
     has_told_missing: bool,
 }
 
@@ -186,7 +186,7 @@ impl<'a> StepReader<'a> {
         found
     }
 
-    /// The words for objects, and those for `:control` parameters behind them.
+    /// Splits the words into those for objects and those for `:control` parameters.
     fn apart<'w, 's>(
         &self,
         schema: Option<SchemaId>,
@@ -202,7 +202,8 @@ impl<'a> StepReader<'a> {
         }
     }
 
-    /// The numbers that the plan chooses for the `:control` parameters of an action, by unknown.
+    /// Returns the numbers that the plan chooses for the `:control` parameters of an action, by
+    /// unknown.
     fn controls(
         &mut self,
         schema: SchemaId,
@@ -256,7 +257,7 @@ impl<'a> StepReader<'a> {
         found
     }
 
-    /// `(name ?x - type …)`
+    /// Returns `(name ?x - type …)`.
     fn signature(&self, id: SchemaId) -> String {
         let problem = self.task.problem();
         let schema = &problem.schemas[id.index()];
@@ -278,7 +279,7 @@ impl<'a> StepReader<'a> {
     }
 }
 
-/// The action with these numbers in the place of its `:control` parameters, and in its name.
+/// Returns the action with these numbers in place of its `:control` parameters, and in its name.
 fn chosen_by_plan(action: Action, controls: &[(u32, Rational)]) -> Action {
     if controls.is_empty() {
         return action;
@@ -299,7 +300,7 @@ fn chosen_by_plan(action: Action, controls: &[(u32, Rational)]) -> Action {
     chosen
 }
 
-/// The place in the plan's text.
+/// Returns the range in the plan's text as a span.
 pub(super) fn span(range: &Range<usize>) -> Span {
     Span {
         file: FileId::Domain,

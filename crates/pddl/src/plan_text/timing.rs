@@ -9,7 +9,7 @@ use super::line::{RawStep, Word};
 use super::step::span;
 use crate::report::Report;
 
-/// An action with what the text says about its time.
+/// An action with the times that the text gives.
 pub(super) struct TimedStep<'s> {
     pub(super) raw: RawStep<'s>,
     pub(super) start: Start,
@@ -30,11 +30,11 @@ pub(super) enum Duration {
     Given(Rational),
     /// The text gives none.
     Missing,
-    /// The text gives both ends of actions that take time, so this one takes none.
+    /// The action is instantaneous: the text gives both ends of durative actions.
     Instant,
 }
 
-/// Gives each action its time. Actions whose times cannot be read are reported, and missing.
+/// Computes the time of each action. Actions whose times cannot be read are reported and dropped.
 pub(super) fn timed<'s>(report: &mut Report, mut steps: Vec<RawStep<'s>>) -> Vec<TimedStep<'s>> {
     number_steps(&mut steps);
     let is_sequential = |step: &RawStep<'_>| step.form.is_sequential() || step.time.is_none();
@@ -73,7 +73,7 @@ pub(super) fn timed<'s>(report: &mut Report, mut steps: Vec<RawStep<'s>>) -> Vec
     timed
 }
 
-/// FF writes `step` before its first number only.
+/// Marks the steps of FF, which writes `step` before its first number only.
 fn number_steps(steps: &mut [RawStep<'_>]) {
     if !steps.iter().any(|step| step.form == Form::Ff) {
         return;
@@ -86,7 +86,8 @@ fn number_steps(steps: &mut [RawStep<'_>]) {
     }
 }
 
-/// Actions one after the other. Numbers before them must be consecutive: none is missing.
+/// Returns sequential actions. The numbers before them must be consecutive, so that none is
+/// missing.
 fn sequence<'s>(report: &mut Report, steps: Vec<RawStep<'s>>) -> Vec<TimedStep<'s>> {
     let mut expected: Option<u64> = None;
     let mut timed = Vec::with_capacity(steps.len());
@@ -115,7 +116,7 @@ fn sequence<'s>(report: &mut Report, steps: Vec<RawStep<'s>>) -> Vec<TimedStep<'
     timed
 }
 
-/// Starts with their ends. Equal actions that overlap need counters.
+/// Pairs starts with their ends. Equal actions that overlap need counters.
 fn paired<'s>(report: &mut Report, happenings: Vec<RawStep<'s>>) -> Vec<TimedStep<'s>> {
     type Ends<'s> = Vec<(Rational, RawStep<'s>)>;
     let mut actions: BTreeMap<Vec<String>, (Ends<'s>, Ends<'s>)> = BTreeMap::new();
@@ -169,7 +170,7 @@ fn paired<'s>(report: &mut Report, happenings: Vec<RawStep<'s>>) -> Vec<TimedSte
     timed
 }
 
-/// A time or duration, not before 0.
+/// Reads a time or duration, which must not be negative.
 fn number(report: &mut Report, word: &Word<'_>) -> Option<Rational> {
     match word.text.parse::<Rational>() {
         Ok(time) if !time.is_negative() => Some(time),

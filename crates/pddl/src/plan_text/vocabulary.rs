@@ -1,11 +1,11 @@
-//! Names of the actions and objects of a task, as plans may write them.
+//! Names of the actions and objects of a task, in the forms that plans may use.
 
 use std::collections::BTreeMap;
 
 use elbowroom_model::Task;
 use elbowroom_model::problem::{ObjectId, SchemaId};
 
-/// Words of more parts are not taken apart.
+/// Maximum number of parts into which words are split.
 const MOST_PARTS: usize = 32;
 
 /// Names of actions and objects, in lower case.
@@ -44,7 +44,8 @@ impl Vocabulary {
         self.objects.get(&word.to_ascii_lowercase()).copied()
     }
 
-    /// Number of parameters of the action with this name, `None` if there is no such action.
+    /// Returns the number of parameters of the action with this name, or `None` if there is no such
+    /// action.
     pub(super) fn parameters(&self, word: &str) -> Option<usize> {
         let schema = self.schema(word)?;
         self.parameters.get(schema.index()).copied()

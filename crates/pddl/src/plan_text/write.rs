@@ -1,20 +1,20 @@
-//! From a plan to text.
+//! Writer of plans.
 
 use std::fmt::Write;
 
 use elbowroom_model::{Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-/// How many digits behind the point are written at least, as planners do.
+/// Minimum number of digits after the decimal point, as planners print.
 const FEWEST_DIGITS: usize = 3;
-/// The number of digits tried before a number is written as a fraction.
+/// Number of digits tried before a number is written as a fraction.
 const MOST_DIGITS: u32 = 300;
 
-/// The plan as text that [`read_plan`](crate::read_plan) reads: one
+/// Returns the plan as text that [`read_plan`](crate::read_plan) reads: one
 /// `0.000: (action argument …) [10.000]` on each line, by start time.
 ///
-/// Numbers are written exactly; one without a finite decimal is written as `p/q`, which other
-/// tools may refuse.
+/// Numbers are written exactly; one without a finite decimal is written as `p/q`, which other tools
+/// may refuse.
 pub fn write_plan(task: &Task, plan: &TimeTriggeredPlan) -> String {
     written(task, plan, &|step| {
         let duration = step.duration.as_ref().map(decimal);
@@ -22,11 +22,12 @@ pub fn write_plan(task: &Task, plan: &TimeTriggeredPlan) -> String {
     })
 }
 
-/// The plan as [`write_plan`] writes it, with all times rounded to `digits` digits after the point.
+/// Returns the plan as [`write_plan`] does, with all times rounded to `digits` digits after the
+/// point.
 ///
 /// A duration is the difference of the rounded end and the rounded start. So happenings keep their
-/// order, simultaneous happenings stay simultaneous, and a distance with at most `digits` digits does
-/// not shrink.
+/// order, simultaneous happenings stay simultaneous, and a distance with at most `digits` digits
+/// does not shrink.
 pub fn write_rounded_plan(task: &Task, plan: &TimeTriggeredPlan, digits: u32) -> String {
     let rounded = |value: &Rational| -> Rational {
         let nearest = value.to_decimal(digits).parse();
@@ -42,7 +43,7 @@ pub fn write_rounded_plan(task: &Task, plan: &TimeTriggeredPlan, digits: u32) ->
     })
 }
 
-/// The lines of a plan, with the start and the duration of each step as `numbers` gives them.
+/// Returns the lines of a plan; `numbers` gives the start and the duration of each step.
 fn written(
     task: &Task,
     plan: &TimeTriggeredPlan,
@@ -55,7 +56,7 @@ fn written(
         text.push_str(&start);
         text.push_str(": ");
         if task.problem().controls.contains_key(&action.schema) {
-            // The numbers that the plan chooses stand in the name only.
+            // The numbers that the plan chooses appear only in the name.
             text.push_str(&action.name);
         } else {
             text.push_str(&task.action_name(action.schema, &action.arguments));
@@ -69,7 +70,7 @@ fn written(
     text
 }
 
-/// The number, exactly: in decimals with at least three digits behind the point, or as `p/q`.
+/// Returns the exact number: in decimals with at least three digits after the point, or as `p/q`.
 pub(super) fn decimal(value: &Rational) -> String {
     let is_exact = |text: &String| text.parse().is_ok_and(|read: Rational| read == *value);
     let Some(mut text) = [18, MOST_DIGITS]

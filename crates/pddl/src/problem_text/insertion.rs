@@ -1,13 +1,13 @@
-//! Further initial facts in the text of a problem file.
+//! Insertion of initial facts into the text of a problem file.
 
 use crate::report::Report;
 use crate::source::FileId;
 use crate::syntax::{Node, parse};
 use elbowroom_text::Source;
 
-/// Returns the text of a problem file with further elements at the end of its `:init`, such as timed
-/// initials. `lines` has one element or comment a line. The rest of the text, comments included, stays
-/// as it is; a text that is no problem file stays as it is altogether.
+/// Returns the text of a problem file with further elements at the end of its `:init`, such as
+/// timed initials. `lines` has one element or comment a line. The rest of the text, including
+/// comments, is unchanged. A text that is not a problem file is returned unchanged.
 ///
 /// ```
 /// let problem = "(define (problem p) (:domain d)\n  (:init (lit))\n  (:goal (cold)))";
@@ -32,7 +32,7 @@ pub fn with_initials(problem: &str, lines: &str) -> String {
         Some(init) => (init, "", ""),
         None => (define, "\n  (:init", ")"),
     };
-    // The place of the closing parenthesis.
+    // Position of the closing parenthesis.
     let at = section.span.end.saturating_sub(1);
     let (Some(before), Some(after)) = (problem.get(..at), problem.get(at..)) else {
         return problem.to_owned();

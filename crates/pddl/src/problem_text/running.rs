@@ -1,4 +1,4 @@
-//! Actions under way, as what will happen at their ends.
+//! Effects of running actions at their ends, as timed initials.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use elbowroom_num::{End, Interval, Rational};
 
 use super::WriteProblemError;
 
-/// For each running action, the earliest end that is possible and not before `epsilon` from now.
+/// Returns the earliest possible end of each running action that is at least `epsilon` from now.
 ///
 /// # Errors
-/// When the only end left to an action is now, or past.
+/// If the only remaining end of an action is now or in the past.
 pub fn end_times(
     situation: &Situation,
     epsilon: &Rational,
@@ -37,7 +37,8 @@ pub fn end_times(
     situation.running.iter().map(end).collect()
 }
 
-/// The smallest number in an interval; one above its lower end, if that is not part of it.
+/// Returns the smallest number in an interval. If the lower end is excluded, returns a number above
+/// it.
 fn shortest(interval: &Interval, epsilon: &Rational) -> Option<Rational> {
     if interval.is_empty() {
         return None;
@@ -55,7 +56,7 @@ fn shortest(interval: &Interval, epsilon: &Rational) -> Option<Rational> {
     }
 }
 
-/// The changes by the running actions at their `ends`, each as timed initials of its own.
+/// Returns the changes by the running actions at their `ends`, each as separate timed initials.
 pub(super) fn ends_of_running(
     task: &Task,
     situation: &Situation,
@@ -67,7 +68,7 @@ pub(super) fn ends_of_running(
             ends: ends.len(),
         });
     }
-    // Increases add up in the order in which they happen.
+    // Increases accumulate in the order of the ends.
     let mut order: Vec<_> = situation.running.iter().zip(ends).collect();
     order.sort_by_key(|(_, end)| *end);
     let mut values = situation.state.values.clone();
@@ -113,7 +114,8 @@ fn check_end(
     Ok(())
 }
 
-/// The part of the rest of an action that is no change at a known time.
+/// Returns the reason why the remaining part of an action cannot be written as changes at known
+/// times.
 fn beyond_timed_initials(task: &Task, body: &DurativeBody) -> Option<String> {
     if let Some(effect) = body.continuous.first() {
         let fluent = task.fluent_name(effect.fluent);
@@ -133,8 +135,8 @@ fn beyond_timed_initials(task: &Task, body: &DurativeBody) -> Option<String> {
     ))
 }
 
-/// The changes at an action's end, with numbers for expressions: those that `values` gives, which
-/// are updated. What else changes a fluent until then is not foreseen; the judge will see it.
+/// Returns the changes at an action's end with expressions evaluated by `values`, which is updated.
+/// Other changes of the fluents until then are not predicted; the validator accounts for them.
 fn changes_at(
     task: &Task,
     end: &SnapAction,
@@ -190,7 +192,7 @@ fn changes_at(
     Ok(changes)
 }
 
-/// A fluent's value after an update; `None` where the old one is needed and missing.
+/// Returns a fluent's value after an update, or `None` if the old value is needed and missing.
 fn updated(operator: UpdateOperator, old: Option<Rational>, by: &Rational) -> Option<Rational> {
     match operator {
         UpdateOperator::Assign => Some(by.clone()),

@@ -12,7 +12,7 @@ use super::Writer;
 type Names<'a> = Vec<Cow<'a, str>>;
 
 impl Writer<'_> {
-    /// `type`, or `(either type …)`.
+    /// Returns `type`, or `(either type …)`.
     pub(super) fn types(&self, types: &[TypeId]) -> String {
         let name = |id: &TypeId| self.task.problem().types[id.index()].name.as_str();
         match types {
@@ -25,7 +25,7 @@ impl Writer<'_> {
         }
     }
 
-    /// The condition, its variables numbered as in `names`.
+    /// Returns the condition as text, with variables numbered as in `names`.
     pub(super) fn condition<'a>(&self, condition: &'a Condition, names: &mut Names<'a>) -> String {
         let problem = self.task.problem();
         match condition {
@@ -54,7 +54,7 @@ impl Writer<'_> {
         }
     }
 
-    /// The constraint, its variables numbered as in `names`.
+    /// Returns the constraint as text, with variables numbered as in `names`.
     pub(super) fn constraint<'a>(
         &self,
         constraint: &'a Constraint,
@@ -90,7 +90,7 @@ impl Writer<'_> {
         }
     }
 
-    /// The declaration of variables, which are in scope from now on, and how many were before.
+    /// Adds variables to the scope. Returns their declaration, and the previous number of names.
     fn declared<'a>(&self, variables: &'a [Variable], names: &mut Names<'a>) -> (String, usize) {
         let outside = names.len();
         let mut declared = Vec::new();
@@ -125,7 +125,7 @@ impl Writer<'_> {
         format!("({quantifier} ({declared}) {part})")
     }
 
-    /// The expression, its variables numbered as in `names`.
+    /// Returns the expression as text, with variables numbered as in `names`.
     pub(super) fn expression(&self, expression: &Expression, names: &Names<'_>) -> String {
         let problem = self.task.problem();
         let two = |operator: &str, left: &Expression, right: &Expression| {
@@ -147,7 +147,7 @@ impl Writer<'_> {
             Expression::Violations(preference) => {
                 format!("(is-violated {})", problem.preferences[preference.index()])
             }
-            // Only the domain's own unknowns can stand outside of actions.
+            // Outside of actions, only the domain's own unknowns can occur.
             Expression::Unknown(
                 Unknown::Domain(place) | Unknown::Action(place) | Unknown::Parameter(place),
             ) => problem
@@ -179,7 +179,7 @@ impl Writer<'_> {
     }
 }
 
-/// The name, or one like it if an enclosing quantifier has it already.
+/// Returns the name, or a similar one if an enclosing quantifier already uses it.
 fn unused<'a>(name: &'a str, names: &Names<'_>) -> Cow<'a, str> {
     let is_taken = |name: &str| names.iter().any(|own| own.eq_ignore_ascii_case(name));
     let mut free = Cow::Borrowed(name);

@@ -1,4 +1,4 @@
-//! From text to parentheses and words.
+//! Conversion of text to parentheses and words.
 
 use crate::report::Report;
 use crate::source::{FileId, Span};
@@ -11,7 +11,7 @@ pub(crate) enum Token<'s> {
     Word(&'s str),
 }
 
-/// The tokens of a text with their places. Reports characters that belong nowhere.
+/// Returns the tokens of a text with their positions. Reports invalid characters.
 pub(crate) fn tokens<'s>(
     file: FileId,
     text: &'s str,
@@ -74,7 +74,8 @@ fn ends_word(character: char) -> bool {
     matches!(character, '(' | ')' | ';') || character.is_whitespace() || is_stray(character)
 }
 
-/// An operator may be written without a space before its operand, as in `(>=?x 3)`.
+/// Returns the length of an operator at the beginning of a word. It may be written without a space
+/// before its operand, as in `(>=?x 3)`.
 fn operator_length(word: &str) -> Option<usize> {
     let length = match word.as_bytes() {
         [b'<' | b'>', b'=', ..] => 2,

@@ -1,4 +1,4 @@
-//! From words to nested lists.
+//! Conversion of words to nested lists.
 
 use std::borrow::Cow;
 
@@ -6,10 +6,10 @@ use crate::report::Report;
 use crate::source::{FileId, Span};
 use crate::syntax::lexer::{Token, tokens};
 
-/// Deeper lists are refused, so that everything that walks a tree may recurse.
+/// Maximum depth of lists. Deeper ones are refused, so that recursion over trees is safe.
 const DEEPEST: usize = 200;
 
-/// A word or a list, and where it stands.
+/// A word or a list, with its position.
 #[derive(Debug)]
 pub(crate) struct Node<'s> {
     pub(crate) span: Span,
@@ -24,7 +24,7 @@ pub(crate) enum Kind<'s> {
 }
 
 impl<'s> Node<'s> {
-    /// The word as written, if it is one.
+    /// Returns the word as written, if it is one.
     pub(crate) fn word(&self) -> Option<&'s str> {
         match self.kind {
             Kind::Word(word) => Some(word),
@@ -32,18 +32,18 @@ impl<'s> Node<'s> {
         }
     }
 
-    /// The word in lower case, if it is one.
+    /// Returns the word in lower case, if it is one.
     pub(crate) fn lower(&self) -> Option<Cow<'s, str>> {
         self.word().map(lower)
     }
 
-    /// Whether it is this word, whatever the case.
+    /// Returns `true` if the node is this word, ignoring case.
     pub(crate) fn is(&self, word: &str) -> bool {
         self.word()
             .is_some_and(|own| own.eq_ignore_ascii_case(word))
     }
 
-    /// The elements, if it is a list.
+    /// Returns the elements, if it is a list.
     pub(crate) fn list(&self) -> Option<&[Node<'s>]> {
         match &self.kind {
             Kind::Word(_) => None,
@@ -51,25 +51,25 @@ impl<'s> Node<'s> {
         }
     }
 
-    /// The first element's word in lower case, and the other elements.
+    /// Returns the first element's word in lower case, and the other elements.
     pub(crate) fn form(&self) -> Option<(Cow<'s, str>, &[Node<'s>])> {
         let (head, rest) = self.list()?.split_first()?;
         Some((head.lower()?, rest))
     }
 
-    /// Whether it is `()`.
+    /// Returns `true` if the node is `()`.
     pub(crate) fn is_empty_list(&self) -> bool {
         self.list().is_some_and(<[_]>::is_empty)
     }
 
-    /// The place of the first element, or of the whole where there is none.
+    /// Returns the span of the first element, or of the whole node if there is none.
     pub(crate) fn head_span(&self) -> Span {
         self.list()
             .and_then(<[_]>::first)
             .map_or(self.span, |head| head.span)
     }
 
-    /// The first line's worth of what is written here, to quote it.
+    /// Returns a short quotation of the node for messages.
     pub(crate) fn quote(&self) -> String {
         match &self.kind {
             Kind::Word(word) => (*word).to_owned(),
@@ -85,7 +85,7 @@ impl<'s> Node<'s> {
     }
 }
 
-/// Lower case, without a copy where nothing changes.
+/// Returns the word in lower case, without a copy if nothing changes.
 pub(crate) fn lower(word: &str) -> Cow<'_, str> {
     if word.bytes().any(|byte| byte.is_ascii_uppercase()) {
         Cow::Owned(word.to_ascii_lowercase())
@@ -94,7 +94,7 @@ pub(crate) fn lower(word: &str) -> Cow<'_, str> {
     }
 }
 
-/// The top-level lists and words of a text. Reports parentheses that do not match.
+/// Returns the top-level lists and words of a text. Reports unbalanced parentheses.
 pub(crate) fn parse<'s>(file: FileId, text: &'s str, report: &mut Report) -> Vec<Node<'s>> {
     let tokens = tokens(file, text, report);
     let mut builder = Builder::new();
@@ -120,7 +120,7 @@ pub(crate) fn parse<'s>(file: FileId, text: &'s str, report: &mut Report) -> Vec
     builder.finish(report)
 }
 
-/// Whether a list that begins with the word can only stand directly inside `(define …)`.
+/// Returns `true` if a list that begins with the word can only occur directly inside `(define …)`.
 fn is_section(word: &str) -> bool {
     const SECTIONS: &[&str] = &[
         ":action",
@@ -140,11 +140,11 @@ fn is_section(word: &str) -> bool {
     word.starts_with(':') && SECTIONS.contains(&lower(word).as_ref())
 }
 
-/// The lists that are open at one moment, outermost first.
+/// The lists that are currently open, outermost first.
 struct Builder<'s> {
     done: Vec<Node<'s>>,
     open: Vec<(Span, Vec<Node<'s>>)>,
-    /// The number of lists that are open beyond the deepest that is kept.
+    /// Number of open lists beyond the maximum depth.
     too_deep: usize,
 }
 
@@ -196,7 +196,7 @@ impl<'s> Builder<'s> {
         }
     }
 
-    /// At the start of a section: all but `(define` should be closed.
+    /// Checks at the start of a section that all lists but `(define` are closed.
     fn expect_section(&mut self, span: Span, word: &str, report: &mut Report) {
         if self.open.len() + self.too_deep <= 1 || !self.is_in_define() {
             return;
@@ -219,7 +219,7 @@ impl<'s> Builder<'s> {
         first.is_some_and(|head| head.is("define"))
     }
 
-    /// Closes the innermost list as if a `)` stood just before `span`.
+    /// Closes the innermost list as if there were a `)` just before `span`.
     fn close_at(&mut self, span: Span) {
         if let Some((start, nodes)) = self.open.pop() {
             let end = Span {

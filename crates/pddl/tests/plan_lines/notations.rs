@@ -1,4 +1,4 @@
-//! Notations of plans apart from that of the International Planning Competition.
+//! Notations of plans other than that of the International Planning Competition.
 
 use crate::{errors, notes, plan};
 

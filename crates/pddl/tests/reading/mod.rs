@@ -1,4 +1,4 @@
-//! What the tests share: short texts in, PDDL-like text out.
+//! Helpers shared by the tests: short texts in, PDDL-like text out.
 
 #![allow(dead_code, reason = "each test program uses a part of it")]
 
@@ -10,7 +10,7 @@ use elbowroom_model::problem::{
 use elbowroom_model::{Problem, Task};
 use elbowroom_pddl::{Diagnostic, Diagnostics, Source, read_problem};
 
-/// A domain with some names to play with, and `actions`.
+/// Returns a domain with some names for tests, and `actions`.
 pub(crate) fn domain(actions: &str) -> Source {
     let frame = "(define (domain d)
 (:types room ball - thing thing)
@@ -21,7 +21,7 @@ pub(crate) fn domain(actions: &str) -> Source {
     Source::new("domain.pddl", format!("{frame}{actions})"))
 }
 
-/// A problem with some objects, and `sections`.
+/// Returns a problem with some objects, and `sections`.
 pub(crate) fn problem(sections: &str) -> Source {
     let text = format!(
         "(define (problem p) (:domain d) (:objects kitchen - room b1 B2 - ball)\n{sections})"
@@ -29,17 +29,17 @@ pub(crate) fn problem(sections: &str) -> Source {
     Source::new("problem.pddl", text)
 }
 
-/// The problem of the plainest problem file with these actions in its domain.
+/// Reads a minimal problem file with these actions in its domain.
 pub(crate) fn read_actions(actions: &str) -> Result<(Problem, Vec<Diagnostic>), Diagnostics> {
     read_problem(&domain(actions), &problem("(:init) (:goal (and))"))
 }
 
-/// The problem of the plainest domain with these sections in its problem file.
+/// Reads a minimal domain with these sections in its problem file.
 pub(crate) fn read_sections(sections: &str) -> Result<(Problem, Vec<Diagnostic>), Diagnostics> {
     read_problem(&domain(""), &problem(sections))
 }
 
-/// The diagnostics, one line each.
+/// Returns the diagnostics, one line each.
 pub(crate) fn mistakes<T>(read: Result<T, Diagnostics>) -> String {
     match read {
         Ok(_) => "none".to_owned(),
@@ -47,7 +47,7 @@ pub(crate) fn mistakes<T>(read: Result<T, Diagnostics>) -> String {
     }
 }
 
-/// The ground task of a text.
+/// Returns the ground task of a text.
 pub(crate) fn task(domain: &Source, problem: &Source) -> Task {
     match read_problem(domain, problem) {
         Ok((problem, _)) => Task::new(problem),
@@ -55,7 +55,7 @@ pub(crate) fn task(domain: &Source, problem: &Source) -> Task {
     }
 }
 
-/// The only action of a domain, written out.
+/// Returns the only action of a domain, as text.
 pub(crate) fn only_action(actions: &str) -> String {
     match read_actions(actions) {
         Ok((problem, _)) => Printer(&problem).schema(&problem.schemas[0]),
@@ -63,7 +63,7 @@ pub(crate) fn only_action(actions: &str) -> String {
     }
 }
 
-/// Writes parts of a problem as PDDL would, with variables as numbers.
+/// Writer of parts of a problem in the style of PDDL, with variables as numbers.
 pub(crate) struct Printer<'a>(pub(crate) &'a Problem);
 
 impl Printer<'_> {

@@ -1,4 +1,4 @@
-//! Our own cases, and others' plans, as they are and with times shifted.
+//! Our own cases, and plans of others, unchanged and with times shifted.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use elbowroom_pddl::Source;
 use crate::program::{Said, Val, ours, task};
 use crate::skipped::skipped;
 
-/// The plan with one number of one line changed: the start of an action, or its duration.
+/// Returns the plan with one number of one line changed: the start of an action, or its duration.
 fn shifted(plan: &str, line: usize, is_duration: bool, by: &Rational) -> Option<String> {
     let mut lines: Vec<String> = plan.lines().map(str::to_owned).collect();
     let changed = lines.get_mut(line)?;
@@ -28,14 +28,15 @@ fn shifted(plan: &str, line: usize, is_duration: bool, by: &Rational) -> Option<
     Some(lines.join("\n") + "\n")
 }
 
-/// The lines of a plan with actions.
+/// Returns the lines of a plan that contain actions.
 fn steps(plan: &str) -> Vec<usize> {
     let lines = plan.lines().enumerate();
     let steps = lines.filter(|(_, line)| line.contains(": (") || line.contains(":("));
     steps.map(|(number, _)| number).collect()
 }
 
-/// What is said about a plan and about those with one number changed, where it differs.
+/// Compares the verdicts on a plan and on its variants with one number changed. Returns the
+/// disagreements and the number of comparisons.
 fn compare(
     val: &Val,
     [domain, problem, plan]: [&str; 3],
@@ -58,7 +59,7 @@ fn compare(
         let theirs = val.says(domain, problem, &plan);
         let (ours, why) = ours(&task, &Source::new("plan", plan.clone()));
         if ours == Said::Nothing && theirs == Said::Invalid {
-            // VAL does not say that it cannot tell.
+            // VAL does not report that it is undecided.
             continue;
         }
         compared += 1;
@@ -69,7 +70,7 @@ fn compare(
     (differ, compared)
 }
 
-/// Every step's start and duration, earlier and later.
+/// Returns changes of every step's start and duration, to earlier and later times.
 fn all_changes(plan: &str) -> Vec<(usize, bool, Rational)> {
     let mut changes = Vec::new();
     for line in steps(plan) {
@@ -101,7 +102,7 @@ fn our_own_cases_and_what_becomes_of_them_are_judged_alike() {
     ] {
         let read = |file: &str| {
             let text = std::fs::read_to_string(root.join(name).join(file)).expect("a case");
-            // VAL asks for a condition.
+            // VAL requires a condition.
             text.replace(":condition ()", ":condition (and)")
         };
         let [domain, problem, plan] = ["domain.pddl", "problem.pddl", "plan.plan"].map(read);
@@ -282,7 +283,7 @@ fn others_plans_and_what_becomes_of_them_are_judged_alike() {
     );
 }
 
-/// The smallest examples of what is told in the document about events and divisions.
+/// The smallest examples for the document's sections on events and divisions.
 #[test]
 fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
     let Some(val) = Val::find("smallest") else {
@@ -307,7 +308,7 @@ fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
         (:action turn-on :parameters () :precondition (not (open)) :effect (open))
         (:action turn-off :parameters () :precondition (open) :effect (not (open))))";
     let dry = "(define (problem p) (:domain basin) (:init (= (level) 0)) (:goal (not (flooded))))";
-    // At 11, the basin holds 10, whatever is done then.
+    // At 11, the basin holds 10, whatever action is applied then.
     let (theirs, ours) = judged(basin, dry, "1.0: (turn-on)\n11.0: (turn-off)\n");
     assert!(
         matches!(theirs, Said::Valid(_)) && ours == Said::Invalid,
@@ -319,7 +320,7 @@ fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
         "{theirs:?} {ours:?}"
     );
 
-    // The flow ends at 9. After any happening meanwhile, VAL lets it go on until an event.
+    // The flow ends at 9. After any happening in between, VAL lets it continue until an event.
     let bounded = basin
         .replace(
             ":precondition (open)\n          :effect (increase",
@@ -346,7 +347,8 @@ fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
         (:predicates (done)) (:functions (each) (people))
         (:action divide :parameters () :precondition (and)
           :effect (and (done) (assign (each) (/ 1 (people))))))";
-    // What a preference reads keeps nothing apart for us, since it never makes a plan invalid.
+    // In our semantics, the reads of a preference require no separation, since a preference never
+    // makes a plan invalid.
     let lamp = "(define (domain lamp) (:requirements :strips :preferences)
         (:predicates (lit) (seen))
         (:action switch :parameters () :precondition (and) :effect (lit))

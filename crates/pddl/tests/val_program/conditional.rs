@@ -8,7 +8,8 @@ use elbowroom_pddl::Source;
 
 use crate::program::{Said, Val, ours, task};
 
-/// The verdicts of VAL and of the judge on one action `(a)` from 0.5 to 2.5, with these effects, initial facts and goal.
+/// Returns the verdicts of VAL and of the validator on one action `(a)` from 0.5 to 2.5, with these
+/// effects, initial facts and goal.
 fn judged(val: &Val, [effects, initial, goal]: [&str; 3]) -> [Said; 2] {
     let domain = format!(
         "(define (domain d)
@@ -34,7 +35,7 @@ fn is_valid(said: &Said) -> bool {
     matches!(said, Said::Valid(_))
 }
 
-/// The smallest examples of the disagreements in the document. The judge accepts all of them.
+/// The smallest examples of the disagreements in the document. The validator accepts all of them.
 #[test]
 fn the_document_lists_conditional_effects_that_val_judges_otherwise() {
     let Some(val) = Val::find("conditional-known") else {
@@ -88,7 +89,8 @@ fn the_document_lists_conditional_effects_that_val_judges_otherwise() {
     }
 }
 
-/// A condition at the start is read before the effects of the own start, for VAL as for the judge.
+/// A condition at the start is read before the effects of the action's own start, by VAL and by the
+/// validator.
 #[test]
 fn start_conditions_are_read_before_the_own_start_as_by_val() {
     let Some(val) = Val::find("conditional-start") else {

@@ -4,7 +4,7 @@ use elbowroom_pddl::Source;
 
 use crate::program::{Said, Val, ours, task};
 
-/// A source of numbers that is the same each time (Marsaglia's xorshift).
+/// Pseudo-random numbers with a fixed seed (Marsaglia's xorshift).
 struct Dice(u64);
 
 impl Dice {
@@ -46,7 +46,7 @@ const CONDITIONS: [&str; 8] = [
     "(>= (x) 1)",
 ];
 
-/// Four actions, each of which changes something at its start and end.
+/// Returns a domain with four actions, each with a change at its start and end.
 fn domain(dice: &mut Dice) -> String {
     let mut text = "(define (domain d)
         (:requirements :strips :durative-actions :fluents :constraints :preferences
@@ -78,8 +78,9 @@ fn domain(dice: &mut Dice) -> String {
     text + ")"
 }
 
-/// A problem with a constraint of this form, and one that says the same in other words, where VAL
-/// does not judge this form: that the condition always holds while a timed initial says so.
+/// Returns a problem with a constraint of this form. If VAL does not support the form, an
+/// equivalent problem is returned as well, in which the condition always holds while a timed
+/// initial is true.
 fn problem(form: &str, is_soft: bool, dice: &mut Dice) -> (String, Option<String>) {
     let from = format!("{}.5", dice.below(12));
     let until = format!("{}.5", 13 + dice.below(5));
@@ -116,7 +117,7 @@ fn problem(form: &str, is_soft: bool, dice: &mut Dice) -> (String, Option<String
     }
 }
 
-/// Each action once, at a time of its own.
+/// Returns a plan with each action once, at a separate time.
 fn plan(domain: &str, dice: &mut Dice) -> String {
     let mut text = String::new();
     for (action, line) in domain
@@ -137,7 +138,7 @@ fn plan(domain: &str, dice: &mut Dice) -> String {
     text
 }
 
-/// The disagreements under one form, each with all that was said.
+/// Returns the disagreements under one form, each with both answers.
 fn disagreements(val: &Val, form: &str, is_soft: bool, count: usize) -> (Vec<String>, usize) {
     let mut dice = Dice(0x9e37_79b9_7f4a_7c15);
     let (mut differ, mut valid) = (Vec::new(), 0);
@@ -183,7 +184,7 @@ fn constraints_of_every_form_are_judged_alike() {
     }
 }
 
-/// One action that makes (p) true from 2 to 4, and another one later.
+/// Returns both verdicts on one action that makes (p) true from 2 to 4, and another one later.
 fn known(val: &Val, constraint: &str) -> (Said, Said) {
     let domain = "(define (domain d) (:requirements :strips :durative-actions :constraints)
         (:predicates (p) (q))

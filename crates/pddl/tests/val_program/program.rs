@@ -1,4 +1,4 @@
-//! VAL as a process, and the judge's answer in the same words.
+//! VAL as a process, and the validator's answer in the same terms.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -10,21 +10,21 @@ use elbowroom_pddl::{Source, read_plan, read_problem};
 
 use crate::skipped::skipped;
 
-/// The tolerance of both.
+/// The tolerance of both validators.
 pub(crate) const TOLERANCE: &str = "0.001";
 
-/// What is said about a plan.
+/// Verdict on a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Said {
     /// It is valid, with this metric, if there is one.
     Valid(Option<f64>),
     Invalid,
-    /// Domain, problem or plan cannot be read, or not judged.
+    /// Domain, problem or plan cannot be read or validated.
     Nothing,
 }
 
 impl Said {
-    /// Whether the two are the same, metrics up to what rounding does to them.
+    /// Returns `true` if both verdicts are the same, up to rounding of the metrics.
     pub(crate) fn agrees_with(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Valid(Some(one)), Self::Valid(Some(two))) => (one - two).abs() < 0.005,
@@ -34,14 +34,14 @@ impl Said {
     }
 }
 
-/// VAL, with a folder of its own for what it reads.
+/// VAL, with a working folder for its input files.
 pub(crate) struct Val {
     program: PathBuf,
     folder: PathBuf,
 }
 
 impl Val {
-    /// `None` where the environment names none; the test says so.
+    /// Returns `None`, with a message, if the environment names no program.
     pub(crate) fn find(test: &str) -> Option<Self> {
         let Some(program) = std::env::var_os("ELBOWROOM_VAL").map(PathBuf::from) else {
             skipped("no VAL; set ELBOWROOM_VAL to its program Validate");
@@ -52,7 +52,7 @@ impl Val {
         Some(Self { program, folder })
     }
 
-    /// What VAL says about texts.
+    /// Returns VAL's verdict on texts.
     pub(crate) fn says(&self, domain: &str, problem: &str, plan: &str) -> Said {
         let texts = [
             ("domain.pddl", domain),
@@ -67,7 +67,7 @@ impl Val {
         self.says_of(&domain, &problem, &plan)
     }
 
-    /// What VAL says about files.
+    /// Returns VAL's verdict on files.
     pub(crate) fn says_of(&self, domain: &Path, problem: &Path, plan: &Path) -> Said {
         let output = Command::new(&self.program)
             .args(["-t", TOLERANCE])
@@ -101,13 +101,13 @@ impl Val {
     }
 }
 
-/// A problem that can be read.
+/// Returns the task of a problem that can be read.
 pub(crate) fn task(domain: &Source, problem: &Source) -> Option<Task> {
     let (problem, _) = read_problem(domain, problem).ok()?;
     Some(Task::new(problem))
 }
 
-/// What the judge says, and why.
+/// Returns the validator's verdict and its reason.
 pub(crate) fn ours(task: &Task, plan: &Source) -> (Said, String) {
     let Ok((plan, _)) = read_plan(plan, task) else {
         return (Said::Nothing, "the plan cannot be read".to_owned());

@@ -1,6 +1,6 @@
-//! What each technique of the embedded planner is worth: states evaluated to the first plan, with
-//! all techniques, and with one of them switched off, or with one search of the portfolio alone; and
-//! what that comes to on all instances together.
+//! Measures the contribution of each technique of the embedded planner: states evaluated to the
+//! first plan, with all techniques, with one of them switched off, or with one search of the
+//! portfolio alone. Prints a summary over all instances.
 //!
 //! ```text
 //! ablation [--states N] [--seconds S] [--processor-time] [--memory MEGABYTES]
@@ -8,11 +8,11 @@
 //!          [--only TEXT]… [--every K] FOLDER|DOMAIN PROBLEM…
 //! ```
 //!
-//! Without `--without` and `--search`, each technique that plays a part before the first plan is
-//! switched off in turn. The tables are Markdown. A search that has found nothing after N states (50,000) or S seconds (60; with
-//! `--processor-time`, of the processor) is shown as a dash with the states it has evaluated; only
-//! the number of states makes that the same on each machine. `--only` and `--every` are those of
-//! the example `coverage`.
+//! Without `--without` and `--search`, each technique that takes part before the first plan is
+//! switched off in turn. The tables are Markdown. A search that has found nothing after N states
+//! (50,000) or S seconds (60; with `--processor-time`, of the processor) is shown as a dash with
+//! the number of states it has evaluated. Only the limit on states makes this the same on each
+//! machine. `--only` and `--every` are those of the example `coverage`.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,
@@ -38,7 +38,7 @@ use elbowroom_planner::{Answer, Counts, Settings, Technique, Tuning, TuningError
 use instances::{Instance, Selection, instances, task};
 use summary::{Answered, Comparison};
 
-/// What only better plans are looked for with.
+/// Techniques used only after the first plan.
 const AFTER_THE_FIRST_PLAN: [Technique; 4] = [
     Technique::Cleanup,
     Technique::Rescheduling,
@@ -52,7 +52,7 @@ struct Options {
     counts_processor_time: bool,
     memory: Option<usize>,
     tuning: Tuning,
-    /// A heading, and how to search.
+    /// Headings and settings of the variants.
     variants: Vec<(String, Tuning)>,
     selection: Selection,
     files: Vec<PathBuf>,
@@ -143,7 +143,7 @@ fn table(options: &Options) -> Result<(), String> {
         headings.collect::<Vec<_>>().join(" | ")
     );
     println!("|---|--:|{}", "--:|".repeat(options.variants.len()));
-    // What became of each instance, for each variant.
+    // Outcome of each instance, for each variant.
     let mut outcomes: Vec<Vec<Option<Answered>>> = vec![Vec::new(); options.variants.len()];
     for instance in &instances {
         let mut line = String::new();
@@ -169,9 +169,9 @@ fn table(options: &Options) -> Result<(), String> {
     Ok(())
 }
 
-/// What one search came to.
+/// Result of one search.
 struct Cell {
-    /// How many states were evaluated to the first plan, in words.
+    /// Number of states evaluated to the first plan, as text.
     text: String,
     actions: u64,
     /// `None` if there was neither a plan nor a proof.
@@ -195,7 +195,7 @@ fn cell(options: &Options, tuning: &Tuning, instance: &Instance) -> Cell {
         ..Settings::default()
     };
     settings.max_memory = options.memory.unwrap_or(settings.max_memory);
-    // The states up to the first plan count.
+    // Only the states up to the first plan count.
     settings.tuning.without.push(Technique::Cleanup);
     let clock = Clock::now(options.counts_processor_time);
     let answer = plan(&task, &situation, &settings, &mut |progress| {

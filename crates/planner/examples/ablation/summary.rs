@@ -1,4 +1,4 @@
-//! What a variant comes to on all instances, compared with the planner as it is.
+//! Summary of a variant over all instances, compared with the unchanged planner.
 
 use std::cmp::Ordering;
 use std::fmt::Write as _;
@@ -11,25 +11,26 @@ pub(crate) struct Answered {
     pub(crate) time: Duration,
 }
 
-/// A variant beside the planner as it is, over some instances.
+/// Comparison of a variant with the unchanged planner over some instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Comparison {
-    /// How many the variant answers.
+    /// Number of instances that the variant answers.
     pub(crate) answered: usize,
-    /// How many only the planner as it is answers.
+    /// Number that only the unchanged planner answers.
     pub(crate) lost: usize,
-    /// How many only the variant answers.
+    /// Number that only the variant answers.
     pub(crate) gained: usize,
-    /// How many both answer.
+    /// Number that both answer.
     pub(crate) both: usize,
-    /// Of these, how many the variant answers with more states.
+    /// Number of these for which the variant needs more states.
     pub(crate) more: usize,
-    /// Of these, how many the variant answers with fewer states.
+    /// Number of these for which the variant needs fewer states.
     pub(crate) fewer: usize,
-    /// The variant's states for one of the planner as it is: the geometric mean over those that
-    /// both answer. A state more is counted on each side, as there may be none.
+    /// Ratio of the variant's states to those of the unchanged planner: geometric mean over the
+    /// instances that both answer. One is added to both counts, since a count may be zero.
     pub(crate) states: Option<f64>,
-    /// The variant's time for those that both answer, divided by that of the planner as it is.
+    /// Ratio of the variant's time to that of the unchanged planner, over the instances that both
+    /// answer.
     pub(crate) time: Option<f64>,
 }
 
@@ -72,7 +73,7 @@ impl Comparison {
         comparison
     }
 
-    /// A line of Markdown for each variant; the first one is the planner as it is.
+    /// Returns a line of Markdown for each variant; the first one is the unchanged planner.
     pub(crate) fn table<'a>(
         variants: impl IntoIterator<Item = (&'a str, &'a Vec<Option<Answered>>)>,
     ) -> String {
@@ -120,7 +121,7 @@ mod tests {
 
     #[test]
     fn the_ratio_of_states_is_a_geometric_mean_over_what_both_answer() {
-        // 8 : 1, 1 : 2 and 4 : 4, with one state more; the cubic root of 4.
+        // Ratios 8 : 1, 1 : 2 and 4 : 4, with one state more each; the cubic root of 4.
         let variant = [answered(7, 30), answered(0, 10), answered(3, 20), None];
         let base = [
             answered(0, 10),

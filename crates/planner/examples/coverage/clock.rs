@@ -1,16 +1,16 @@
-//! Time by the clock, or of the processor.
+//! Wall-clock time or processor time.
 
 use std::time::{Duration, Instant};
 
-/// Measures time from a moment on.
+/// Stopwatch that starts at its creation.
 pub(crate) struct Clock {
     begin: Instant,
-    /// The processor time at the moment, if that is what is measured.
+    /// Processor time at the start, if processor time is measured.
     spent: Option<Duration>,
 }
 
 impl Clock {
-    /// From now on; of the processor, if that is asked for and the system tells it.
+    /// Starts the clock. Measures processor time if requested and available on the system.
     pub(crate) fn now(counts_processor_time: bool) -> Self {
         Self {
             begin: Instant::now(),
@@ -27,7 +27,7 @@ impl Clock {
     }
 }
 
-/// The processor time of the main thread, in which the planner runs.
+/// Returns the processor time of the main thread, which runs the planner.
 fn processor_time() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/self/schedstat").ok()?;
     let nanoseconds = text.split_whitespace().next()?.parse().ok()?;

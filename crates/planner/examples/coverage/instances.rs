@@ -1,4 +1,4 @@
-//! The problems to run: those of a folder of benchmarks, or files.
+//! The problems to run: from a folder of benchmarks, or given as files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,24 +15,25 @@ pub(crate) struct Instance {
     pub(crate) problem_file: PathBuf,
 }
 
-/// Which instances of a folder are wanted.
+/// Filter for the instances of a folder.
 #[derive(Debug, Default)]
 pub(crate) struct Selection {
-    /// Those whose lines contain one of the texts; all of them if there are no texts.
+    /// Keeps the instances whose lines contain one of the texts; all of them if there are no texts.
     pub(crate) only: Vec<String>,
-    /// Each one of so many of a domain, beginning with the first, if the domain has durative
-    /// actions.
+    /// If set to `k`, every `k`-th instance of each domain with durative actions, beginning with
+    /// the first.
     pub(crate) every: Option<usize>,
 }
 
-/// The problems that the arguments name: a folder with a `manifest.csv`, or a domain and problems.
+/// Returns the problems that the arguments name: a folder with a `manifest.csv`, or a domain and
+/// problems.
 ///
 /// The first line of a manifest names its columns: `domain`, `instance`, `domain_file` and
-/// `problem_file`, in any order; there may be a `collection`, `durative_actions` (how many the domain
-/// has), and others.
+/// `problem_file`, in any order. The columns `collection` and `durative_actions` (number of
+/// durative actions in the domain) are optional, and others are ignored.
 ///
 /// # Errors
-/// When there is nothing to run.
+/// If there is nothing to run.
 pub(crate) fn instances(files: &[PathBuf], selection: &Selection) -> Result<Vec<Instance>, String> {
     match files {
         [folder] => of_folder(folder, selection),
@@ -110,10 +111,10 @@ fn of_folder(folder: &Path, selection: &Selection) -> Result<Vec<Instance>, Stri
     Ok(instances)
 }
 
-/// The task of an instance.
+/// Returns the task of an instance.
 ///
 /// # Errors
-/// When it cannot be read; the word says whether that is for a feature that is not supported.
+/// If the instance cannot be read. The word distinguishes unsupported features from mistakes.
 pub(crate) fn task(instance: &Instance) -> Result<Task, &'static str> {
     let source = |path: &Path| {
         let bytes = std::fs::read(path).unwrap_or_default();

@@ -7,15 +7,15 @@
 //! ```
 //!
 //! FOLDER holds a `manifest.csv`, whose first line names its columns: `domain`, `instance`,
-//! `domain_file` and `problem_file` must be among them, `collection` may. `--only` keeps the lines
-//! that contain one of the texts, and `--every` each Kth of the instances of a domain with durative
-//! actions. With a domain and problems instead, these are run. With
-//! `--plans`, plans are printed to standard error. `--set` changes a constant of the search
-//! (`embedded/tuning.rs`), `--without` switches a technique off, and `--search` runs one search of
-//! the portfolio alone. With `--processor-time`, limits and times are those of the processor, as
-//! far as the system tells (Linux): what else the machine does changes them little. That is told of
-//! one thread only, so `--threads` is refused with it. `prepared_seconds` is the time until the search
-//! begins: grounding, compiling and what is found out before; `read_seconds` comes before that.
+//! `domain_file` and `problem_file` are required, `collection` is optional. `--only` keeps the
+//! lines that contain one of the texts, and `--every` every Kth of the instances of a domain with
+//! durative actions. With a domain and problems instead, these are run. With `--plans`, plans are
+//! printed to standard error. `--set` changes a constant of the search (`embedded/tuning.rs`),
+//! `--without` switches a technique off, and `--search` runs one search of the portfolio alone.
+//! With `--processor-time`, limits and times are processor time where the system provides it
+//! (Linux), so that other load on the machine hardly affects them. It is available for one thread
+//! only, so `--threads` is refused with it. `prepared_seconds` is the time until the search begins:
+//! grounding, compilation and preprocessing. `read_seconds` precedes it.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,

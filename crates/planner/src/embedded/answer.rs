@@ -1,4 +1,4 @@
-//! What is asked of the planner, and what it answers.
+//! Settings, progress reports and answers of the planner.
 
 use std::collections::BTreeSet;
 
@@ -11,40 +11,42 @@ use super::tuning::Tuning;
 /// Settings of the planner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// About how many bytes the searches may keep. When they are used up, the one that has taken the most
-    /// gives its up, and the others go on; the run ends, as if it had been interrupted, when none is left.
+    /// Approximate memory limit for the searches, in bytes. When it is reached, the search that
+    /// uses most is abandoned and the others continue. When none is left, the run ends as if it had
+    /// been interrupted.
     pub max_memory: usize,
-    /// Whether to stop at the first plan, or to go on for better ones until interrupted or until
-    /// there is none.
+    /// `true` to stop at the first plan. Otherwise the search continues with better plans until it
+    /// is interrupted or no better plan exists.
     pub first_plan_only: bool,
-    /// The order of preference among plans.
+    /// The objective that compares plans.
     pub objective: Objective,
-    /// The names of ground actions, `(drive rover depot shelf)`, that plans must do without. What is
-    /// proved then is proved of plans without them.
+    /// The names of ground actions, `(drive rover depot shelf)`, that plans must not contain.
+    /// Proofs then hold for plans without these actions only.
     pub without: BTreeSet<String>,
     /// `true` if a ground action may overlap itself: two of its instances each start before the other one has
     /// ended.
     pub self_overlap: bool,
-    /// How many threads may work at the same time. The answer and what is reported are the same
-    /// whatever their number. More than two are of use before the first plan only. WebAssembly has one.
+    /// Maximum number of threads. The answer and the reports do not depend on it. More than two are
+    /// useful only before the first plan. WebAssembly has one.
     pub threads: usize,
     /// The constants of the search.
     pub tuning: Tuning,
 }
 
-/// The objective by which plans are compared.
+/// The objective that compares plans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Objective {
-    /// The problem's metric where it has one that can be evaluated, else the makespan. Of plans of
-    /// the same metric, the shorter one is better.
+    /// The problem's metric if it has one that can be evaluated, otherwise the makespan. Plans with
+    /// equal metric are compared by makespan.
     #[default]
     Metric,
-    /// The makespan, whatever the problem says.
+    /// The makespan, regardless of the problem's metric.
     Makespan,
 }
 
 impl Default for Settings {
-    /// Memory 2 GiB, any number of plans with any action, no self-overlap, the problem's own metric, one thread.
+    /// Returns the defaults: memory 2 GiB, improvement of plans with any action, no self-overlap,
+    /// the problem's own metric, one thread.
     fn default() -> Self {
         Self {
             max_memory: 2 << 30,
@@ -63,97 +65,96 @@ impl Default for Settings {
 pub struct Progress {
     /// The phase of the search.
     pub phase: Phase,
-    /// States made and looked at.
+    /// Number of generated and evaluated states.
     pub counts: Counts,
-    /// The best plan so far, exactly when this report is about a new best plan.
+    /// The best plan so far, if this report is about a new best plan.
     pub plan: Option<Found>,
-    /// The objective's value of the best plan so far; less is better (what is to be maximized is
-    /// negated).
+    /// The objective's value of the best plan so far; smaller is better. Values to be maximized are
+    /// negated.
     pub best: Option<Rational>,
 }
 
 /// The phase of the search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Phase {
-    /// Finding out which actions are possible at all.
+    /// Computing the reachable actions.
     #[default]
     Grounding,
-    /// Searching for a first plan, quickly and not everywhere.
+    /// Searching for a first plan with incomplete methods.
     Incomplete,
-    /// Searching everywhere.
+    /// Searching the complete space.
     Complete,
-    /// Looking for better plans.
+    /// Searching for better plans.
     Improving,
 }
 
 /// Statistics of a search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Ground actions.
+    /// Number of ground actions.
     pub actions: u64,
-    /// States whose successors were listed.
+    /// Number of states whose successors were listed.
     pub expanded: u64,
-    /// Successors listed.
+    /// Number of successors listed.
     pub generated: u64,
-    /// States made and estimated, and states made again for candidates that came to nothing: that the
-    /// judge refused, or that were no better than the best plan.
+    /// Number of states that were generated and evaluated. Includes states generated again for
+    /// candidate plans that the validator rejected, or that were no better than the best plan.
     pub evaluated: u64,
     /// The work so far, in the units of [`elbowroom_num::work`].
     pub work: u64,
-    /// About how many bytes the states take.
+    /// Approximate memory of the states, in bytes.
     pub memory: usize,
 }
 
-/// A valid plan, and what it is worth.
+/// A valid plan and its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// The plan. From a situation, its first steps continue what is under way.
+    /// The plan. If it begins in a situation, its first steps continue the running actions.
     pub plan: TimeTriggeredPlan,
     /// The time of its last happening, on the task's clock.
     pub makespan: Rational,
-    /// The value of the problem's metric, as the problem writes it; `None` if it has none that can
-    /// be evaluated.
+    /// The value of the problem's metric, as the problem states it. `None` if there is no metric
+    /// that can be evaluated.
     pub metric: Option<Rational>,
-    /// The objective's value; less is better (what is to be maximized is negated).
+    /// The objective's value; smaller is better. Values to be maximized are negated.
     pub value: Rational,
 }
 
 /// The answer to a planning problem.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// A plan. The judge has found it valid.
+    /// A plan that the validator has accepted.
     Plan {
         /// The best plan found.
         found: Found,
-        /// Why the search did not go on.
+        /// Reason for the end of the search.
         stopped: Stopped,
         /// Statistics.
         counts: Counts,
     },
-    /// No plan exists, as far as the search's own rules go; or, by [`Proof::WithoutSelfOverlap`], none
-    /// without self-overlap. Front ends report it only with a certificate of
-    /// `elbowroom-verify`.
+    /// The search proved that no plan exists; for [`Proof::WithoutSelfOverlap`], that none exists
+    /// without self-overlap. Front ends report this only with a certificate of `elbowroom-verify`.
     Unsolvable {
         /// The reason.
         proof: Proof,
         /// Statistics.
         counts: Counts,
     },
-    /// No plan was found, and nothing is proved.
+    /// No plan was found, and nothing was proved.
     NoneFound {
-        /// Why the search did not go on.
+        /// Reason for the end of the search.
         stopped: Stopped,
         /// `true` if plans were excluded with self-overlap.
         without_self_overlap: bool,
         /// Statistics.
         counts: Counts,
     },
-    /// The problem uses something that this planner does not handle.
+    /// The problem uses a feature that this planner does not support.
     Unsupported(Unsupported),
 }
 
 impl Answer {
-    /// The statistics; `None` where nothing was searched.
+    /// Returns the statistics, or `None` if there was no search.
     pub fn counts(&self) -> Option<&Counts> {
         match self {
             Self::Plan { counts, .. }
@@ -163,7 +164,7 @@ impl Answer {
         }
     }
 
-    /// The plan, if one was found.
+    /// Returns the plan, if one was found.
     pub fn found(&self) -> Option<&Found> {
         match self {
             Self::Plan { found, .. } => Some(found),
@@ -172,28 +173,28 @@ impl Answer {
     }
 }
 
-/// Why a search ended.
+/// Reason for the end of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stopped {
-    /// The observer said so: a time limit, or an impatient user.
+    /// The observer ended the search, for example because of a time limit.
     Interrupted,
-    /// [`Settings::max_memory`] is used up, or there are too many ground actions.
+    /// [`Settings::max_memory`] is exhausted, or there are too many ground actions.
     OutOfMemory,
-    /// The first plan was all that was asked for.
+    /// Only the first plan was requested.
     FirstPlan,
-    /// All that the search can reach was searched. Without a plan, and without a proof, some plans
-    /// were out of its reach.
+    /// The search space is exhausted. If there is neither a plan nor a proof, the search could not
+    /// reach some plans.
     Exhausted,
 }
 
-/// Why no plan exists.
+/// Reason why no plan exists.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Proof {
-    /// A conjunct of the goal cannot become true even if nothing that was reached is ever lost.
+    /// A conjunct of the goal cannot become true even if reached facts are never lost.
     #[error("no plan exists: {}", .0.join("; "))]
     Unreachable(Vec<String>),
-    /// A conjunct of the goal comes too late even if nothing that was reached is ever lost, and
-    /// everything is as early as it can be.
+    /// A conjunct of the goal becomes true too late even if reached facts are never lost and every
+    /// happening is as early as possible.
     #[error("no plan exists: {goal} cannot be reached before {deadline}")]
     TooLate {
         /// The parts of the goal.

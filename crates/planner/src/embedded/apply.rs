@@ -1,4 +1,4 @@
-//! From one state to the next.
+//! Successor states.
 
 mod conditions;
 mod durations;
@@ -23,20 +23,21 @@ use places::{forget_past, insert, keep_within, reach_foreseen_end, reach_timed, 
 /// A choice of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Step {
-    /// The action starts, or happens if it takes no time.
+    /// Starts the action, or applies it if it is instantaneous.
     Start(u32),
-    /// The action starts, and ends before anything else in the order of happenings.
+    /// Starts the action and ends it before any other happening, in the order of happenings.
     Compressed(u32),
-    /// The envelope starts, and ends after the content, before anything else in the order of happenings.
+    /// Starts the envelope, applies its content, and ends the envelope before any other happening,
+    /// in the order of happenings.
     Macro(u32),
-    /// The action at that place among those under way ends.
+    /// Ends the running action at that index.
     End(u32),
-    /// The next timed initials happen.
+    /// Applies the next timed initials.
     Timed,
 }
 
 impl Step {
-    /// Returns the steps that make up a step from a state.
+    /// Returns the basic steps of a macro step in a state; other steps consist of themselves.
     pub(crate) fn parts(self, compiled: &Compiled, state: &State) -> Vec<Self> {
         let Self::Macro(number) = self else {
             return vec![self];
@@ -47,7 +48,7 @@ impl Step {
         } else {
             Self::Compressed(content)
         };
-        // Where the start inserts the envelope.
+        // Index at which the start inserts the envelope.
         let place = state.open.partition_point(|open| open.action <= envelope);
         let place = u32::try_from(place).expect("few actions run at the same time");
         vec![Self::Start(envelope), content, Self::End(place)]
@@ -58,31 +59,31 @@ impl Step {
 #[derive(Debug)]
 pub(crate) struct Stepper<'a> {
     pub(crate) compiled: &'a Compiled,
-    /// Nothing may happen later.
+    /// Latest time of a happening.
     pub(crate) horizon: Ticks,
-    /// The bound that a better plan must stay below, where that depends on times.
+    /// Upper bound for a better plan, if the metric depends on times.
     pub(crate) limit: Option<MetricBound>,
-    /// If present, all happenings stay in the network, to be read off at the end, and what is
-    /// needed to compute their times exactly is noted here.
+    /// If present, all happenings stay in the network until the end. The log stores the data for
+    /// the exact computation of their times.
     pub(crate) log: Option<Log>,
-    /// Whether what is chosen later happens no earlier.
+    /// `true` if later choices happen no earlier.
     pub(crate) is_chronological: bool,
     /// `true` if an over-all condition may be false until the moment is complete.
     pub(crate) joins: bool,
     /// The node of the happening chosen last, in a search that joins happenings.
     newest: NodeId,
-    /// Whether a duration had to be rounded to a tick, so that nothing is proved.
+    /// `true` if a duration had to be rounded to a tick. Then nothing is proved.
     pub(crate) has_rounded: bool,
 }
 
-/// The most happenings that are joined at one moment.
+/// Maximum number of happenings that are joined at one moment.
 const MOST_JOINED: u8 = 6;
 
 /// The exact data of a network's nodes, whose times are rounded to ticks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Log {
-    /// For each end of an action its node, that of its start if it started in the plan, and the
-    /// duration's exact bounds.
+    /// For each end of an action: its node, the node of its start if the action started in the
+    /// plan, and the exact bounds of its duration.
     pub(crate) ends: Vec<(NodeId, NodeId, Rational, Option<Rational>)>,
 }
 
@@ -100,9 +101,9 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// The state after the step, if the step is possible.
+    /// Returns the state after the step, if the step is applicable.
     pub(crate) fn apply(&mut self, state: &State, step: Step) -> Option<State> {
-        // Most impossible steps are seen without a copy.
+        // Most inapplicable steps are detected without a copy.
         if let Step::Start(action) | Step::Compressed(action) = step {
             let action = self.compiled.action(action);
             let snap = self.compiled.snap(action.start);
@@ -128,13 +129,13 @@ impl<'a> Stepper<'a> {
         let mut next = state.clone();
         self.advance(&mut next, step)?;
         if next.symbolic.is_some() {
-            // The network keeps all happenings, and a vector that grows doubles its memory.
+            // The network keeps all happenings, and a growing vector doubles its memory.
             next.network.shrink();
         }
         Some(next)
     }
 
-    /// Applies the step in place; the state is of no use if that fails.
+    /// Applies the step in place. The state is unusable if this fails.
     pub(crate) fn advance(&mut self, state: &mut State, step: Step) -> Option<()> {
         match step {
             Step::Start(action) => {
@@ -161,21 +162,22 @@ impl<'a> Stepper<'a> {
         (is_in_time && self.has_times(state)).then_some(())
     }
 
-    /// Whether there are times that meet what has been demanded of them. Where a plan is extracted,
-    /// nobody asks: the search has seen each of these states, and times for the last one do for all.
+    /// Returns `true` if some times satisfy the demands. While a plan is extracted, the answer is
+    /// always `true`: the search has checked each of these states, and the times of the last state
+    /// satisfy all demands.
     fn has_times(&self, state: &mut State) -> bool {
         let metric = self.compiled.metric.as_ref();
         let limit = metric.zip(self.limit.as_ref());
         self.log.is_some() || symbolic::is_possible(state, self.compiled, limit)
     }
 
-    /// Whether happenings may leave the network.
+    /// Returns `true` if happenings may leave the network.
     fn settles(&self, state: &State) -> bool {
         self.log.is_none() && state.symbolic.is_none() && !self.joins
     }
 
-    /// Returns `Some` if all over-all conditions hold, or further happenings of the same moment may still
-    /// bring them about.
+    /// Returns `Some` if all over-all conditions hold, or further happenings of the same moment may
+    /// still satisfy them.
     fn keeps_conditions_or_joins(&self, state: &mut State) -> Option<()> {
         let before = state.joint.take();
         let is_kept = self.keeps_conditions(state);
@@ -190,8 +192,8 @@ impl<'a> Stepper<'a> {
         (count < MOST_JOINED).then_some(())
     }
 
-    /// Starts a durative action and returns its place among those under way, or lets an
-    /// instantaneous action happen.
+    /// Starts a durative action and returns its index among the running actions, or applies an
+    /// instantaneous action.
     fn start(&mut self, state: &mut State, number: u32) -> Option<usize> {
         let action = self.compiled.action(number);
         if state.excludes(self.compiled, action) {
@@ -337,8 +339,8 @@ impl<'a> Stepper<'a> {
         Some(())
     }
 
-    /// When an action started that has been under way from the beginning: in ticks, as all times of
-    /// the search are, but exactly where a plan is extracted.
+    /// Returns the start time of an action that was running in the situation. The value is rounded
+    /// to ticks, as all times of the search, but exact while a plan is extracted.
     fn start_of_running(&self, open: &Open) -> Rational {
         let running = self.compiled.beginning.running.get(open.action as usize);
         let exact = running.filter(|_| self.log.is_some());
@@ -348,7 +350,7 @@ impl<'a> Stepper<'a> {
         )
     }
 
-    /// Notes the exact duration, for the times of the plan.
+    /// Records the exact duration for the times of the plan.
     fn note_end(&mut self, open: &Open, node: NodeId) {
         let scale = self.compiled.scale;
         let Some(log) = &mut self.log else { return };
@@ -400,7 +402,7 @@ impl<'a> Stepper<'a> {
     }
 }
 
-/// A moment, where numbers depend on times; elsewhere nobody looks at it.
+/// Returns the moment if numbers depend on times. Otherwise the moment is not used.
 fn moment(state: &State, form: impl FnOnce() -> (Form, Option<Form>)) -> Moment {
     if state.symbolic.is_none() {
         return Moment::default();
@@ -409,7 +411,8 @@ fn moment(state: &State, form: impl FnOnce() -> (Form, Option<Form>)) -> Moment 
     Moment { time, duration }
 }
 
-/// The duration: the only one there is, or the distance from start to end.
+/// Returns the duration: the constant if there is only one, otherwise the distance from start to
+/// end.
 fn duration_form(duration: Option<&Rational>, start: NodeId, end: NodeId) -> Form {
     match duration {
         Some(duration) => Form::constant(duration.clone()),

@@ -1,4 +1,4 @@
-//! What a plan must be better than, and which states cannot lead to such a plan.
+//! Bound on the metric, and the states that cannot lead to a better plan.
 
 use elbowroom_num::Rational;
 
@@ -6,25 +6,25 @@ use super::compile::Metric;
 use super::state::State;
 use super::time::{NEVER, Scale, Ticks};
 
-/// See the module.
+/// Upper bound on the metric of a plan.
 #[derive(Clone, Debug)]
 pub(crate) struct MetricBound {
     /// The metric of the best plan.
     pub(crate) value: Rational,
-    /// Whether a plan may be as good as that.
+    /// `true` if a plan may have the same value.
     pub(crate) may_equal: bool,
 }
 
 impl MetricBound {
-    /// Whether times have no bearing on the metric.
+    /// Returns `true` if the metric does not depend on times.
     pub(crate) fn is_timeless(metric: &Metric) -> bool {
         metric.time.is_zero()
     }
 
-    /// The latest time at which a plan may end that begins like this and is within the limit;
+    /// Returns the latest time at which a plan with this beginning can end within the limit, or
     /// `None` if there is no such plan.
     ///
-    /// A metric that only grows is at least what the state has spent, and the weighted time.
+    /// A metric that only grows is at least the state's cost plus the weighted time.
     pub(crate) fn latest_end(&self, metric: &Metric, scale: Scale, state: &State) -> Option<Ticks> {
         if !metric.only_grows {
             return Some(NEVER);

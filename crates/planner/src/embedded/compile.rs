@@ -1,11 +1,11 @@
-//! The ground problem in the form in which the search reads it.
+//! The ground problem in the form used by the search.
 //!
-//! Every action becomes one or two *snaps* (Fox & Long's name for starts, ends and instants);
-//! facts, fluents and tests become small numbers; and what keeps happenings apart becomes a list of
-//! *annotations* (POPF; Coles, Coles, Fox & Long, ICAPS 2010). An annotation is the latest time at
-//! which something of a kind happened, such as "fact 7 was read". Each snap says which annotations
-//! it must keep what distance from, and which ones it sets; so the order that PDDL's
-//! no-moving-targets rule and over-all conditions ask for is settled here once, and the search only
+//! Every action becomes one or two *snaps* (Fox & Long's name for starts, ends and instants).
+//! Facts, fluents and tests become small integers. Separations of happenings become a list of
+//! *annotations* (POPF; Coles, Coles, Fox & Long, ICAPS 2010). An annotation is the latest time of
+//! a kind of event, such as "fact 7 was read". Each snap lists the annotations that it must be
+//! separated from, with the distances, and the annotations that it sets. So the order required by
+//! PDDL's no-moving-targets rule and by over-all conditions is computed once, and the search only
 //! takes maxima.
 
 mod beginning;
@@ -50,10 +50,10 @@ use super::time::{NEVER, Scale, Ticks};
 use super::tuning::Tuning;
 use super::windows::Windows;
 
-/// No snap, action or the like.
+/// No snap or action.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// A problem from a situation on.
+/// A compiled problem that begins in a situation.
 #[derive(Debug)]
 #[allow(
     clippy::struct_excessive_bools,
@@ -62,58 +62,60 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) struct Compiled {
     pub(crate) scale: Scale,
     pub(crate) epsilon: Ticks,
-    /// How it is searched.
+    /// Settings of the search.
     pub(crate) tuning: Tuning,
-    /// The longest distance from any annotation.
+    /// Longest distance from any annotation.
     pub(crate) longest_distance: Ticks,
-    /// When the situation is; nothing new happens earlier.
+    /// Time of the situation. New happenings are no earlier.
     pub(crate) now: Ticks,
     /// The facts that some condition reads.
     pub(crate) facts: Vec<FactId>,
     /// The fluents that matter to some condition, duration or rate.
     pub(crate) fluents: Vec<FluentId>,
-    /// For each fluent, `true` if continuous changes of it are known to concern one action at a time.
+    /// For each fluent, `true` if at most one action at a time is affected by its continuous
+    /// changes.
     pub(crate) exclusive_fluents: Vec<bool>,
     pub(crate) tests: Vec<Test>,
     pub(crate) snaps: Vec<Snap>,
     pub(crate) actions: Vec<Action>,
     /// By envelope and content.
     pub(crate) macros: Vec<Macro>,
-    /// For each fact the annotations of its latest addition and deletion; [`NONE`] if nothing waits
-    /// for them.
+    /// For each fact the annotations of its latest addition and deletion; [`NONE`] if no happening
+    /// depends on them.
     pub(crate) fact_annotations: Vec<[u32; 2]>,
     /// The number of annotations.
     pub(crate) annotation_count: usize,
-    /// The timed initials to come, by time, but for those of calendars.
+    /// The future timed initials by time, without those of calendars.
     pub(crate) timed: Vec<Timed>,
-    /// The literals that change at fixed times only, and restrict when things happen.
+    /// The literals that change at fixed times only, and restrict the times of happenings.
     pub(crate) calendars: Vec<Calendar>,
-    /// The windows that conditions on calendars leave; `None` if there are none.
+    /// The windows given by conditions on calendars; `None` if there are none.
     pub(crate) windows: Option<Arc<Windows>>,
     pub(crate) goal: Formula,
-    /// The metric to minimize, if one other than the makespan was asked for.
+    /// The metric to minimize, if one other than the makespan was requested.
     pub(crate) metric: Option<Metric>,
-    /// How many timed initials come before the goal is settled, as far as they go: those up to the
-    /// last that writes something the goal reads.
+    /// Number of timed initials up to the last one that writes a fact or fluent of the goal. The
+    /// goal is not decided before.
     pub(crate) timed_until_goal: u32,
-    /// The rules of derived facts: what a stratum negates is settled in an earlier one.
+    /// The rules of derived facts. A fact that a stratum negates is decided in an earlier stratum.
     pub(crate) strata: Vec<Vec<Rule>>,
     /// The derived facts, by stratum.
     pub(crate) derived: Vec<Vec<u32>>,
     pub(crate) beginning: Beginning,
-    /// Whether all of this is exact, so that a search that finds nothing proves something.
+    /// `true` if the compilation is exact. Only then does an exhausted search prove that no plan
+    /// exists.
     pub(crate) is_exact: bool,
-    /// Whether an instance of some action could be needed that this form cannot express; also an
-    /// obstacle to proofs. Says why.
+    /// Reason why a plan may need an instance of an action that the compiled form cannot express.
+    /// Also an obstacle to proofs.
     pub(crate) incomplete_because: Option<&'static str>,
-    /// The same for a form in which numbers, and what is reached once, are never lost.
+    /// The same reason for a relaxation without numbers that never loses reached facts.
     pub(crate) relaxation_incomplete_because: Option<&'static str>,
     /// `true` if several happenings of one moment may keep an over-all condition that none of them keeps
     /// alone, in any order.
     pub(crate) needs_joining: bool,
     /// `true` if starts of one moment may need each other's effects.
     pub(crate) starts_depend_on_each_other: bool,
-    /// Whether some value depends on when things happen.
+    /// `true` if some value depends on the times of happenings.
     pub(crate) is_symbolic: bool,
 }
 
@@ -129,11 +131,11 @@ pub(crate) struct Snap {
     pub(crate) conditional: Vec<Conditional>,
     /// Its addition to `State::cost`.
     pub(crate) cost: Option<Numeric>,
-    /// Annotations, and how long after them this must happen.
+    /// Annotations that the snap must follow, with the distances.
     pub(crate) after: Vec<(u32, Ticks)>,
-    /// Annotations that this sets.
+    /// Annotations that the snap sets.
     pub(crate) marks: Vec<u32>,
-    /// Timed initials, and how long before them this must happen if it comes first; ascending.
+    /// Timed initials that must follow the snap, if they come later, with the distances; ascending.
     pub(crate) before_timed: Vec<(u32, Ticks)>,
 }
 
@@ -148,7 +150,7 @@ pub(crate) struct Update {
 /// A conditional effect.
 #[derive(Clone, Debug)]
 pub(crate) struct Conditional {
-    /// The position among [`Action::guards`] of what was read at the start.
+    /// Index among [`Action::guards`] of the part that was read at the start.
     pub(crate) at_start: Option<u8>,
     pub(crate) now: Formula,
     pub(crate) change: Change,
@@ -160,7 +162,7 @@ pub(crate) enum Change {
     Add(u32),
     Delete(u32),
     Update(Update),
-    /// Something is added to `State::cost`.
+    /// Adds to `State::cost`.
     Cost(Numeric),
 }
 
@@ -169,7 +171,7 @@ pub(crate) enum Change {
 pub(crate) struct Action {
     pub(crate) schema: SchemaId,
     pub(crate) arguments: Vec<ObjectId>,
-    /// Its start, or the instantaneous action; [`NONE`] if it is under way in the situation.
+    /// Its start, or the instantaneous action; [`NONE`] if it is already running in the situation.
     pub(crate) start: u32,
     /// [`NONE`] for an instantaneous action.
     pub(crate) end: u32,
@@ -182,31 +184,31 @@ pub(crate) struct Action {
     pub(crate) flows: Vec<Flow>,
     /// Timed initials that would break the over-all condition while the action runs; ascending.
     pub(crate) breaking_timed: Vec<u32>,
-    /// Whether a search may compress it.
+    /// Loss of plans when the search compresses the action.
     pub(crate) compressibility: Compressibility,
-    /// Whether its end only adds facts that matter where they are true; see `compression`.
+    /// `true` if its end only adds facts that matter only when true; see `compression`.
     pub(crate) is_compression_safe: bool,
-    /// Whether it cannot start while another instance of it runs.
+    /// `true` if it cannot start while another instance of it is running.
     pub(crate) excludes_itself: bool,
     /// The annotation of the latest end of the ground action, which no instance may overlap; [`NONE`] if
     /// instances may overlap, or never do. All forms of the ground action share it.
     pub(crate) exclusion: u32,
-    /// Whether something reads `?duration`, or changes continuously.
+    /// `true` if a condition or effect reads `?duration`, or if the action has continuous effects.
     pub(crate) uses_duration: bool,
 }
 
-/// How much is lost by *compressing* an action: ending it before anything else happens, in the
-/// order of happenings (compression-safe actions; Coles, Coles, Fox & Long, ICAPS 2009). The safer
-/// ones come later.
+/// Loss of plans from *compressing* an action: ending it before any other happening, in the order
+/// of happenings (compression-safe actions; Coles, Coles, Fox & Long, ICAPS 2009). In ascending
+/// order of safety.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Compressibility {
-    /// Others may need what it offers while it runs: it is an envelope (Coles, Fox, Halsey, Long &
+    /// An envelope: other actions may need its effects while it runs (Coles, Fox, Halsey, Long &
     /// Smith, "Managing concurrency in temporal planning", AIJ 173, 2009).
     Envelope,
-    /// Others can use only what it leaves of a quantity: it takes some at its start and gives it
-    /// back at its end (a renewable resource; Laborie, AIJ 143, 2003).
+    /// The action takes an amount of a quantity at its start and returns it at its end (a renewable
+    /// resource; Laborie, AIJ 143, 2003). Meanwhile, others can use only the remaining amount.
     HoldsResource,
-    /// Little.
+    /// Few plans are lost.
     Safe,
 }
 
@@ -225,7 +227,7 @@ pub(crate) struct Duration {
 pub(crate) struct Bound {
     pub(crate) comparison: Comparison,
     pub(crate) value: Numeric,
-    /// Whether it is read at the end.
+    /// `true` if it is evaluated at the end.
     pub(crate) at_end: bool,
 }
 
@@ -234,7 +236,7 @@ pub(crate) struct Bound {
 pub(crate) struct Flow {
     pub(crate) fluent: u32,
     pub(crate) rate: Numeric,
-    /// The position among [`Action::guards`] of its condition.
+    /// Index among [`Action::guards`] of its condition.
     pub(crate) guard: Option<u8>,
 }
 
@@ -248,7 +250,7 @@ pub(crate) struct Timed {
     pub(crate) marks: Vec<u32>,
 }
 
-/// `head` holds where `body` does.
+/// A rule: `head` holds if `body` holds.
 #[derive(Clone, Debug)]
 pub(crate) struct Rule {
     pub(crate) head: u32,
@@ -261,13 +263,14 @@ impl Compiled {
         self.actions.iter().any(|action| action.exclusion != NONE)
     }
 
-    /// Whether a goal that is out of reach of a relaxation is out of reach.
+    /// Returns `true` if a goal that a relaxation cannot reach is unreachable.
     pub(crate) fn is_relaxation_exact(&self) -> bool {
         self.is_exact && self.relaxation_incomplete_because.is_none()
     }
 
-    /// The earliest time that a tick stands for. That of now is rounded down where the situation's
-    /// time is not on the grid, and nothing happens before that.
+    /// Returns the earliest time that a tick represents. The tick of [`now`](Self::now) is rounded
+    /// down if the situation's time is not on the grid, and nothing happens before the situation's
+    /// time.
     pub(crate) fn earliest(&self, tick: Ticks) -> Rational {
         if tick == self.now {
             self.beginning.time.clone()
@@ -276,8 +279,8 @@ impl Compiled {
         }
     }
 
-    /// The latest end of a running action by the windows of its over-all condition, if they bound
-    /// it. Outside of them it can only end at once.
+    /// Returns the latest end of a running action by the windows of its over-all condition, if they
+    /// bound it. Outside of these windows, it can only end immediately.
     pub(crate) fn latest_end_in_window(&self, action: u32) -> Option<Ticks> {
         let list = self.action(action).dates.windows?;
         let intervals = self.windows.as_ref()?.list(list);
@@ -288,12 +291,12 @@ impl Compiled {
         (end < NEVER).then_some(end)
     }
 
-    /// The snap of that number.
+    /// Returns the snap with that number.
     pub(crate) fn snap(&self, number: u32) -> &Snap {
         &self.snaps[number as usize]
     }
 
-    /// The action of that number.
+    /// Returns the action with that number.
     pub(crate) fn action(&self, number: u32) -> &Action {
         &self.actions[number as usize]
     }

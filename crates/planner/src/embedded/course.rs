@@ -1,31 +1,34 @@
-//! Constraints on the course of a plan, as conditions of actions and goals.
+//! Constraints on the course of a plan, compiled into conditions of actions and goals.
 //!
-//! A problem with constraints becomes one without them, of which the plans are made that keep them
-//! (Baier & `McIlraith`, ICAPS 2006, and Bonassi, De Giacomo, Favorito, Fuggitti, Gerevini & Scala,
-//! ICAPS 2021, do such things for sequential plans; here happenings overlap):
+//! A problem with constraints becomes one without constraints, whose plans satisfy them (Baier &
+//! `McIlraith`, ICAPS 2006, and Bonassi, De Giacomo, Favorito, Fuggitti, Gerevini & Scala, ICAPS
+//! 2021, use similar compilations for sequential plans; here happenings overlap):
 //!
-//! - `always`: what would make the last literal of a clause false needs another one to hold
-//!   afterwards, which is told by regression.
-//! - `sometime`, `within`: an *observer*, an action that takes no time, sees that the condition
-//!   holds, before its deadline; the goal asks for what it has seen.
-//! - `sometime-before`: always, unless the other condition has been seen.
-//! - `at-most-once`: what ends it says so, and then nothing can begin it.
-//! - `sometime-after`: what makes the one true without the other is owed until that has been seen.
-//! - `always-within`: as `always`, unless an action that *waits* is under way; it ends in time, when
+//! - `always`: a happening that makes the last true literal of a clause false needs another literal
+//!   to hold afterwards, which is computed by regression.
+//! - `sometime`, `within`: an *observer*, an instantaneous action, observes that the condition
+//!   holds, before its deadline. The goal requires the fact that it adds.
+//! - `sometime-before`: as `always`, unless the other condition has been observed.
+//! - `at-most-once`: a happening that ends the condition records it, and then no happening can make
+//!   it true again.
+//! - `sometime-after`: a happening that makes the first condition true without the second creates
+//!   an obligation until the second has been observed.
+//! - `always-within`: as `always`, unless an action that *waits* is running. It ends in time, when
 //!   the other condition holds.
-//! - `hold-during`, `hold-after`: an observer sees the condition in time and *locks* it, until a
-//!   timed initial unlocks it.
+//! - `hold-during`, `hold-after`: an observer observes the condition in time and *locks* it, until
+//!   a timed initial unlocks it.
 //! - `at end`: a part of the goal.
 //!
-//! What timed initials would break, an observer sees and locks before (`timed`). Observers and what
-//! waits are left out of the plan, and the judge sees it under the constraints as they are. There
-//! are a little fewer plans then: what an observer sees lasts for ε, and happenings of one time do
-//! not keep a clause together. So nothing is proved this way. Where nothing is found, or a constraint has no
-//! such form, a search ignores the constraints, and the judge rejects the plans that break them. A proof
-//! for the problem without constraints holds with them.
+//! If a timed initial would break a condition, an observer observes and locks the condition before
+//! (`timed`). Observers and waiting actions are removed from the plan, and the validator checks the
+//! plan under the original constraints. The compilation loses a few plans: an observation takes ε,
+//! and happenings of one time cannot keep a clause together. So nothing is proved this way. If no
+//! plan is found, or a constraint has no such form, a search ignores the constraints, and the
+//! validator rejects the plans that violate them. A proof for the problem without constraints also
+//! holds with them.
 //!
-//! In mid-execution only [deadlines](Task::with_deadlines) are respected, because nothing that was before counts for
-//! them. They change no action, so that running actions remain as they are.
+//! In mid-execution, only [deadlines](Task::with_deadlines) are respected, because they do not
+//! depend on the past. They change no action, so that running actions remain as they are.
 
 mod actions;
 mod clauses;
@@ -49,21 +52,22 @@ use super::tuning::Technique;
 pub(super) use delay::delayed;
 use rewriting::Coverage;
 
-/// Why a problem has no form without constraints.
+/// Reason why a problem has no form without constraints.
 enum Obstacle {
-    /// What is not supported.
+    /// The feature is not supported.
     Feature(&'static str),
-    /// Why a constraint is broken whatever is done.
+    /// The constraint is violated in every plan.
     Broken(String),
 }
 
-/// How many states are evaluated for each preference that is tried.
+/// Number of states evaluated for each preference that is tried.
 const TRIAL: u64 = 20_000;
 
-/// Most states of each of the short searches, under the constraints and without them, before the whole search.
+/// Maximum number of states of each of the short searches, with and without the constraints, before
+/// the full search.
 const QUICK: u64 = 60;
 
-/// Whether plans of a task are looked for here.
+/// Returns `true` if this module handles the search for plans of the task.
 pub(super) fn concerns(task: &Task, situation: &Situation, settings: &Settings) -> bool {
     let constraints = task.constraints();
     let is_improving = !settings.first_plan_only
@@ -83,11 +87,11 @@ fn counts_violations(task: &Task) -> bool {
     counts
 }
 
-/// As [`plan`](super::plan), of a task with constraints.
+/// As [`plan`](super::plan), for a task with constraints.
 ///
-/// Where the metric counts violated preferences, they are tried one after the other once there is a
-/// plan: each is demanded, beside those that paid, for some states. The rest of the time goes into
-/// plans under all that paid.
+/// If the metric counts violated preferences, they are tried one after the other once there is a
+/// plan: each is required, in addition to those that improved the plan, for a limited number of
+/// states. The remaining time is used for plans under all preferences that improved it.
 pub(super) fn plan(
     task: &Task,
     situation: &Situation,
@@ -147,7 +151,7 @@ pub(super) fn plan(
         Err(answer) if matches!(*answer, Answer::Unsupported(_)) => {
             let is_first = settings.first_plan_only;
             let expressible = (&demanded[..], Coverage::Expressible);
-            // An obstacle there is none of the problem itself.
+            // An obstacle here is not an obstacle for the problem without constraints.
             let _ = search.under(expressible, Some(TRIAL), is_first);
             let proof = search.without(None);
             proof.unwrap_or_else(|| search.answer_without_form(*answer))
@@ -156,7 +160,7 @@ pub(super) fn plan(
     }
 }
 
-/// A search for plans of the task, in several problems without constraints.
+/// A search for plans of the task, over several problems without constraints.
 struct Search<'a> {
     task: &'a Task,
     situation: &'a Situation,
@@ -164,13 +168,13 @@ struct Search<'a> {
     observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     best: Option<Found>,
     is_interrupted: bool,
-    /// The states that finished searches made.
+    /// Statistics of the finished searches.
     spent: Counts,
 }
 
 impl Search<'_> {
-    /// Looks for plans that keep these preferences, too; the answer is about the problem without
-    /// constraints. `Err` if there is no such problem: the answer, then, about the task.
+    /// Searches for plans that also satisfy these preferences. Returns the answer for the problem
+    /// without constraints. If there is no such problem, returns the answer for the task as `Err`.
     fn under(
         &mut self,
         (demanded, coverage): (&[usize], Coverage),
@@ -195,7 +199,8 @@ impl Search<'_> {
         Ok(self.search(&free, constrained, &settings, most_states))
     }
 
-    /// The settings of one search. A plan is judged under the constraints as soon as it is found.
+    /// Returns the settings of one search. Each plan that it finds is validated under the
+    /// constraints.
     fn settings_of_search(&self, first_plan_only: bool) -> Settings {
         let mut settings = Settings {
             first_plan_only,
@@ -231,9 +236,9 @@ impl Search<'_> {
         answer
     }
 
-    /// Searches for a first plan for a few states, under the constraints and then without them: the form of
-    /// the constraints may exclude plans that are found at once without it. The answer if that settles the
-    /// matter.
+    /// Searches for a first plan for a few states, first under the constraints and then without
+    /// them, since the form of the constraints may exclude plans that are easy to find without it.
+    /// Returns the answer if it is final.
     fn quickly(&mut self, demanded: &[usize]) -> Option<Answer> {
         let whole = self.under((demanded, Coverage::All), Some(QUICK), true);
         let answer = match whole {
@@ -255,8 +260,8 @@ impl Search<'_> {
         is_settled.then(|| self.answer(answer))
     }
 
-    /// Searches without the constraints if the search under them has found nothing: for plans that satisfy
-    /// them by chance, and for a proof that excludes plans even without them.
+    /// Searches without the constraints if the search under them found no plan: for plans that
+    /// happen to satisfy them, and for a proof that no plan exists even without them.
     fn without(&mut self, most_states: Option<u64>) -> Option<Answer> {
         if self.best.is_some() || self.is_interrupted {
             return None;
@@ -303,7 +308,7 @@ impl Search<'_> {
         judged_without_observers(self.task, self.situation, self.settings, plan)
     }
 
-    /// Takes over what a search reports.
+    /// Processes a report of a search.
     fn look(&mut self, progress: &Progress) -> ControlFlow<()> {
         let found = progress.plan.as_ref();
         let found = found.and_then(|found| self.judged(&found.plan));
@@ -333,7 +338,7 @@ impl Search<'_> {
         flow
     }
 
-    /// The answer about the task where there is no problem without constraints.
+    /// Returns the answer for the task if there is no problem without constraints.
     fn answer_without_form(&mut self, unsupported: Answer) -> Answer {
         let stopped = if self.is_interrupted {
             Stopped::Interrupted
@@ -356,7 +361,7 @@ impl Search<'_> {
         }
     }
 
-    /// The answer about the task, after the last one about a problem without constraints.
+    /// Returns the answer for the task, given the last answer for a problem without constraints.
     fn answer(&mut self, last: Answer) -> Answer {
         let (stopped, mut counts) = match &last {
             Answer::Plan {
@@ -408,7 +413,7 @@ fn unsupported(task: &Task, feature: &str) -> Answer {
     })
 }
 
-/// The plan without observers, if the judge accepts it.
+/// Returns the plan without observers if the validator accepts it.
 pub(super) fn judged_without_observers(
     task: &Task,
     situation: &Situation,

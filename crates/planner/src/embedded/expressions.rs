@@ -9,27 +9,27 @@ use super::network::NodeId;
 /// `constant + Σ coefficient · time of node`, in units of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Form {
-    /// Ascending, without zeros.
+    /// In ascending order, without zeros.
     pub(crate) terms: Vec<(NodeId, Rational)>,
     pub(crate) constant: Rational,
 }
 
-/// A number that moves: `base + rate · now`.
+/// A number that changes continuously: `base + rate · now`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Course {
     pub(crate) base: Form,
     pub(crate) rate: Rational,
 }
 
-/// The numbers of a state that depend on times, and what has been demanded of them.
+/// The numbers of a state that depend on times, and the demands on them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Symbolic {
-    /// By fluent; those have no value in `State::values`.
+    /// By fluent. These fluents have no value in `State::values`.
     pub(crate) courses: Vec<(u32, Course)>,
     /// `form comparison 0`.
     pub(crate) demands: Vec<(Form, Comparison)>,
-    /// Times of the happenings that the demands were about when they were met last: where to begin. They
-    /// say nothing about the state.
+    /// Times of the happenings in the demands from the last solution, as a starting point for the
+    /// next one. They are not part of the state.
     pub(crate) times: Vec<(NodeId, Rational)>,
 }
 
@@ -54,7 +54,7 @@ impl Form {
         }
     }
 
-    /// The time of a node.
+    /// Returns the time of a node.
     pub(crate) fn node(node: NodeId) -> Self {
         Self {
             terms: vec![(node, Rational::ONE)],
@@ -66,7 +66,7 @@ impl Form {
         self.terms.is_empty().then_some(&self.constant)
     }
 
-    /// `self + factor · other`
+    /// Returns `self + factor · other`.
     pub(crate) fn plus(mut self, factor: &Rational, other: &Self) -> Self {
         for (node, coefficient) in &other.terms {
             let change = factor * coefficient;
@@ -98,12 +98,13 @@ impl Symbolic {
         place.ok().map(|place| &self.courses[place].1)
     }
 
-    /// Whether the fluent's value depends on times.
+    /// Returns `true` if the fluent's value depends on times.
     pub(crate) fn governs(&self, fluent: u32) -> bool {
         self.course(fluent).is_some()
     }
 
-    /// Demands `form comparison 0`. Of two demands that differ in the constant, the stronger one is kept.
+    /// Demands `form comparison 0`. Of two demands that differ only in the constant, the stronger
+    /// one is kept.
     pub(crate) fn demand(&mut self, form: Form, comparison: Comparison) {
         for (known, other) in &mut self.demands {
             if known.terms != form.terms {
@@ -122,12 +123,12 @@ impl Symbolic {
         self.demands.push((form, comparison));
     }
 
-    /// Whether there is anything to solve.
+    /// Returns `true` if there are demands to satisfy.
     pub(crate) fn has_demands(&self) -> bool {
         !self.demands.is_empty()
     }
 
-    /// An estimate of the memory it takes, in bytes.
+    /// Returns an estimate of the memory, in bytes.
     pub(crate) fn size(&self) -> usize {
         let term = size_of::<(NodeId, Rational)>();
         let forms = self.courses.iter().map(|(_, course)| &course.base);

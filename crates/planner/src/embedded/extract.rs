@@ -1,4 +1,4 @@
-//! From the choices of a search to a plan with times.
+//! Conversion of the choices of a search to a plan with times.
 
 use std::sync::Arc;
 
@@ -14,20 +14,20 @@ use super::state::State;
 use super::symbolic::{self, Exact, KnownEnd, exact_distance, not_before};
 use super::time::{NEVER, Ticks};
 
-/// A step of the plan to be.
+/// A step of the plan being built.
 #[derive(Clone, Debug)]
 struct Timing {
     action: u32,
-    /// `None`: it was under way before.
+    /// `None` if it was already running in the situation.
     start: Option<NodeId>,
     end: Option<NodeId>,
 }
 
-/// How many choices are taken between two questions whether to go on.
+/// Number of choices replayed between two calls of `goes_on`.
 const STEPS_PER_QUESTION: usize = 16;
 
-/// The plan that the choices stand for, everything as early as possible; `None` if the judge does
-/// not find it valid, or `goes_on` says no.
+/// Returns the plan for these choices, with every happening as early as possible. Returns `None` if
+/// the validator rejects it, or `goes_on` returned `false`.
 pub(crate) fn plan_of(
     task: &Task,
     situation: &Situation,
@@ -62,7 +62,7 @@ pub(crate) fn plan_of(
     let times = if state.symbolic.is_none() {
         exact_times(compiled, &state.network, log, (task.epsilon(), &exact))?
     } else {
-        // A linear program of all that happens can take longer than all that came before.
+        // A linear program over all happenings can take longer than all earlier steps.
         if !goes_on() {
             return None;
         }
@@ -75,12 +75,12 @@ pub(crate) fn plan_of(
     }
 }
 
-/// Takes the choices again, and remembers which node is which happening.
+/// Replays the choices, and records the node of each happening.
 struct Replay<'a> {
     stepper: Stepper<'a>,
     state: State,
     timings: Vec<Timing>,
-    /// For each action under way, its timing.
+    /// Index of the timing of each running action.
     open: Vec<usize>,
 }
 
@@ -136,7 +136,7 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// The plan with these times of its nodes.
+/// Returns the plan with these times of its nodes.
 fn written(
     task: &Task,
     situation: &Situation,
@@ -169,7 +169,7 @@ fn written(
     Some(plan)
 }
 
-/// The distances between starts and ends, exactly.
+/// Returns the exact distances between starts and ends.
 fn exact_distances(log: &Log) -> Vec<(NodeId, NodeId, Rational)> {
     let mut distances = Vec::new();
     for (end, start, least, most) in &log.ends {
@@ -179,8 +179,8 @@ fn exact_distances(log: &Log) -> Vec<(NodeId, NodeId, Rational)> {
     distances
 }
 
-/// When what is under way may end, exactly: its start need not lie on the grid. Duration bounds that do
-/// not belong to what they bound are kept away from by a tick, as in the search.
+/// Returns the exact times at which the running actions may end, since their starts may be off the
+/// grid. Excluded duration bounds are avoided by a tick, as in the search.
 fn known_ends(situation: &Situation, compiled: &Compiled, timings: &[Timing]) -> Vec<KnownEnd> {
     let tick = compiled.scale.units(1);
     let each = situation.running.iter().zip(timings);
@@ -211,12 +211,12 @@ fn known_ends(situation: &Situation, compiled: &Compiled, timings: &[Timing]) ->
     .collect()
 }
 
-/// The earliest times of all happenings in exact numbers, of which some are known exactly.
+/// Computes the earliest times of all happenings in exact numbers, some of which are known exactly.
 ///
-/// Where everything lies on the grid these are the network's own. Elsewhere exact durations take
-/// the place of rounded ones; a bound by a fixed time is moved by a tick, to be safe from its
-/// rounding. What can happen at once happens at the situation's time, which may be later than its
-/// tick.
+/// If everything is on the grid, these are the network's own times. Otherwise exact durations
+/// replace rounded ones, and a bound by a fixed time is moved by a tick to compensate for its
+/// rounding. Happenings that can happen immediately happen at the situation's time, which may be
+/// later than its tick.
 fn exact_times(
     compiled: &Compiled,
     network: &Network,
@@ -245,7 +245,7 @@ fn exact_times(
         let node = usize::from(end.node);
         times[node] = end.after(floors[node], compiled);
     }
-    // Windows lie on the grid, rounded to the inside.
+    // Windows are on the grid, rounded to the inside.
     for (node, begin) in network.window_begins() {
         if begin > compiled.now {
             let time = &mut times[usize::from(node)];

@@ -1,12 +1,12 @@
-//! Conditions and numeric expressions in the form in which the search reads them.
+//! Conditions and numeric expressions in the form used by the search.
 //!
-//! Facts and fluents are small numbers here, by position in [`Compiled`](super::compile::Compiled).
+//! Facts and fluents are small integers, by position in [`Compiled`](super::compile::Compiled).
 
 use elbowroom_model::ground::Expression;
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
 
-/// A fact that shall be true or false: twice the fact, plus one for false.
+/// A fact with a required truth: twice the fact, plus one for false.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Literal(pub(crate) u32);
 
@@ -27,13 +27,13 @@ impl Literal {
         self.0 as usize
     }
 
-    /// Whether it holds where the bits of true facts are set.
+    /// Returns `true` if it holds in the state whose true facts are set in `facts`.
     pub(crate) fn holds(self, facts: &[u64]) -> bool {
         is_set(facts, self.fact()) == self.truth()
     }
 }
 
-/// Whether a bit is set.
+/// Returns `true` if a bit is set.
 pub(crate) fn is_set(bits: &[u64], index: u32) -> bool {
     bits[index as usize / 64] >> (index % 64) & 1 == 1
 }
@@ -60,12 +60,12 @@ pub(crate) struct Formula {
 }
 
 impl Formula {
-    /// Whether it always holds.
+    /// Returns `true` if it always holds.
     pub(crate) fn is_trivial(&self) -> bool {
         self.literals.is_empty() && self.tests.is_empty() && self.choices.is_empty()
     }
 
-    /// Whether it holds; `test` says whether a numeric test does.
+    /// Returns `true` if it holds. `test` evaluates a numeric test.
     pub(crate) fn holds(&self, facts: &[u64], test: &mut dyn FnMut(u32) -> bool) -> bool {
         self.literals.iter().all(|literal| literal.holds(facts))
             && self.tests.iter().all(|&number| test(number))
@@ -84,7 +84,7 @@ impl Formula {
                 .all(|choice| choice.iter().any(|part| part.may_hold(test)))
     }
 
-    /// Calls `visit` for each literal anywhere.
+    /// Calls `visit` for each literal, including nested ones.
     pub(crate) fn visit_literals(&self, visit: &mut dyn FnMut(Literal)) {
         self.literals.iter().copied().for_each(&mut *visit);
         for part in self.choices.iter().flatten() {
@@ -92,7 +92,7 @@ impl Formula {
         }
     }
 
-    /// Calls `visit` for each test anywhere.
+    /// Calls `visit` for each test, including nested ones.
     pub(crate) fn visit_tests(&self, visit: &mut dyn FnMut(u32)) {
         self.tests.iter().copied().for_each(&mut *visit);
         for part in self.choices.iter().flatten() {
@@ -100,8 +100,8 @@ impl Formula {
         }
     }
 
-    /// Returns formulas whose disjunction is this one, without the choices that have an alternative for which
-    /// `splits` is `true`. `None` if there are more than `most`.
+    /// Returns formulas whose disjunction is this one, without the choices that have an alternative
+    /// for which `splits` returns `true`. Returns `None` if there are more than `most`.
     pub(crate) fn alternatives(
         &self,
         splits: &dyn Fn(&Self) -> bool,
@@ -179,7 +179,7 @@ impl Linear {
         self.terms.is_empty() && self.duration.is_zero()
     }
 
-    /// `self + factor · other`.
+    /// Adds `factor · other`.
     pub(crate) fn add(&mut self, factor: &Rational, other: &Self) {
         for (fluent, coefficient) in &other.terms {
             let change = factor * coefficient;
@@ -199,7 +199,7 @@ impl Linear {
         scaled
     }
 
-    /// The linear form of an expression, if it has one.
+    /// Returns the linear form of an expression, if it has one.
     pub(crate) fn of(expression: &Expression) -> Option<Self> {
         Some(match expression {
             Expression::Constant(value) => Self::constant(value.clone()),
@@ -260,7 +260,7 @@ impl Numeric {
         }
     }
 
-    /// The value, unless something it reads has none.
+    /// Returns the value, unless the expression reads a fluent without a value.
     pub(crate) fn value(
         &self,
         values: &[Option<Rational>],
@@ -285,7 +285,7 @@ impl Numeric {
         }
     }
 
-    /// Its value, if it reads nothing.
+    /// Returns its value if it reads no fluents.
     pub(crate) fn as_constant(&self) -> Option<&Rational> {
         match self {
             Self::Linear(linear) if linear.is_constant() => Some(&linear.constant),
@@ -293,7 +293,7 @@ impl Numeric {
         }
     }
 
-    /// Calls `visit` for each fluent it reads.
+    /// Calls `visit` for each fluent that the expression reads.
     pub(crate) fn visit_fluents(&self, visit: &mut dyn FnMut(u32)) {
         match self {
             Self::Linear(linear) => linear.terms.iter().for_each(|term| visit(term.0)),
@@ -301,7 +301,7 @@ impl Numeric {
         }
     }
 
-    /// Whether it reads `?duration`.
+    /// Returns `true` if it reads `?duration`.
     pub(crate) fn reads_duration(&self) -> bool {
         match self {
             Self::Linear(linear) => !linear.duration.is_zero(),

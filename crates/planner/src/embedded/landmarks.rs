@@ -1,17 +1,19 @@
-//! Landmarks: what each plan must have made true at some time, in which order, and how much of that a
-//! sequence of choices still lacks. They decompose the goal into what has to be done one after the other.
+//! Landmarks: propositions that every plan must make true at some time, their order, and the number
+//! of them that a sequence of choices still lacks. They decompose the goal into consecutive
+//! subgoals.
 //!
-//! They are the facts and numeric tests that each relaxed plan goes through (see `relaxed::labels`). Of two
-//! landmarks, one is ordered before the other
+//! They are the facts and numeric tests that each relaxed plan goes through (see
+//! `relaxed::labels`). Of two landmarks, one is ordered before the other
 //!
 //! - *naturally*, if each relaxed plan for the other goes through it,
-//! - *greedy-necessarily*, if it is also needed by whatever makes the other true for the first time
-//!   (Hoffmann, Porteous & Sebastia, JAIR 22, 2004),
+//! - *greedy-necessarily*, if every operator that makes the other true for the first time also
+//!   needs it (Hoffmann, Porteous & Sebastia, JAIR 22, 2004),
 //! - *reasonably*, if it would have to be undone for the other one otherwise (see `reasonable`).
 //!
-//! A landmark is *accepted* when it is true and all that is ordered before it was accepted. What is left are
-//! those not accepted, and those needed again: false, though the goal or a landmark that is left needs
-//! them (the landmark-counting heuristic of LAMA; Richter & Westphal, JAIR 39, 2010).
+//! A landmark is *accepted* when it is true and all landmarks ordered before it were accepted. The
+//! remaining landmarks are those not accepted, and those needed again: they are false, although the
+//! goal or a remaining landmark needs them (the landmark-counting heuristic of LAMA; Richter &
+//! Westphal, JAIR 39, 2010).
 
 mod reasonable;
 #[cfg(test)]
@@ -22,31 +24,31 @@ use super::formula::{Literal, is_set, set};
 use super::relaxed::{Graph, Labels};
 use super::state::{Open, State};
 
-/// Something that must have been true.
+/// A proposition that must be true at some time.
 #[derive(Clone, Debug)]
 pub(crate) struct Landmark {
-    /// A literal or a test, as the relaxed problem numbers them.
+    /// A literal or a test, by its number in the relaxed problem.
     pub(crate) proposition: u32,
-    /// Whether it must be true in the end.
+    /// `true` if the proposition is part of the goal.
     pub(crate) is_goal: bool,
-    /// The landmarks that come before it, a bit for each.
+    /// The landmarks that come before it, as a bit set.
     after: Vec<u64>,
     /// The landmarks that need it just before they become true.
     needed_by: Vec<u32>,
 }
 
-/// The landmarks of a problem; what comes naturally before another one stands before it.
+/// The landmarks of a problem, in an order that extends the natural order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Landmarks {
     pub(crate) list: Vec<Landmark>,
     first_test: u32,
-    /// How many of them are no goals, and did not hold in the beginning.
+    /// Number of landmarks that are not goals and did not hold in the initial state.
     pub(crate) on_the_way: usize,
 }
 
 impl Landmarks {
-    /// The landmarks for the goal, and for what is under way to end, from a state on, with its labels.
-    /// `None` if that is out of reach.
+    /// Returns the landmarks from a state for the goal and for the ends of the running actions,
+    /// given the labels of the state. Returns `None` if they are unreachable.
     pub(crate) fn of(graph: &Graph, labels: &Labels, open: &[Open]) -> Option<Self> {
         let mut wanted = graph.goal.clone();
         for open in open {
@@ -55,7 +57,7 @@ impl Landmarks {
         }
         let to_reach = labels.of_all(&wanted)?;
         let needs = first_needs(graph, labels, &to_reach);
-        // What comes naturally before another one has a smaller label.
+        // In the natural order, earlier landmarks have smaller labels.
         let size = |&proposition: &u32| labels.of(proposition).map_or(0, <[u32]>::len);
         let goals = graph.goal.iter().copied();
         let held = goals.chain(needs.iter().flatten().copied());
@@ -103,8 +105,8 @@ impl Landmarks {
         })
     }
 
-    /// What is accepted after a choice that led to the state, where before that those were; nothing before
-    /// the first state. And how many are left.
+    /// Returns the accepted landmarks of a state, given those of its predecessor (`None` for the
+    /// first state), and the number of remaining landmarks.
     pub(crate) fn progress(
         &self,
         compiled: &Compiled,
@@ -143,7 +145,8 @@ impl Landmarks {
     }
 }
 
-/// What each operator needs that makes one of these true for the first time.
+/// Returns for each of these propositions the preconditions common to all operators that can make
+/// it true for the first time.
 fn first_needs(graph: &Graph, labels: &Labels, to_reach: &[u32]) -> Vec<Vec<u32>> {
     let mut needs: Vec<Option<Vec<u32>>> = vec![None; to_reach.len()];
     labels.visit_achievers(graph, &mut |operator, proposition| {

@@ -1,27 +1,28 @@
-//! Mutex groups: sets of atoms of which at most one is true in each state that can be reached. An atom is a
-//! fact, or that an action is under way. "The robot is at a, at b, or drives from a to b" is one: a variable
-//! of a finite domain.
+//! Mutex groups: sets of atoms of which at most one is true in each reachable state. An atom is a
+//! fact, or the statement that an action is running. An example is "the robot is at a, at b, or
+//! drives from a to b": a variable of a finite domain.
 //!
-//! A set is one if at most one of it is true in the beginning, and each happening *balances* it: one that
-//! makes an atom of the set true makes no other one true, and needs one that it makes false (the invariants
-//! of Helmert, AIJ 173, 2009; the fam-groups of Fišer & Komenda, JAIR 61, 2018). Starts and ends are
-//! operators here: a start makes it true that the action is under way, and its end needs that and makes it
-//! false. Sets are found on the ground problem: one grows from an atom that is true in the beginning, by what
-//! balances the happenings that would add to it. Where several atoms would do, the same place in the list of
-//! what an action deletes is tried for all actions of a schema, one place after the other.
+//! A set is a mutex group if at most one of its atoms is true in the initial state, and each
+//! happening *balances* it: a happening that makes an atom of the set true makes no other one true,
+//! and needs one that it makes false (the invariants of Helmert, AIJ 173, 2009; the fam-groups of
+//! Fišer & Komenda, JAIR 61, 2018). Starts and ends are operators here: a start makes the atom of
+//! the running action true, and its end needs this atom and makes it false. Sets are found on the
+//! ground problem: a set grows from an atom that is true in the initial state, by atoms that
+//! balance the happenings that would add to it. If there are several candidates, the same position
+//! in the list of deletions is tried for all actions of a schema, one position after the other.
 
 use super::compile::{Change, Compiled, NONE, Snap};
 use super::formula::{Literal, is_set};
 use super::hash::Map;
 use super::state::State;
 
-/// How many choices are tried for each atom to begin with.
+/// Maximum number of choices tried for each initial atom.
 const MOST_TRIES: usize = 16;
 
 /// A start, an end, an instant or timed initials.
 #[derive(Debug, Default)]
 struct Operator {
-    /// Ascending, as are all.
+    /// In ascending order, as all lists.
     needs: Vec<u32>,
     adds: Vec<u32>,
     /// Atoms that it needs and makes false, in the order of its effects.
@@ -33,14 +34,14 @@ struct Operator {
 /// The mutex groups of a problem.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Mutexes {
-    /// Atoms by number: facts, and then for each action that it is under way. Ascending.
+    /// Sets of atoms by number: facts, then the running actions. In ascending order.
     pub(crate) groups: Vec<Vec<u32>>,
-    /// For each fact the groups that it is in.
+    /// For each fact, the groups that contain it.
     of_fact: Vec<Vec<u32>>,
 }
 
 impl Mutexes {
-    /// The groups from a state on, as many as are found with so much work.
+    /// Returns the groups from a state that are found with at most `most_work` work.
     pub(crate) fn of(compiled: &Compiled, state: &State, most_work: u64) -> Self {
         let mut finder = Finder::new(compiled, state);
         let mut mutexes = Self {
@@ -71,7 +72,7 @@ impl Mutexes {
         mutexes
     }
 
-    /// Whether two literals are never true together, as far as groups tell.
+    /// Returns `true` if a group shows that two literals are never true together.
     pub(crate) fn exclude(&self, one: Literal, other: Literal) -> bool {
         if one.fact() == other.fact() {
             return one.truth() != other.truth();
@@ -85,20 +86,21 @@ impl Mutexes {
     }
 }
 
-/// What groups are found with.
+/// Search for mutex groups.
 struct Finder {
     operators: Vec<Operator>,
-    /// The operators that make each atom true.
+    /// For each atom, the operators that make it true.
     adding: Vec<Vec<u32>>,
-    /// The operators that use each atom up.
+    /// For each atom, the operators that use it up.
     using: Vec<Vec<u32>>,
-    /// How many times each atom is true in the beginning.
+    /// Number of times each atom is true in the initial state.
     weight: Vec<u32>,
     is_member: Vec<bool>,
     work: u64,
 }
 
-/// Which place in what an operator uses up was chosen, for a kind of operators, of so many.
+/// Choices: for a kind of operators, the chosen position among the atoms that they use up, and the
+/// number of positions.
 type Choices = Vec<(u32, usize, usize)>;
 
 impl Finder {
@@ -160,7 +162,7 @@ impl Finder {
         }
     }
 
-    /// A group with that atom, if one is found.
+    /// Returns a group with that atom, if one is found.
     fn group_with(&mut self, seed: u32) -> Option<Vec<u32>> {
         let mut choices = Choices::new();
         for _ in 0..MOST_TRIES {
@@ -175,7 +177,7 @@ impl Finder {
             if is_balanced {
                 return (members.len() > 1).then_some(members);
             }
-            // The next place for the last choice that leaves one.
+            // Take the next position for the last choice that has one.
             loop {
                 let (_, place, count) = choices.last_mut()?;
                 *place += 1;
@@ -188,7 +190,8 @@ impl Finder {
         None
     }
 
-    /// Adds what operators make true that use up a member and give none back, where that can be balanced.
+    /// Adds atoms that are made true by operators which use up a member and add none, if this can
+    /// be balanced.
     fn extend(&mut self, members: &mut Vec<u32>, choices: &mut Choices) {
         let mut next = 0;
         while let Some(&atom) = members.get(next) {
@@ -211,14 +214,14 @@ impl Finder {
         }
     }
 
-    /// Leaves only so many members.
+    /// Removes all members beyond the first `count`.
     fn cut(&mut self, members: &mut Vec<u32>, count: usize) {
         for member in members.drain(count..) {
             self.is_member[member as usize] = false;
         }
     }
 
-    /// Adds a member, and others until every operator is balanced. Whether that succeeds.
+    /// Adds a member, and others until every operator is balanced. Returns `true` if this succeeds.
     fn grow(&mut self, members: &mut Vec<u32>, seed: u32, choices: &mut Choices) -> bool {
         let mut next = members.len();
         members.push(seed);
@@ -239,7 +242,7 @@ impl Finder {
                 let is_new = |atom: &&u32| !operator.needs.contains(*atom);
                 let new = operator.adds.iter().filter(is_member).filter(is_new);
                 match new.count() {
-                    // What holds anyway stays the only one.
+                    // An atom that always holds stays the only one.
                     0 => continue,
                     1 => {}
                     _ => return false,
@@ -311,7 +314,7 @@ mod tests {
     use crate::embedded::root::root;
     use crate::embedded::testing::{choices, compiled};
 
-    /// How often the atoms of a group are true in a state.
+    /// Returns the number of true atoms of a group in a state.
     fn weight(compiled: &Compiled, group: &[u32], state: &State) -> usize {
         let count = |&atom: &u32| match atom.checked_sub(narrow(compiled.facts.len())) {
             None => usize::from(is_set(&state.facts, atom)),
@@ -320,7 +323,7 @@ mod tests {
         group.iter().map(count).sum()
     }
 
-    /// Looks at all states that so many choices lead to.
+    /// Visits all states that at most `left` choices lead to.
     fn visit(compiled: &Compiled, state: &State, left: usize, see: &mut dyn FnMut(&State) -> bool) {
         if !see(state) || left == 0 {
             return;

@@ -69,7 +69,7 @@ impl MutexPairs {
         })
     }
 
-    /// Returns `true` if the state has a dead pair. No plan visits it then.
+    /// Returns `true` if the state has a dead pair. No plan passes through it then.
     pub(crate) fn is_dead_end(&self, state: &State) -> bool {
         if self.with_dead.is_empty() {
             return false;

@@ -1,4 +1,4 @@
-//! Plans without steps that nothing needs (*action elimination*, Nakhost & Müller, ICAPS 2010).
+//! Removal of unnecessary plan steps (*action elimination*, Nakhost & Müller, ICAPS 2010).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,13 +7,14 @@ use elbowroom_model::validate::{self, Report, Verdict};
 use elbowroom_model::{Footprint, Situation, Step, Task, TimeTriggeredPlan, validate_from};
 use elbowroom_num::Rational;
 
-/// The plan without the steps that it works without. A search can come to a goal by way of an
-/// action that makes true what another one, perhaps under way before, makes true anyway.
+/// Returns the plan without steps that it does not need. The plan of a search may contain an action
+/// whose effects another action, possibly one that was already running, achieves anyway.
 ///
-/// Only steps are tried that supply no fact that is read before anything else supplies it: there are few of
-/// them, and whether the plan works without one is for the judge to say. Steps that change numbers which something
-/// reads are mostly there for that. Both kinds are tried only as long as few trials of that kind were in vain
-/// ([`MOST_IN_VAIN`]). `goes_on` is asked before each trial; once it says no, the other steps stay.
+/// Only steps that supply no fact to another step are tried: there are few of them, and the
+/// validator decides whether the plan is valid without them. Steps that change numbers which
+/// something reads are usually needed. Trials of each kind stop after a few failures
+/// ([`MOST_IN_VAIN`]). `goes_on` is called before each trial; when it returns `false`, the
+/// remaining steps stay.
 pub(super) fn without_needless(
     task: &Task,
     situation: &Situation,
@@ -24,7 +25,7 @@ pub(super) fn without_needless(
     let mut timeline = Timeline::new(task, situation, &plan.steps);
     let mut left = (plan, report);
     let (mut of_numbers, mut of_nothing) = (0, 0);
-    // What is under way comes first, and stays. Later steps may need earlier ones.
+    // Running actions come first, and stay. Later steps may need earlier ones.
     for index in (situation.running.len()..left.0.steps.len()).rev() {
         let in_vain = match timeline.supplies(index) {
             Supplies::Facts => continue,
@@ -50,15 +51,15 @@ pub(super) fn without_needless(
     left
 }
 
-/// So many trials of a kind are in vain at most: each takes a look at the whole plan.
+/// Maximum number of failed trials of a kind. Each trial validates the whole plan.
 const MOST_IN_VAIN: usize = 20;
 
-/// What others read of that which a step makes so.
+/// Effects of a step that others read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Supplies {
-    /// A fact that would be false without it.
+    /// A fact that would be false without the step.
     Facts,
-    /// No such fact, but a number that it changes.
+    /// No such fact, but a number that the step changes.
     Numbers,
     Nothing,
 }
@@ -68,13 +69,13 @@ struct Timeline<'a> {
     situation: &'a Situation,
     moments: Vec<Moment>,
     goal: Footprint,
-    /// For each number the steps that read it; `None` is a timed initial.
+    /// For each number, the steps that read it; `None` for a timed initial.
     readers: BTreeMap<FluentId, BTreeSet<Option<usize>>>,
 }
 
 struct Moment {
     time: Rational,
-    /// The step's place in the plan; `None` of a timed initial.
+    /// Index of the step in the plan; `None` for a timed initial.
     step: Option<usize>,
     footprint: Footprint,
 }
@@ -112,7 +113,7 @@ impl<'a> Timeline<'a> {
                     footprint: Footprint::of_timed(timed),
                 }),
         );
-        // Stable: what is read throughout an action comes after its start.
+        // The sort is stable, so that the over-all reads of an action stay after its start.
         moments.sort_by(|one, other| one.time.cmp(&other.time));
         let mut readers: BTreeMap<FluentId, BTreeSet<Option<usize>>> = BTreeMap::new();
         for moment in &moments {
@@ -128,7 +129,7 @@ impl<'a> Timeline<'a> {
         }
     }
 
-    /// What is known to be read of a step.
+    /// Returns the kind of effects of a step that others read.
     fn supplies(&self, step: usize) -> Supplies {
         let own = self.moments.iter().enumerate();
         let mut own = own.filter(|(_, moment)| moment.step == Some(step));
@@ -146,14 +147,15 @@ impl<'a> Timeline<'a> {
         }
     }
 
-    /// Whether another step, or the goal, reads a number.
+    /// Returns `true` if another step, or the goal, reads a number.
     fn is_number_read(&self, fluent: FluentId, step: usize) -> bool {
         let readers = self.readers.get(&fluent);
         self.goal.reads_fluents.contains(&fluent)
             || readers.is_some_and(|all| all.iter().any(|it| *it != Some(step)))
     }
 
-    /// Whether a fact is read as this moment's step makes it, and would be false without that step.
+    /// Returns `true` if a fact added at this moment is read later and would be false without the
+    /// step.
     fn is_read(&self, fact: FactId, place: usize) -> bool {
         let step = self.moments[place].step;
         let is_other = |moment: &&Moment| moment.step != step;
@@ -210,7 +212,7 @@ mod tests {
         (:action sell :parameters (?x - item) :precondition (have ?x)
           :effect (and (not (have ?x)) (sold ?x))))";
 
-    /// The plan without what it does not need, in which each line is an action.
+    /// Returns the names of the steps that remain in the plan, one action per line of `plan`.
     fn left(init: &str, goal: &str, plan: &str) -> Vec<String> {
         let problem = format!(
             "(define (problem p) (:domain d) (:objects r s - robot book pen - item)
@@ -235,7 +237,7 @@ mod tests {
         let plan = "0: (fetch r book) [5]\n0: (fetch s pen) [5]";
         let init = "(have book) (= (charge r) 1) (= (charge s) 1)";
         assert_eq!(left(init, "(have pen)", plan), ["(fetch s pen)"]);
-        // Nor is needed then what it was loaded for.
+        // The action that it was loaded for is then unnecessary as well.
         let plan = "0: (load r) [2]\n3: (fetch r book) [5]\n0: (fetch s pen) [5]";
         let init = "(have book) (= (charge r) 0) (= (charge s) 1)";
         assert_eq!(left(init, "(have pen)", plan), ["(fetch s pen)"]);
@@ -247,7 +249,7 @@ mod tests {
         let init = "(= (charge r) 0) (= (charge s) 0)";
         let goal = "(and (have pen) (have book))";
         assert_eq!(left(init, goal, plan).len(), 3);
-        // It had been there before, but is sold meanwhile.
+        // It had been there before, but is sold in the meantime.
         let plan = "0: (sell book)\n1: (fetch r book) [5]";
         let init = "(have book) (= (charge r) 1) (= (charge s) 0)";
         assert_eq!(left(init, "(and (sold book) (have book))", plan).len(), 2);

@@ -1,17 +1,17 @@
-//! The temporal network of those happenings whose times are not settled yet.
+//! Temporal network of the happenings whose times are not settled yet.
 //!
-//! A happening is settled when no action under way could still push it to a later time: then the
-//! earliest time it can have is the best for everything that follows, and it leaves the network.
-//! What stays is small, and is all that matters of the past besides the annotations.
+//! A happening is settled when no running action can delay it any more. Its earliest time is then
+//! the best for all later happenings, and it leaves the network. The remaining network is small,
+//! and together with the annotations it contains all relevant information about the past.
 //!
 //! All constraints are of the form `to >= from + distance`. The network keeps the earliest time of
-//! each node, and is consistent if no node is later than its latest time and no cycle pushes
-//! itself (Cesta & Oddi, "Gaining efficiency and flexibility in the simple temporal problem",
-//! TIME 1996, for the incremental test).
+//! each node, and is consistent if no node is later than its latest time and there is no positive
+//! cycle (Cesta & Oddi, "Gaining efficiency and flexibility in the simple temporal problem", TIME
+//! 1996, for the incremental test).
 //!
-//! Beside these, nodes may have to lie in [windows](super::windows). Lower bounds are propagated
-//! along the constraints first. A node that lies outside of its windows then moves to the next one,
-//! and so on until nothing moves.
+//! In addition, nodes may have to be in [windows](super::windows). Lower bounds are propagated
+//! along the constraints first. A node outside of its windows then moves to the next one, and so on
+//! until no node moves.
 
 mod windows;
 
@@ -27,16 +27,16 @@ pub(crate) type NodeId = u16;
 /// No node: the happening is settled.
 pub(crate) const SETTLED: NodeId = NodeId::MAX;
 
-/// See the module.
+/// Simple temporal network with windows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Network {
     nodes: Vec<Node>,
     /// The constraints that are not in the matrix.
     edges: Vec<Edge>,
-    /// All distances, row by row, among the nodes that there were when it was made; see
-    /// [`project`](Network::project). Otherwise empty.
+    /// Distances between all nodes at the time of the last [`project`](Network::project), row by
+    /// row. Otherwise empty.
     matrix: Vec<Ticks>,
-    /// How many rows the matrix has.
+    /// Number of rows of the matrix.
     closed: usize,
     /// Annotations that unsettled happenings have set.
     pub(crate) marks: Vec<(u32, NodeId)>,
@@ -47,7 +47,7 @@ pub(crate) struct Network {
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// A lower bound that holds whatever else happens.
+    /// Lower bound of the node itself.
     floor: Ticks,
     earliest: Ticks,
     latest: Ticks,
@@ -66,7 +66,7 @@ struct Edge {
 pub(crate) struct Inconsistent;
 
 impl Network {
-    /// An empty network with these windows.
+    /// Returns an empty network with these windows.
     pub(crate) fn with_windows(windows: Option<Arc<Windows>>) -> Self {
         Self {
             windows,
@@ -74,7 +74,7 @@ impl Network {
         }
     }
 
-    /// An empty network with the same windows.
+    /// Returns an empty network with the same windows.
     pub(crate) fn emptied(&self) -> Self {
         Self::with_windows(self.windows.clone())
     }
@@ -91,20 +91,20 @@ impl Network {
         self.nodes[node as usize].earliest
     }
 
-    /// The earliest time at which all of its happenings can be over.
+    /// Returns the earliest time at which all of its happenings can be over.
     pub(crate) fn earliest_end(&self) -> Ticks {
         let times = self.nodes.iter().map(|node| node.earliest);
         times.max().unwrap_or(-NEVER)
     }
 
-    /// Adds a node that comes at given distances after others.
+    /// Adds a node that follows others at given distances.
     pub(crate) fn add_node(
         &mut self,
         earliest: Ticks,
         latest: Ticks,
         after: &[(NodeId, Ticks)],
     ) -> Result<NodeId, Inconsistent> {
-        // A plan of sixty thousand happenings that are all unsettled is beyond us anyway.
+        // Plans with sixty thousand unsettled happenings are out of reach anyway.
         let node = NodeId::try_from(self.nodes.len()).map_err(|_| Inconsistent)?;
         if node == SETTLED {
             return Err(Inconsistent);
@@ -130,7 +130,7 @@ impl Network {
         Ok(node)
     }
 
-    /// Adds `to >= from + distance`, where the network was consistent without it.
+    /// Adds `to >= from + distance` to a consistent network.
     pub(crate) fn add_edge(
         &mut self,
         from: NodeId,
@@ -142,14 +142,14 @@ impl Network {
         self.push(to, time, from)
     }
 
-    /// Moves a node to `time` or later, and all that this moves in turn. When the edges alone would
-    /// move `origin`, the new edge from there has closed a cycle that pushes itself.
+    /// Moves a node to `time` or later, and propagates the change. If the edges alone would move
+    /// `origin`, the new edge from there has closed a positive cycle.
     fn push(&mut self, node: NodeId, time: Ticks, origin: NodeId) -> Result<(), Inconsistent> {
         self.follow_edges(node, time, origin)?;
         self.enter_windows()
     }
 
-    /// For each node, whether some of the nodes `from` can push it.
+    /// Returns for each node whether some node of `from` can delay it.
     pub(crate) fn reach(&self, from: impl Iterator<Item = NodeId>) -> Vec<bool> {
         let mut waiting: Vec<NodeId> = from.collect();
         let mut is_reached = vec![false; self.nodes.len()];
@@ -163,14 +163,14 @@ impl Network {
                 let row = (0..).zip(self.row(node));
                 waiting.extend(row.filter(|(_, d)| **d > -NEVER).map(|(to, _)| to));
             }
-            // An end that leaves its window pushes the start.
+            // An end that moves to a later window delays its start.
             let windows = self.within.iter().filter(|within| within.last == node);
             waiting.extend(windows.map(|within| within.first));
         }
         is_reached
     }
 
-    /// The same along the edges, whatever the windows.
+    /// Propagates the change along the edges only, without the windows.
     fn follow_edges(
         &mut self,
         node: NodeId,
@@ -201,14 +201,14 @@ impl Network {
         Ok(())
     }
 
-    /// Makes a node happen no earlier than `time`.
+    /// Raises the lower bound of a node to `time`.
     pub(crate) fn delay(&mut self, node: NodeId, time: Ticks) -> Result<(), Inconsistent> {
         let floor = &mut self.nodes[node as usize].floor;
         *floor = (*floor).max(time);
         self.push(node, time, SETTLED)
     }
 
-    /// Makes a node happen no later than `time`.
+    /// Lowers the upper bound of a node to `time`.
     pub(crate) fn hurry(&mut self, node: NodeId, time: Ticks) -> Result<(), Inconsistent> {
         let place = &mut self.nodes[node as usize];
         place.latest = place.latest.min(time);
@@ -218,8 +218,8 @@ impl Network {
         Ok(())
     }
 
-    /// Notes that a node has set an annotation. Older nodes that are known to come before it need
-    /// not be remembered for that annotation.
+    /// Records that a node has set an annotation. Older nodes that are known to precede it are
+    /// dropped for that annotation.
     pub(crate) fn mark(&mut self, annotation: u32, node: NodeId) {
         let older = self.marks.iter().filter(|mark| mark.0 == annotation);
         let older: Vec<NodeId> = older.map(|mark| mark.1).collect();
@@ -236,7 +236,7 @@ impl Network {
         self.marks.push((annotation, node));
     }
 
-    /// Lets everything happen at its earliest time, and leave the network.
+    /// Settles all happenings at their earliest times and empties the network.
     pub(crate) fn settle_all(&mut self, settle: &mut dyn FnMut(u32, Ticks)) {
         for &(annotation, node) in &self.marks {
             settle(annotation, self.nodes[node as usize].earliest);
@@ -244,8 +244,8 @@ impl Network {
         *self = Self::with_windows(self.windows.take());
     }
 
-    /// Keeps only what the nodes `open` can still push. Hands the annotations and times of what is
-    /// settled to `settle`, and returns the new names of the nodes.
+    /// Keeps only the nodes that the nodes `open` can still delay. Passes the annotations and times
+    /// of the settled nodes to `settle`, and returns the new names of the nodes.
     pub(crate) fn settle(
         &mut self,
         open: impl Iterator<Item = NodeId>,
@@ -268,7 +268,7 @@ impl Network {
             *node = names[*node as usize];
             true
         });
-        // No kept node can push a settled one, so an edge with a kept source is kept whole.
+        // No kept node can delay a settled one, so an edge with a kept source is kept.
         self.edges.retain_mut(|edge| {
             let is_kept = is_kept[edge.from as usize];
             if is_kept {
@@ -286,15 +286,15 @@ impl Network {
         names
     }
 
-    /// The distances from a node to those in the matrix.
+    /// Returns the distances from a node to those in the matrix.
     fn row(&self, node: NodeId) -> &[Ticks] {
         let begin = node as usize * self.closed;
         &self.matrix[begin..begin + self.closed]
     }
 
-    /// Keeps only some nodes, with all distances that follow among them: what the network allows
-    /// these nodes stays the same. Returns the new names of the nodes; none of the others may be
-    /// marked, or be pushed to another window.
+    /// Keeps only some nodes, with all implied distances among them: the possible times of these
+    /// nodes stay the same. Returns the new names of the nodes. No other node may be marked, or be
+    /// pushed to another window.
     pub(crate) fn project(&mut self, kept: &[NodeId]) -> Vec<NodeId> {
         let all = self.all_distances();
         let count = self.nodes.len();
@@ -324,8 +324,7 @@ impl Network {
         names
     }
 
-    /// The distances between all nodes, row by row: those of the matrix, and what new nodes and
-    /// their edges add to them.
+    /// Returns the distances between all nodes, row by row, from the matrix and the edges.
     fn all_distances(&self) -> Vec<Ticks> {
         let count = self.nodes.len();
         let mut all = vec![-NEVER; count * count];
@@ -386,7 +385,7 @@ impl Network {
         all
     }
 
-    /// For each node, the least time it must come after `origin`; `-NEVER` if it need not.
+    /// Returns for each node its minimum distance after `origin`, or `-NEVER` if there is none.
     pub(crate) fn distances_from(&self, origin: NodeId) -> Vec<Ticks> {
         if self.is_closed() && self.closed > 0 {
             return self.row(origin).to_vec();
@@ -394,7 +393,7 @@ impl Network {
         debug_assert_eq!(self.closed, 0, "a matrix is asked when it is complete");
         let mut distances = vec![-NEVER; self.nodes.len()];
         distances[origin as usize] = 0;
-        // Edges stand in the order of happenings, so that few rounds are needed.
+        // Edges are in the order of happenings, so that few rounds are needed.
         let mut changed = true;
         while changed {
             changed = false;
@@ -410,18 +409,18 @@ impl Network {
         distances
     }
 
-    /// The least time by which one node must come after another, where all distances are known;
-    /// `-NEVER` if it need not.
+    /// Returns the minimum distance of one node after another if all distances are known, or
+    /// `-NEVER` if there is none.
     pub(crate) fn distance(&self, from: NodeId, to: NodeId) -> Ticks {
         self.matrix[from as usize * self.closed + to as usize]
     }
 
-    /// Whether all distances are known.
+    /// Returns `true` if all distances are known.
     pub(crate) fn is_closed(&self) -> bool {
         self.edges.is_empty() && self.closed == self.nodes.len()
     }
 
-    /// How late a node can be so that nothing it pushes is too late.
+    /// Returns the latest time of a node at which none of the nodes it delays is too late.
     pub(crate) fn latest_given(&self, distances: &[Ticks]) -> Ticks {
         let nodes = self.nodes.iter().zip(distances);
         nodes
@@ -431,27 +430,27 @@ impl Network {
             .unwrap_or(NEVER)
     }
 
-    /// All constraints between nodes, as `(from, to, distance)`.
+    /// Returns all constraints between nodes, as `(from, to, distance)`.
     pub(crate) fn edges(&self) -> impl Iterator<Item = (NodeId, NodeId, Ticks)> + '_ {
         self.edges
             .iter()
             .map(|edge| (edge.from, edge.to, edge.distance))
     }
 
-    /// The bounds of each node by itself: the time before which it cannot happen, whatever else
-    /// does, and the latest one.
+    /// Returns the bounds of each node itself: its lower bound, independent of other nodes, and its
+    /// latest time.
     pub(crate) fn bounds(&self) -> impl Iterator<Item = (Ticks, Ticks)> + '_ {
         self.nodes.iter().map(|node| (node.floor, node.latest))
     }
 
-    /// Gives back memory that was reserved for growth, which a stored network does not need.
+    /// Frees memory reserved for growth, which a stored network does not need.
     pub(crate) fn shrink(&mut self) {
         self.nodes.shrink_to_fit();
         self.edges.shrink_to_fit();
         self.marks.shrink_to_fit();
     }
 
-    /// An estimate of the memory it takes, in bytes.
+    /// Returns an estimate of the memory, in bytes.
     pub(crate) fn size(&self) -> usize {
         self.nodes.capacity() * size_of::<Node>()
             + self.edges.capacity() * size_of::<Edge>()

@@ -1,15 +1,15 @@
-//! When things can be true together at the earliest: a bound that proves that it is too late.
+//! Lower bounds on the times at which pairs of atoms can be true together, which prove that a goal
+//! is too late.
 //!
 //! `h²` of temporal planning (Haslum & Geffner, "Heuristic planning with time and resources", ECP
 //! 2001; the table is that of TGP, Smith & Weld, IJCAI 1999), over starts and ends: for each pair
-//! of atoms a time before which no sequence of choices has both. A robot that must carry something
-//! from here to there has not got it there before it has driven, which no bound on single facts
-//! sees.
+//! of atoms, a time before which no sequence of choices has both. For example, a robot cannot have
+//! delivered an object before it has driven, which no bound on single facts detects.
 //!
-//! The time of a pair is that of the later of the two happenings that brought the atoms about. A
-//! sequence of choices need not be in the order of time (see [`State`](super::state::State)), so a
-//! duration counts from when two atoms held together only if whatever brought them about must come
-//! before the start: if they interfere.
+//! The time of a pair is that of the later of the two happenings that made the atoms true. A
+//! sequence of choices need not be in chronological order (see [`State`](super::state::State)). So
+//! a duration counts from the time at which two atoms held together only if the happenings that
+//! made them true must come before the start, because they interfere.
 
 mod model;
 mod operators;
@@ -24,46 +24,47 @@ use super::time::{NEVER, Ticks};
 use model::{Kind, Model};
 use operators::start_of;
 
-/// How many actions under way are told to end before what they do not allow.
+/// Maximum number of running actions that are required to end before happenings that they exclude.
 const MOST_ENDED: usize = 16;
 
-/// Bounds of one problem; keeps its tables from one state to the next.
+/// Bounds of one problem. Reuses its tables from one state to the next.
 #[derive(Debug)]
 pub(crate) struct Pairs<'a> {
     compiled: &'a Compiled,
     graph: Graph,
     model: Model,
-    /// Nothing may happen later.
+    /// Latest time of a happening.
     pub(crate) horizon: Ticks,
-    /// The atoms of the model, and then one for each action under way in the state: that it has
-    /// ended.
+    /// Number of atoms: those of the model, then one for each running action in the state, which
+    /// states that the action has ended.
     count: usize,
-    /// For each pair the earliest time, by row.
+    /// For each pair, the earliest time, by row.
     time: Vec<Ticks>,
-    /// The time at which an atom of the state was brought about; [`NEVER`] if it does not hold.
+    /// The time at which an atom of the state became true; [`NEVER`] if it does not hold.
     since: Vec<Ticks>,
-    /// For each action and atom, when both are: the action under way since a start that came later
-    /// in the order of choices than the atom, or together with it.
+    /// For each action and atom, the earliest time of both if the action was started after the atom
+    /// became true, or together with it, in the order of choices.
     started: Vec<Ticks>,
-    /// The same for what was brought about after the start.
+    /// As [`started`](Self::started), for atoms that became true after the start.
     meanwhile: Vec<Ticks>,
     /// The needs of each operator in this state.
     needs: Vec<Vec<usize>>,
     /// The earliest time of each operator.
     begin: Vec<Ticks>,
-    /// In which round a row, or what is known of an action, was last lowered.
+    /// The round in which a row, or the data of an action, was last lowered.
     row_round: Vec<u32>,
     action_round: Vec<u32>,
     operator_round: Vec<u32>,
     round: u32,
-    /// For each atom when it can hold together with what an operator does.
+    /// For each atom, the earliest time at which it can hold together with the effects of an
+    /// operator.
     with: Vec<Ticks>,
     /// The number of pairs looked up so far.
     pub(crate) work: u64,
 }
 
 impl<'a> Pairs<'a> {
-    /// `None` if the problem is too large.
+    /// Returns `None` if the problem is too large.
     pub(crate) fn of(compiled: &'a Compiled) -> Option<Self> {
         let graph = Graph::of(compiled, None, &[]);
         let model = Model::of(compiled, &graph)?;
@@ -90,22 +91,23 @@ impl<'a> Pairs<'a> {
         })
     }
 
-    /// The number of timetables: literals that change at fixed times only.
+    /// Returns the number of timetables: literals that change at fixed times only.
     pub(crate) fn timetable_count(&self) -> usize {
         self.graph.timetable.len()
     }
 
-    /// Takes the literal of a timetable to be true at all times, and returns when it is.
+    /// Assumes that the literal of a timetable is always true, and returns the spans in which it is
+    /// true.
     pub(crate) fn ignore_timetable(&mut self, number: usize) -> Vec<(Ticks, Ticks)> {
         self.graph.forget_timetable(number)
     }
 
-    /// Takes that back.
+    /// Reverts [`ignore_timetable`](Self::ignore_timetable).
     pub(crate) fn restore_timetable(&mut self, number: usize, spans: Vec<(Ticks, Ticks)>) {
         self.graph.timetable[number] = spans;
     }
 
-    /// The literal of a timetable, and when it last becomes false.
+    /// Returns the literal of a timetable, and the time at which it last becomes false.
     pub(crate) fn deadline(
         &self,
         number: usize,
@@ -115,8 +117,9 @@ impl<'a> Pairs<'a> {
         Some((self.graph.timetable_literal(number)?, end))
     }
 
-    /// The parts of the goal that come too late by themselves, or, if there are none, those that
-    /// come too late together with another; after a question that was answered with yes.
+    /// Returns the parts of the goal that are too late by themselves, or, if there are none, those
+    /// that are too late together with another. Valid after [`is_dead_end`](Self::is_dead_end) has
+    /// returned `true`.
     pub(crate) fn missing_goals(&self) -> Vec<Missing> {
         let goal = &self.model.goal;
         let is_late = |one: usize, other: usize| self.time[one * self.count + other] >= NEVER;
@@ -140,8 +143,8 @@ impl<'a> Pairs<'a> {
         literals.map(Missing::Literal).collect()
     }
 
-    /// Whether no plan can begin like this: the goal, with all that is under way over, comes too
-    /// late, or never.
+    /// Returns `true` if no plan has this beginning: the goal, with all running actions ended, is
+    /// too late or unreachable.
     pub(crate) fn is_dead_end(&mut self, state: &State) -> bool {
         let ended = self.prepare(state);
         loop {
@@ -176,8 +179,8 @@ impl<'a> Pairs<'a> {
         pairs.any(|(one, other)| is_late(one, other))
     }
 
-    /// Puts the state into the tables. Returns the actions under way with the atoms that they have
-    /// ended.
+    /// Initializes the tables from the state. Returns the running actions with the atoms which
+    /// state that they have ended.
     fn prepare(&mut self, state: &State) -> Vec<(u32, usize)> {
         let mut ended: Vec<(u32, usize)> = Vec::new();
         for open in &state.open {
@@ -242,7 +245,7 @@ impl<'a> Pairs<'a> {
         ended
     }
 
-    /// Whether something has changed of what an operator reads.
+    /// Returns `true` if the inputs of an operator have changed.
     fn is_due(&self, number: usize) -> bool {
         let last = self.operator_round[number];
         let needs = &self.needs[number];
@@ -260,7 +263,7 @@ impl<'a> Pairs<'a> {
                 .any(|&need| self.row_round[need] >= last)
     }
 
-    /// The earliest time at which all of these can hold.
+    /// Returns the earliest time at which all of these atoms can hold.
     fn together(&self, atoms: &[usize]) -> Ticks {
         let mut time = self.compiled.now;
         for (place, &one) in atoms.iter().enumerate() {
@@ -272,8 +275,8 @@ impl<'a> Pairs<'a> {
         time
     }
 
-    /// Adds the effects of the operator, together with everything that may persist. Whether
-    /// anything changed.
+    /// Adds the effects of the operator, together with all atoms that may persist. Returns `true`
+    /// if anything changed.
     fn fire(&mut self, state: &State, ended: &[(u32, usize)], number: usize) -> bool {
         let Some(begin) = self.earliest(state, number) else {
             return false;
@@ -333,7 +336,7 @@ impl<'a> Pairs<'a> {
         true
     }
 
-    /// Lowers the pairs of an atom with all others.
+    /// Lowers the times of an atom's pairs with all others.
     fn lower_row(&mut self, one: usize, with: &[Ticks]) -> bool {
         let mut changed = false;
         for (other, &time) in with.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! Why the goal is out of reach of a relaxation: in words, with the deadlines that are to blame.
+//! Explanation of an unreachable goal: the missing parts, and the deadlines that make them
+//! unreachable.
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -11,19 +12,19 @@ use super::relaxed::{Missing, Relaxed};
 use super::root::root;
 use super::time::Ticks;
 
-/// The most deadlines that are looked at one by one.
+/// Maximum number of deadlines that are tested one by one.
 const MOST_SUSPECTS: usize = 24;
 
 /// The names used in a proof.
 #[derive(Debug)]
 pub(crate) struct Names {
-    /// By position in [`Compiled::facts`]; empty where no proof mentions it.
+    /// By position in [`Compiled::facts`]; empty for facts that no proof mentions.
     facts: Vec<String>,
 }
 
 impl Names {
-    /// The names of what the goal reads and timed initials change. `task` is the one that was
-    /// grounded.
+    /// Returns the names of the facts that the goal reads and timed initials change. `task` is the
+    /// grounded task.
     pub(crate) fn of(task: &Task, compiled: &Compiled) -> Self {
         let mut facts = vec![String::new(); compiled.facts.len()];
         let mut name = |fact: u32| {
@@ -55,8 +56,8 @@ impl Names {
     }
 }
 
-/// A proof that no plan exists, if timed initials take a part of the goal away for good, or if the
-/// goal is out of reach from the beginning even when nothing that was reached is ever lost.
+/// Returns a proof that no plan exists, if timed initials make a part of the goal false for good,
+/// or if the goal is unreachable from the initial state even when reached facts are never lost.
 pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof> {
     let uncompressed: Option<Compressibility> = None;
     let initial = root(compiled);
@@ -92,8 +93,8 @@ pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof>
     ))
 }
 
-/// A proof that no plan exists, if two parts of the goal cannot hold together in time. It names
-/// the deadlines that are to blame as long as `goes_on` says so.
+/// Returns a proof that no plan exists, if two parts of the goal cannot hold together in time. The
+/// search for the responsible deadlines stops when `goes_on` returns `false`.
 pub(crate) fn pairs_proof(
     names: &Names,
     compiled: &Compiled,
@@ -138,7 +139,8 @@ pub(crate) fn pairs_proof(
     ))
 }
 
-/// The reason: what is missing, and the deadlines without which it would be within reach.
+/// Returns the proof: the missing parts of the goal, and the deadlines without which it would be
+/// reachable.
 fn explained(
     names: &Names,
     compiled: &Compiled,
@@ -177,15 +179,16 @@ fn explained(
     }
 }
 
-/// The number as a decimal if it has at most nine digits after the point, else as a fraction.
+/// Returns the number as a decimal if it has at most nine digits after the point, else as a
+/// fraction.
 fn exact(number: &Rational) -> String {
     let decimals = (3..=9).map(|digits| number.to_decimal(digits));
     let mut decimals = decimals.filter(|text| text.parse().as_ref() == Ok(number));
     decimals.next().unwrap_or_else(|| number.to_string())
 }
 
-/// A smallest set of deadlines without which the goal would be within reach, in the sense that
-/// none of them can be left out; one alone if possible.
+/// Returns a minimal set of deadlines without which the goal would be reachable: none of them can
+/// be omitted. A single deadline is preferred.
 fn guilty(
     suspects: &[Option<(Literal, Ticks)>],
     fails_without: &mut dyn FnMut(&[usize]) -> bool,

@@ -1,17 +1,19 @@
-//! Better plans from the plan that was found: parts of it are done otherwise (large neighbourhood
-//! search; Shaw, CP 1998).
+//! Improvement of the best plan by replacing parts of it (large neighbourhood search; Shaw, CP
+//! 1998).
 //!
-//! Three things are tried in turn, at random but alike in each run:
+//! Three methods are used in turn, at random but with the same sequence in each run:
 //!
-//! - `scheduling`: the same actions in another order, by a search that ends when there is no better one.
-//! - `schedule`: the same actions in another order. The order of choices decides what waits for
-//!   what, and so when the plan ends.
-//! - `removal` and `repair`: actions are taken out, and a search among what is left of the plan puts
-//!   others in.
+//! - `scheduling`: the same actions in another order, by a search that ends when there is no better
+//!   one.
+//! - `schedule`: the same actions in another order. The order of choices determines the waiting
+//!   times between actions, and so the end of the plan.
+//! - `removal` and `repair`: actions are removed, and a search around the remaining plan inserts
+//!   others.
 //!
-//! A plan is kept if it is no worse than the one before. Now and then one is kept that is a little
-//! worse than the best one (record-to-record travel; Dueck, Journal of Computational Physics 104,
-//! 1993), which is gone back to after a while. The judge sees each that is better than all before.
+//! A plan is kept if it is no worse than the one before. From time to time, a plan is kept that is
+//! a little worse than the best one (record-to-record travel; Dueck, Journal of Computational
+//! Physics 104, 1993); after a while, the search returns to the best one. The validator checks each
+//! plan that is better than all before.
 
 mod incumbent;
 mod random;
@@ -37,24 +39,24 @@ use schedule::Schedule;
 use scheduling::Scheduling;
 use sequence::{Item, Kind, Scene, items_of};
 
-/// Counts work, and asks now and then whether to go on.
+/// Counter of work that regularly asks whether to continue.
 pub(crate) struct Ticker<'a> {
-    /// What one estimate counts for.
+    /// Work units of one estimate.
     pub(crate) weight: u64,
-    /// What was done so far.
+    /// Work done so far.
     pub(crate) work: u64,
-    /// How many states were estimated.
+    /// Number of states estimated.
     pub(crate) evaluated: u64,
-    /// Asked with the work done so far, and the number of states.
+    /// Called with the work done so far, and the number of states.
     pub(crate) goes_on: &'a mut dyn FnMut(u64, u64) -> bool,
-    /// Whether it was told to stop.
+    /// `true` once `goes_on` has returned `false`.
     pub(crate) is_stopped: bool,
 }
 
-/// One turn in so many goes on from a plan that is a little worse than the best one.
+/// One turn in this many may continue from a plan that is a little worse than the best one.
 const LENIENT_ONCE_IN: usize = 4;
 
-/// What a step counts for, beside what an operator of an estimate does.
+/// Work units of a step, relative to those of an operator in an estimate.
 const STEP_WORK: u64 = 200;
 
 impl Ticker<'_> {
@@ -78,38 +80,38 @@ impl Ticker<'_> {
     }
 }
 
-/// See the module.
+/// Plan improver by large neighbourhood search.
 pub(crate) struct Refiner<'a> {
     compiled: &'a Compiled,
     stepper: Stepper<'a>,
     relaxed: Relaxed<'a>,
     random: Random,
     compresses: Option<Compressibility>,
-    /// The plan that is changed; for a while it may be a little worse than the best one.
+    /// The current plan, which may temporarily be a little worse than the best one.
     incumbent: Option<Incumbent>,
     /// The best plan's worth and items.
     best: Option<(Worth, Vec<Item>)>,
-    /// What looks for better orders of its actions, and whether that has been tried.
+    /// The search for better orders of the best plan's actions, and whether it has been created.
     scheduling: Option<Scheduling<'a>>,
     is_scheduled: bool,
-    /// The work on that since it began, or last found something, and how much it may come to.
+    /// Work of that search since its beginning or its last improvement, and the limit on it.
     scheduled_for: u64,
     scheduling_patience: u64,
-    /// How many turns have passed since it was found, or gone back to.
+    /// Number of turns since the best plan was found, or was returned to.
     idle: u64,
-    /// How many turns have passed since it was found.
+    /// Number of turns since the best plan was found.
     fruitless: u64,
-    /// The costs of the actions, in whole numbers.
+    /// The costs of the actions, as integers.
     base_costs: Vec<u32>,
-    /// Their durations, the mean being four.
+    /// The durations of the actions, scaled to a mean of four.
     durations: Vec<u32>,
-    /// What other orders have taken so far, and what repairs have.
+    /// Work spent so far, by method.
     work: Spent,
-    /// How much memory a repair may take, in bytes.
+    /// Memory limit for a repair, in bytes.
     most_memory: usize,
 }
 
-/// Work, by what it was spent on.
+/// Work by method.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spent {
     scheduling: u64,
@@ -118,7 +120,7 @@ struct Spent {
 }
 
 impl<'a> Refiner<'a> {
-    /// `seed`: which numbers it draws.
+    /// Creates a refiner; `seed` is the random seed.
     pub(crate) fn new(
         compiled: &'a Compiled,
         compresses: Option<Compressibility>,
@@ -162,17 +164,18 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// From now on a repair gives up when its nodes take more than so many bytes.
+    /// Limits the memory of the nodes of each later repair, in bytes.
     pub(crate) fn limit_memory(&mut self, most: usize) {
         self.most_memory = most;
     }
 
-    /// What one estimate comes to.
+    /// Returns the work units of one estimate.
     pub(crate) fn weight(&self) -> u64 {
         self.relaxed.weight()
     }
 
-    /// Goes on from the plan of these choices, if it is better than its own or there is none.
+    /// Continues from the plan of these choices, if it is better than the refiner's best plan or
+    /// there is none.
     pub(crate) fn take(&mut self, steps: &[Step], ticker: &mut Ticker<'_>) {
         let Some(items) = items_of(self.compiled, steps) else {
             return;
@@ -188,18 +191,18 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// Whether there is a plan that it can change.
+    /// Returns `true` if there is a plan to improve.
     pub(crate) fn has_plan(&self) -> bool {
         self.incumbent.is_some() && self.best.is_some()
     }
 
-    /// The judge does not accept the plan: goes on from another one.
+    /// Discards the plan because the validator has rejected it.
     pub(crate) fn forget(&mut self) {
         self.incumbent = None;
         self.best = None;
     }
 
-    /// Notes that the plan is the best one.
+    /// Records the current plan as the best one.
     fn keep_best(&mut self) {
         let own = self.incumbent.as_ref();
         self.best = own.map(|own| (own.worth.clone(), own.items.clone()));
@@ -207,7 +210,7 @@ impl<'a> Refiner<'a> {
         self.schedule_from_best();
     }
 
-    /// How long it should take for each unit of time of another search.
+    /// Returns the share of time for refinement, relative to another search.
     pub(crate) fn share(&self) -> u64 {
         let tuning = &self.compiled.tuning;
         let spent = self.work.rescheduling.saturating_add(self.work.repair);
@@ -218,12 +221,13 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// Tries one change; the choices of a plan that is better than all before, if that is one.
+    /// Tries one change. Returns the choices of the new plan if it is better than all before.
     pub(crate) fn turn(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Step>> {
         let (best, items) = self.best.as_ref()?;
         let done_before = ticker.work;
         if IS_WHOLE && self.is_turn_to_schedule() {
-            // What the others draw and count is theirs, so that they come to the same plans where it finds nothing.
+            // This search does not use the random numbers and counters of the other methods, so
+            // that these find the same plans where it finds nothing.
             let bound = best.clone();
             let items = self.schedule(ticker);
             let done = ticker.work - done_before;
@@ -254,7 +258,8 @@ impl<'a> Refiner<'a> {
         self.accept(items, &bound, ticker)
     }
 
-    /// Goes on from this plan, if it is one and within the bound; its choices, if it is better than all before.
+    /// Continues from this plan if it is valid and within the bound. Returns its choices if it is
+    /// better than all before.
     fn accept(
         &mut self,
         items: Option<Vec<Item>>,
@@ -281,8 +286,8 @@ impl<'a> Refiner<'a> {
         self.incumbent.as_ref().map(|own| own.steps.clone())
     }
 
-    /// Whether other orders are tried next. They take much less time than repairs, and seldom
-    /// change what the same actions cost.
+    /// Returns `true` if other orders are tried next. They take much less time than repairs, and
+    /// seldom change the cost of the same actions.
     fn is_turn_to_reschedule(&self) -> bool {
         let tuning = &self.compiled.tuning;
         if !tuning.uses(Technique::Repair) {
@@ -366,8 +371,8 @@ impl<'a> Refiner<'a> {
         Some(items)
     }
 
-    /// Leaves out actions that the plan works without, and what is not possible without them
-    /// (action elimination; Nakhost & Müller, ICAPS 2010).
+    /// Removes actions that the plan does not need, and the actions that depend on them (action
+    /// elimination; Nakhost & Müller, ICAPS 2010).
     fn leave_out_needless(&mut self, ticker: &mut Ticker<'_>) {
         let Some(incumbent) = self.incumbent.take() else {
             return;
@@ -424,7 +429,7 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// The scene after these items.
+/// Returns the scene after these items.
 fn scene_at(
     compiled: &Compiled,
     stepper: &mut Stepper<'_>,
@@ -439,8 +444,8 @@ fn scene_at(
     Some(scene)
 }
 
-/// The latest time at which a plan may end that begins like this and is to be better than `worth`,
-/// or as good.
+/// Returns the latest time at which a plan with this beginning may end if it must be better than
+/// `worth`, or equally good.
 fn latest_end(compiled: &Compiled, worth: &Worth, may_equal: bool, state: &State) -> Option<Ticks> {
     let Some(metric) = &compiled.metric else {
         return Some(worth.end - i64::from(!may_equal));

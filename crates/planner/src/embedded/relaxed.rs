@@ -1,12 +1,11 @@
-//! The heuristic: how many steps a plan takes when nothing that was reached is ever lost.
+//! Heuristic: the number of steps of a plan if reached facts are never lost.
 //!
-//! Facts, their negations, numeric tests and the like are *propositions*. The cost of a
-//! proposition is the sum over what its cheapest achiever needs (`h_add`, Bonet & Geffner 2001); a
-//! relaxed plan is read off the cheapest achievers (Keyder & Geffner 2008, "`FF(h_a)`"), and its
-//! first steps are the preferred ones (Hoffmann & Nebel 2001). A numeric test that adding up
-//! changes can reach costs as many repetitions as the gap asks for (Scala et al. 2016); other
-//! numeric effects are taken to reach any value at once. So a state without relaxed plan has no
-//! plan.
+//! Facts, their negations, numeric tests and the like are *propositions*. The cost of a proposition
+//! is the sum over the preconditions of its cheapest achiever (`h_add`, Bonet & Geffner 2001). A
+//! relaxed plan consists of the cheapest achievers (Keyder & Geffner 2008, "`FF(h_a)`"), and its
+//! first steps are the preferred ones (Hoffmann & Nebel 2001). A numeric test that additive changes
+//! can reach costs as many repetitions as its gap requires (Scala et al. 2016); other numeric
+//! effects are assumed to reach any value at once. So a state without relaxed plan has no plan.
 
 mod changes;
 mod consumables;
@@ -45,31 +44,31 @@ pub(crate) use plan::OVERDRAWN;
 use resources::Resources;
 pub(crate) use resources::reservoirs;
 
-/// Beyond this, costs are all alike.
+/// Upper limit of costs.
 const MOST: u32 = 1 << 15;
 
-/// Not reached.
+/// Cost of an unreached proposition.
 const UNREACHED: u32 = u32::MAX;
 
-/// No operator: true in the state.
+/// Achiever of a proposition that is true in the state.
 const NO_OPERATOR: u32 = u32::MAX;
 
 /// The result of one heuristic evaluation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Estimate {
-    /// How many steps the relaxed plan has; what they cost, in a weighing search.
+    /// Number of steps of the relaxed plan, or their cost in a weighted search.
     pub(crate) steps: u32,
-    /// The steps whose conditions hold in the state; in time they may still be impossible.
+    /// The steps whose conditions hold in the state. They may still be impossible in time.
     pub(crate) applicable: Vec<Step>,
     /// Those among them that are in the relaxed plan.
     pub(crate) preferred: Vec<Step>,
-    /// The literals that the relaxed plan brings about, if they were asked for.
+    /// The literals that the relaxed plan achieves, if they were requested.
     pub(crate) subgoals: Vec<Literal>,
-    /// The actions that start in the relaxed plan, if they were asked for.
+    /// The actions that start in the relaxed plan, if they were requested.
     pub(crate) actions: Vec<u32>,
 }
 
-/// Something that is out of reach.
+/// An unreachable part of the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Missing {
     Literal(Literal),
@@ -77,19 +76,19 @@ pub(crate) enum Missing {
     Other,
 }
 
-/// Evaluates states; keeps its tables from one to the next.
+/// Evaluator of states. Reuses its tables from one state to the next.
 #[derive(Debug)]
 pub(crate) struct Relaxed<'a> {
     compiled: &'a Compiled,
     graph: Graph,
     cost: Vec<u32>,
     achiever: Vec<u32>,
-    /// How often the achiever must be repeated.
+    /// Number of times the achiever must be repeated.
     repetitions: Vec<u32>,
-    /// How many preconditions an operator waits for.
+    /// Number of preconditions that an operator waits for.
     missing: Vec<u32>,
     operator_cost: Vec<u32>,
-    /// What each operator counts for.
+    /// Cost of each operator.
     own_cost: Vec<u32>,
     /// The effects of each operator.
     reaches: Vec<Reaches>,
@@ -101,25 +100,26 @@ pub(crate) struct Relaxed<'a> {
     deadlines: Deadlines,
     resources: Resources,
     consumables: Consumables,
-    /// Nothing may happen later.
+    /// Latest time of a happening.
     pub(crate) horizon: Ticks,
-    /// Whether what happens next happens no earlier than what was chosen last.
+    /// `true` if later choices happen no earlier.
     pub(crate) is_chronological: bool,
-    /// Whether an estimate lists what its relaxed plan brings about.
+    /// `true` if estimates list the literals that their relaxed plans achieve.
     pub(crate) lists_subgoals: bool,
-    /// Whether it serves repairs: an estimate stops where all of the goal is reached, so that not all
+    /// `true` for repairs: an estimate stops when the whole goal is reached, so that not all
     /// applicable steps are listed, and lists the actions of its relaxed plan.
     pub(crate) serves_repairs: bool,
 }
 
 impl<'a> Relaxed<'a> {
-    /// Actions that can be compressed at least as safely as `compresses` count as one step.
+    /// Creates an evaluator. Actions that are at least as safe to compress as `compresses` count as
+    /// one step.
     pub(crate) fn new(compiled: &'a Compiled, compresses: Option<Compressibility>) -> Self {
         Self::over(compiled, Graph::of(compiled, compresses, &[]))
     }
 
-    /// The same with macro-operators in place of the starts of their envelopes. `None` if the goal is out of
-    /// reach then.
+    /// As [`new`](Self::new), with macro-operators in place of the starts of their envelopes.
+    /// Returns `None` if the goal is then unreachable.
     pub(crate) fn with_macros(
         compiled: &'a Compiled,
         compresses: Option<Compressibility>,
@@ -157,14 +157,13 @@ impl<'a> Relaxed<'a> {
         }
     }
 
-    /// From now on a step counts for what it costs, not for one.
+    /// Weights each step by its cost instead of one.
     pub(crate) fn weigh(&mut self, step_costs: &StepCosts) {
         self.graph.weigh(step_costs);
         self.own_cost = own_costs(&self.graph);
     }
 
-    /// From now on the starts and ends of these actions count for so much, instead of what they
-    /// count for by themselves.
+    /// Sets the costs of the starts and ends of these actions.
     pub(crate) fn set_costs(&mut self, costs: impl Iterator<Item = (u32, u32)>) {
         for (action, cost) in costs {
             let (start, end) = self.graph.operators_of(action);
@@ -176,7 +175,7 @@ impl<'a> Relaxed<'a> {
         }
     }
 
-    /// The cost of an action by itself, start and end.
+    /// Returns the own cost of an action, start and end.
     pub(crate) fn cost_of(&self, action: u32) -> u32 {
         let (start, end) = self.graph.operators_of(action);
         let cost = |operator: u32| {
@@ -191,29 +190,30 @@ impl<'a> Relaxed<'a> {
         self.graph.leave_out(self.compiled, is_left_out);
     }
 
-    /// From now on, what a relaxed plan uses up is counted, and filled up.
+    /// Enables the accounting of resources: relaxed plans replenish the resources that they use up.
     pub(crate) fn count_resources(&mut self) {
         self.resources = Resources::of(self.compiled, &self.graph);
     }
 
-    /// From now on, a relaxed plan draws on what is never filled up.
+    /// Enables the accounting of consumables: relaxed plans use resources that are never
+    /// replenished.
     pub(crate) fn count_consumables(&mut self) {
         self.consumables = Consumables::of(self.compiled, &self.graph);
     }
 
-    /// The number of operators.
+    /// Returns the number of operators.
     pub(crate) fn size(&self) -> u64 {
         self.graph.operators.len() as u64
     }
 
-    /// The number of operators, and of all that they change.
+    /// Returns the number of operators and of their effects.
     pub(crate) fn weight(&self) -> u64 {
         let graph = &self.graph;
         (graph.operators.len() + graph.effects.len() + graph.gains.len()) as u64
     }
 
-    /// Whether nothing that the end of the action adds is true, or can become true before it, in a
-    /// state in which one instance of the action is under way.
+    /// Returns `true` if exactly one instance of the action is running, and no fact that its end
+    /// adds is true or can become true before it.
     pub(crate) fn is_end_the_only_way(&mut self, state: &State, action: u32) -> bool {
         let instances = state.open.iter().filter(|open| open.action == action);
         if instances.count() != 1 {
@@ -231,8 +231,8 @@ impl<'a> Relaxed<'a> {
         !is_true(&self.cost)
     }
 
-    /// The parts of the goal that are out of reach, and the ends of what is under way; after an
-    /// evaluation that found nothing.
+    /// Returns the unreachable parts of the goal, and the unreachable ends of running actions.
+    /// Valid after an evaluation that returned `None`.
     pub(crate) fn missing_goals(&self) -> Vec<Missing> {
         let goals = self.graph.goal.iter();
         let goals = goals.filter(|&&goal| self.cost[goal as usize] == UNREACHED);
@@ -248,8 +248,8 @@ impl<'a> Relaxed<'a> {
             .collect()
     }
 
-    /// A literal of the goal that changes at fixed times only and is false in the end, and when it
-    /// last becomes so.
+    /// Returns a literal of the goal that changes at fixed times only and is false at the end, and
+    /// the time at which it last becomes false.
     pub(crate) fn lost_goal(&self) -> Option<(Literal, Ticks)> {
         let mut goals = self.compiled.goal.literals.iter();
         goals.find_map(|&literal| {
@@ -258,19 +258,20 @@ impl<'a> Relaxed<'a> {
         })
     }
 
-    /// The number of timetables: literals that change at fixed times only.
+    /// Returns the number of timetables: literals that change at fixed times only.
     pub(crate) fn timetable_count(&self) -> usize {
         self.graph.timetable.len()
     }
 
-    /// Takes a literal to be true at all times, and says when it last would have become false.
+    /// Assumes that the literal of a timetable is always true. Returns the literal and the time at
+    /// which it last becomes false.
     pub(crate) fn ignore_timetable(&mut self, number: usize) -> Option<(Literal, Ticks)> {
         let spans = self.graph.forget_timetable(number);
         let end = last_end(&spans)?;
         Some((self.graph.timetable_literal(number)?, end))
     }
 
-    /// The estimate, or `None` if even the relaxed goal is out of reach.
+    /// Returns the estimate, or `None` if even the relaxed goal is unreachable.
     pub(crate) fn evaluate(&mut self, state: &State) -> Option<Estimate> {
         if !self.prepare(state) {
             self.buckets.iter_mut().for_each(Vec::clear);
@@ -305,8 +306,8 @@ impl<'a> Relaxed<'a> {
         Some(estimate)
     }
 
-    /// The steps that are applicable, without an estimate; `None` if what is under way cannot end
-    /// in time, as far as that was looked at.
+    /// Returns the applicable steps without an estimate, or `None` if the running actions cannot
+    /// end in time, according to incomplete checks.
     pub(crate) fn list(&mut self, state: &State) -> Option<Estimate> {
         let is_in_time = self.prepare(state);
         if is_in_time {
@@ -318,8 +319,8 @@ impl<'a> Relaxed<'a> {
         is_in_time.then_some(estimate)
     }
 
-    /// Costs of what holds in the state. Whether all that is under way may end in time, as far as
-    /// that was looked at.
+    /// Initializes the costs of the propositions that hold in the state. Returns `false` if some
+    /// running action cannot end in time, according to incomplete checks.
     fn prepare(&mut self, state: &State) -> bool {
         let mut is_in_time = true;
         let spans = self
@@ -397,7 +398,8 @@ impl<'a> Relaxed<'a> {
     }
 }
 
-/// The effects of an operator, by their places in the graph: all that is needed for it when it is reached.
+/// The effects of an operator, by their positions in the graph, with the data needed when it is
+/// reached.
 #[derive(Clone, Copy, Debug)]
 struct Reaches {
     effects: [u32; 2],
@@ -426,14 +428,14 @@ fn own_costs(graph: &Graph) -> Vec<u32> {
         .collect()
 }
 
-/// The time at which the literal of a timetable last becomes false.
+/// Returns the time at which the literal of a timetable last becomes false.
 pub(crate) fn last_end(spans: &[(Ticks, Ticks)]) -> Option<Ticks> {
     let ends = spans.iter().map(|span| span.1);
     ends.filter(|&end| end < NEVER).max()
 }
 
-/// The highest levels of exclusive fluents whose values depend on times. No other action reads them before the
-/// ends of the running ones.
+/// Returns the highest levels of exclusive fluents whose values depend on times. No other action
+/// reads them before the ends of the running ones.
 fn highest_levels(compiled: &Compiled, state: &State) -> Vec<(u32, Rational)> {
     let courses = state.symbolic.iter().flat_map(|symbolic| &symbolic.courses);
     let exclusive = courses.filter(|(fluent, _)| compiled.exclusive_fluents[*fluent as usize]);
@@ -444,7 +446,7 @@ fn highest_levels(compiled: &Compiled, state: &State) -> Vec<(u32, Rational)> {
     levels.collect()
 }
 
-/// Whether times decide the test; then it is taken for granted.
+/// Returns `true` if the test depends on times. It is then assumed to hold.
 fn depends_on_times(compiled: &Compiled, test: u32, state: &State) -> bool {
     let Some(symbolic) = &state.symbolic else {
         return false;

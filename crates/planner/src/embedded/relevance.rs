@@ -1,12 +1,13 @@
-//! Which actions can matter to the goal at all.
+//! Relevance of actions to the goal.
 //!
-//! An action matters if it changes a fact or a fluent that the goal reads, or a condition of an
-//! action that matters, and so on backwards. A plan stays a plan without all others: nothing that
-//! is left reads what they change (Nebel, Dimopoulos & Koehler, "Ignoring irrelevant facts and
-//! operators in plan generation", ECP 1997; this part loses nothing). Where an action builds some
-//! thing out of any two others, most of its instances do not matter.
+//! An action is relevant if it changes a fact or a fluent that the goal reads, or that a condition
+//! of a relevant action reads. A plan stays valid without the irrelevant actions, since the
+//! remaining steps do not read their effects (Nebel, Dimopoulos & Koehler, "Ignoring irrelevant
+//! facts and operators in plan generation", ECP 1997; this part loses no plans). For example, if an
+//! action builds an object from any two others, most of its instances are irrelevant.
 //!
-//! Timed initials make no difference: they happen in every plan, and the goal counts after all of them.
+//! Timed initials need no special treatment: they happen in every plan, and the goal counts after
+//! all of them.
 
 use elbowroom_model::ground::{
     Action, Body, Change, Condition, Effect, Expression, FactId, FluentId, SnapAction,
@@ -15,7 +16,7 @@ use elbowroom_model::problem::{self, UpdateOperator};
 use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Situation, Task};
 
-/// Leaves out the actions that can neither matter to the goal, nor make the metric better.
+/// Removes the actions that are irrelevant to the goal and cannot improve the metric.
 pub(crate) fn keep_relevant(task: &Task, grounding: &mut Grounding, situation: &Situation) {
     let mut relevance = Relevance::of(grounding);
     relevance.read(&grounding.goal);
@@ -38,7 +39,7 @@ pub(crate) fn keep_relevant(task: &Task, grounding: &mut Grounding, situation: &
         .retain(|_| is_relevant.next().is_some_and(|&is_relevant| is_relevant));
 }
 
-/// Whether a metric is the greater, the greater its fluents are.
+/// Returns `true` if a metric grows monotonically with its fluents.
 fn is_growing(expression: &problem::Expression) -> bool {
     use problem::Expression as E;
     match expression {
@@ -54,8 +55,8 @@ fn is_growing(expression: &problem::Expression) -> bool {
     }
 }
 
-/// Whether an action changes numbers so that a metric could become better; one that `only_grows`
-/// does not where something is added to it.
+/// Returns `true` if an action changes numbers such that the metric could improve. If `only_grows`,
+/// additions do not improve the metric.
 fn changes_numbers(action: &Action, only_grows: bool) -> bool {
     let matters = |effect: &Effect| match &effect.change {
         Change::Update {
@@ -73,7 +74,7 @@ fn changes_numbers(action: &Action, only_grows: bool) -> bool {
     has_flows || snaps(action).any(|snap| snap.effects.iter().any(matters))
 }
 
-/// The happenings of an action.
+/// Returns the happenings of an action.
 fn snaps(action: &Action) -> impl Iterator<Item = &SnapAction> {
     let (first, second) = match &action.body {
         Body::Instantaneous(body) => (body, None),
@@ -82,10 +83,10 @@ fn snaps(action: &Action) -> impl Iterator<Item = &SnapAction> {
     [Some(first), second].into_iter().flatten()
 }
 
-/// A search backwards from the goal.
+/// Backward search from the goal.
 struct Relevance {
     is_relevant: Vec<bool>,
-    /// For each fact and each fluent the actions that change it.
+    /// For each fact and each fluent, the actions that change it.
     of_fact: Vec<Vec<usize>>,
     of_fluent: Vec<Vec<usize>>,
     is_read: (Vec<bool>, Vec<bool>),
@@ -129,7 +130,7 @@ impl Relevance {
         }
     }
 
-    /// Something that matters reads the condition.
+    /// Marks the facts and fluents of a condition as relevant.
     fn read(&mut self, condition: &Condition) {
         let (facts, fluents) = (&mut self.facts, &mut self.fluents);
         condition.visit_facts(&mut |fact| facts.push(fact));
@@ -170,7 +171,7 @@ impl Relevance {
         }
     }
 
-    /// Spreads relevance: whatever a relevant part depends on is relevant.
+    /// Propagates relevance to everything that a relevant part depends on.
     fn spread(&mut self, grounding: &Grounding) {
         let mut rules: Vec<Vec<usize>> = Vec::new();
         for (number, rule) in grounding.rules.iter().enumerate() {
@@ -213,7 +214,7 @@ fn take(lists: &mut [Vec<usize>], place: usize) -> Vec<usize> {
     lists.get_mut(place).map(std::mem::take).unwrap_or_default()
 }
 
-/// Sets a mark; whether it is new.
+/// Sets a mark. Returns `true` if it is new.
 fn mark(marks: &mut Vec<bool>, place: usize) -> bool {
     if marks.len() <= place {
         marks.resize(place + 1, false);

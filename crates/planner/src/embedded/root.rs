@@ -1,4 +1,4 @@
-//! The state in which the search begins.
+//! The initial state of the search.
 
 use super::compile::Compiled;
 use super::expressions::Form;
@@ -6,7 +6,7 @@ use super::network::Network;
 use super::state::{Open, State};
 use super::symbolic;
 
-/// The state of the situation, with what is under way.
+/// Returns the state of the situation, with its running actions.
 pub(crate) fn root(compiled: &Compiled) -> State {
     let beginning = &compiled.beginning;
     let mut state = State::new(compiled, &beginning.facts, beginning.values.clone());
@@ -30,7 +30,8 @@ pub(crate) fn root(compiled: &Compiled) -> State {
                 }
             }
             for (fluent, rate) in state.open[place].flows.clone() {
-                // Without a value there is nothing to change; then nothing is claimed to be exact.
+                // Without a value there is nothing to change; then the compilation is not marked as
+                // exact.
                 let _ = symbolic::flow(&mut state, fluent, &rate, &now);
             }
         }

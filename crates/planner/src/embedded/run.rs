@@ -1,4 +1,4 @@
-//! One run of the planner: how many turns a search gets, and what becomes of the plans.
+//! One run of the planner: the turns of the searches, and the handling of plans.
 
 mod cleanup;
 mod improve;
@@ -37,39 +37,40 @@ pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
     }
 }
 
-/// How the search for a first plan ended.
+/// Result of the search for a first plan.
 enum First {
-    /// There is none.
+    /// No plan exists.
     Proved(Proof),
-    /// The run is over, whether there is a plan or not.
+    /// The run is over, with or without a plan.
     Over,
-    /// There is one. Whose turn it was, and what each is given in this round.
+    /// There is a plan. `turn` is the current search, `budget` the number of turns of each search
+    /// in this round.
     Found { turn: usize, budget: u64 },
 }
 
-/// One run.
+/// State of one run.
 pub(super) struct Planner<'a> {
     pub(super) frame: Frame<'a>,
     pub(super) observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     pub(super) symmetry: &'a Symmetry,
     pub(super) names: &'a Names,
     pub(super) progress: Progress,
-    /// Whether something is used up and filled up.
+    /// `true` if some fluent is used up and replenished.
     pub(super) has_reservoirs: bool,
     best: Option<Arc<Best>>,
-    /// How many plans have been the best one.
+    /// Number of plans that have been the best one.
     finds: u64,
-    /// The reason why it does not go on.
+    /// The reason why the run ends.
     stopped: Option<Stopped>,
-    /// The work since somebody was asked whether to go on.
+    /// The work since the last call of `observe`.
     unreported: u64,
-    /// How much work each strand has had for better plans.
+    /// Work of each strand on better plans.
     improved_for: u64,
-    /// How much of it there is at least after searches have given way to others.
+    /// Minimum of that work after searches were abandoned for lack of memory.
     least_work: u64,
-    /// Whether a search that had something left to look at has given way, because the memory was used up.
+    /// `true` if an unfinished search was abandoned because the memory was exhausted.
     has_given_up: bool,
-    /// What makes better plans of the best one.
+    /// The refiners of the best plan.
     refiners: Vec<Nearby<'a>>,
     /// The task of the second strand.
     own_task: Option<Task>,
@@ -108,7 +109,8 @@ impl<'a> Planner<'a> {
 
     pub(super) fn run(mut self) -> Answer {
         let strategies = self.strategies();
-        // The others are made when their first turn comes: that takes its time where actions are many.
+        // The others are created at their first turn, since their creation is slow with many
+        // actions.
         let mut entrants: Vec<Entrant<'_>> = strategies.into_iter().map(Entrant::new).collect();
         let (turn, budget) = match self.first_plan(&mut entrants) {
             First::Proved(proof) => {
@@ -169,7 +171,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Looks for a first plan.
+    /// Searches for a first plan.
     fn first_plan(&mut self, entrants: &mut [Entrant<'a>]) -> First {
         let compiled = self.frame.compiled;
         let tuning = &compiled.tuning;
@@ -245,7 +247,7 @@ impl<'a> Planner<'a> {
         frame.mutex_pairs.get_or_init(find).is_some()
     }
 
-    /// Why a run ends whose searches are all over.
+    /// Returns the reason for the end of a run whose searches are all over.
     fn all_over(&self) -> Stopped {
         if self.has_given_up {
             Stopped::OutOfMemory
@@ -258,7 +260,8 @@ impl<'a> Planner<'a> {
         self.stopped.is_none() && self.best.is_none()
     }
 
-    /// How many states each search looks at in the first round. `size`: the operators of an estimate.
+    /// Returns the number of states per search in the first round. `size` is the number of
+    /// operators of an estimate.
     fn first_budget(&self, size: u64) -> u64 {
         let tuning = &self.frame.compiled.tuning;
         let budget = if self.frame.compiled.is_symbolic {
@@ -270,7 +273,8 @@ impl<'a> Planner<'a> {
         } else {
             tuning.first_round
         };
-        // Where there are reservoirs, the first search fills them up, and has by far the best chance.
+        // If there are reservoirs, the first search replenishes them, and has by far the best
+        // chance.
         if self.has_reservoirs {
             return budget;
         }
@@ -278,8 +282,8 @@ impl<'a> Planner<'a> {
         budget.min(most.max(tuning.root_check_after))
     }
 
-    /// Lets the first search look for a first plan alone. Why it ended, and how many turns that counts
-    /// for.
+    /// Runs the first search alone until a first plan. Returns its outcome, and the number of turns
+    /// that it counts for.
     fn begin(&mut self, entrant: &mut Entrant<'a>, allowance: Allowance) -> (Outcome, u64) {
         let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
         let search = entrant.search(frame, symmetry);
@@ -294,8 +298,9 @@ impl<'a> Planner<'a> {
         (outcome, spent)
     }
 
-    /// A round of the searches for a first plan, from that one on: side by side, as long as there is none.
-    /// Whose turn it was at the end. `left`: what the first one has left.
+    /// Runs a round of the searches for a first plan, concurrently, from search `from` until there
+    /// is a plan. Returns the search whose turn it was at the end. `left` is the number of turns
+    /// left to the search `from`.
     fn round(
         &mut self,
         entrants: &mut [Entrant<'a>],
@@ -304,7 +309,8 @@ impl<'a> Planner<'a> {
     ) -> usize {
         let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
         let compiled = frame.compiled;
-        // What they mention first gets other numbers there than here, in no fixed order.
+        // A separate task, because facts are numbered in the order of their first use, which is not
+        // deterministic across threads.
         let own_task = self
             .own_task
             .take()
@@ -358,8 +364,8 @@ impl<'a> Planner<'a> {
             return 0;
         }
         if !self.is_looking() {
-            // With one thread, those that come later have not begun, and with several nobody knows how
-            // far they are.
+            // With one thread, later searches have not begun. With several threads, their progress
+            // is not deterministic.
             let later = numbers.iter().skip(last + 1);
             for &number in later.filter(|_| self.stopped.is_none()) {
                 self.progress.counts.memory -= memory[number];
@@ -375,7 +381,7 @@ impl<'a> Planner<'a> {
         0
     }
 
-    /// Carries strands out, and hears what they report.
+    /// Runs strands, and processes their reports.
     fn hear_all<R: Send>(&mut self, jobs: Vec<Job<'_, R>>) -> Vec<R> {
         let threads = self.frame.settings.threads;
         let mut base = self.progress.counts;
@@ -384,8 +390,8 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// Hears what a strand reports, and passes it on. Whether to go on. `base`: what was counted before
-    /// the strand began.
+    /// Processes a report of a strand. Returns `false` to stop. `base` are the counts before the
+    /// strand began.
     fn hear(&mut self, base: &mut Counts, report: Report) -> bool {
         let (before, done) = (*base, report.counts);
         let counts = &mut self.progress.counts;
@@ -426,7 +432,7 @@ impl<'a> Planner<'a> {
         goes_on
     }
 
-    /// Tells the caller how it goes, and of a new best plan. Whether to go on.
+    /// Reports the progress, and a new best plan, to the caller. Returns `false` to stop.
     fn tell(&mut self, found: Option<Arc<Best>>) -> bool {
         if let Some(found) = found {
             if !self.cleans_up() {
@@ -446,7 +452,8 @@ impl<'a> Planner<'a> {
         self.progress.plan = Some(found.found.clone());
     }
 
-    /// A proof from the bound on pairs. Told to stop meanwhile, it names no deadlines.
+    /// Returns a proof from the bound on pairs. If the caller stops it, the proof names no
+    /// deadlines.
     fn pairs_proof(&mut self) -> Option<Proof> {
         let Self {
             observe,
@@ -469,12 +476,12 @@ fn is_stuck(entrant: &Entrant<'_>) -> bool {
     !entrant.is_over && !entrant.strategy.is_complete() && search.is_some_and(makes_no_progress)
 }
 
-/// How many turns a search gets of a round.
+/// Returns the number of turns of a search in a round.
 fn share(search: &Search<'_>, budget: u64, compiled: &Compiled) -> u64 {
     if search.prunes_unsafely() || compiled.is_symbolic && !search.joins() {
         budget
     } else if search.joins() {
-        // What only that can find is rare.
+        // Plans that only this search can find are rare.
         budget / (8 * compiled.tuning.incomplete_share.max(1))
     } else {
         budget / compiled.tuning.incomplete_share.max(1)

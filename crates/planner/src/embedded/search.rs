@@ -1,11 +1,12 @@
-//! Greedy best-first search with deferred evaluation: a successor waits in the queue under its
-//! parent's estimate and is made only when its turn comes (Helmert 2006; Richter & Helmert 2009).
+//! Greedy best-first search with deferred evaluation: a successor is queued with its parent's
+//! estimate and is generated only when it is removed from the queue (Helmert 2006; Richter &
+//! Helmert 2009).
 //!
-//! Two queues take turns, one with all successors and one with the preferred ones only; whenever
-//! a better estimate is found, the preferred ones get a long turn.
+//! Two queues alternate, one with all successors and one with the preferred ones only. After each
+//! better estimate, the preferred ones get a long turn.
 //!
-//! A search for plans of a better metric weighs what a state has spent against what the relaxed
-//! plan will still cost, and drops what cannot become better than the best plan (branch and bound).
+//! A search for plans with a better metric weighs the cost so far against the remaining cost of the
+//! relaxed plan, and prunes states that cannot become better than the best plan (branch and bound).
 
 mod dead_ends;
 mod difference;
@@ -62,65 +63,65 @@ pub(crate) struct Search<'a> {
     states: States,
     /// The nodes by the discrete hash of their states.
     known: Hashes,
-    /// Buffer for known states, for comparison with a new one.
+    /// Buffer for known states, for the comparison with a new one.
     compared: State,
     all: Queue,
     preferred: Queue,
-    /// All successors, first come first served, in a search that has to come by everywhere.
+    /// All successors in order of insertion, for a search that must not starve any of them.
     oldest: WaitingList,
     turns: [i64; 2],
-    /// The best estimate, and the number of landmarks left where they count.
+    /// The best estimate, and the number of remaining landmarks where they count.
     best: (u32, u32),
     /// The estimate of the first state.
     first_estimate: u32,
-    /// The propositions seen before, if novelty decides.
+    /// The propositions seen before, if novelty is used.
     novelty: Option<Novelty>,
     /// Mutex pairs, in an incomplete search.
     mutex_pairs: Option<&'a MutexPairs>,
-    /// What is known of the landmarks, if they count.
+    /// The landmarks, if they count.
     landmarks: SearchLandmarks,
-    /// The consumable fluents, if they are to be spared.
+    /// The consumable fluents, if they are to be saved.
     consumables: Vec<Consumable>,
-    /// Whether times are irrelevant but for their distances.
+    /// `true` if times matter only by their distances.
     is_timeless: bool,
     /// The costs of steps, in a search for a better metric.
     step_costs: Option<StepCosts>,
     /// The bound that plans must stay below.
     limit: Option<MetricBound>,
-    /// Nothing may happen later, whatever it costs.
+    /// Latest time of a happening, regardless of the metric.
     horizon: Ticks,
-    /// Whether something was dropped that could have led to a plan.
+    /// `true` if a state or step was dropped that could have led to a plan.
     pub(crate) has_lost: bool,
-    /// How much the last turn counts for.
+    /// Cost of the last turn, in turns.
     price: u64,
-    /// What all turns took, in turns of states without an unsettled past.
+    /// Work of all turns, in turns of states without unsettled happenings.
     labour: u64,
-    /// Number of successors that were made to compute their novelty.
+    /// Number of successors generated to compute their novelty.
     weighed: u64,
-    /// What the turns since the last better estimate count for.
+    /// Cost of the turns since the last better estimate, in turns.
     idle: u64,
-    /// The number of successors that had their turn.
+    /// Number of successors taken from the queues.
     drawn: u64,
     pub(crate) expanded: u64,
     pub(crate) generated: u64,
     pub(crate) evaluated: u64,
-    /// The states that were made again, in vain: see [`waste`](Search::waste).
+    /// Number of states regenerated for rejected candidates: see [`waste`](Search::waste).
     wasted: u64,
     pub(crate) memory: usize,
 }
 
 const ROOT: u32 = u32::MAX;
 
-/// Number of lookups for a successor that is made to compute its novelty: some microseconds.
+/// Cost, in lookups, of a successor that is generated to compute its novelty: some microseconds.
 const SUCCESSOR_LOOKUPS: u64 = 1_500;
 
 /// The result of one expansion step of the search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Turn {
-    /// The choices that lead to a state in which the goal holds.
+    /// The choices that lead to a goal state.
     Goal(Vec<Step>),
     Nothing,
-    /// There is nothing left to look at.
+    /// The search space is exhausted.
     Over,
 }
 
@@ -200,13 +201,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// From now on only plans count that end by then.
+    /// Restricts the search to plans that end by `horizon`.
     pub(crate) fn set_horizon(&mut self, horizon: Ticks) {
         self.horizon = horizon;
         self.is_timeless = false;
     }
 
-    /// From now on only plans count that are within the limit.
+    /// Restricts the search to plans within the limit.
     pub(crate) fn set_limit(&mut self, limit: MetricBound) {
         if self.compiled.is_symbolic {
             self.stepper.limit = Some(limit.clone());
@@ -214,12 +215,13 @@ impl<'a> Search<'a> {
         self.limit = Some(limit);
     }
 
-    /// Whether the search claims more than it can: it has dropped or rounded something.
+    /// Returns `true` if an exhausted search proves nothing, because it has dropped or rounded
+    /// something.
     pub(crate) fn is_incomplete(&self) -> bool {
         self.has_lost || self.stepper.has_rounded
     }
 
-    /// Whether it loses plans for the sake of speed.
+    /// Returns `true` if it drops states that may lead to plans, for speed.
     pub(crate) fn prunes_unsafely(&self) -> bool {
         !self.strategy.is_complete()
     }
@@ -229,12 +231,12 @@ impl<'a> Search<'a> {
         self.strategy.joins
     }
 
-    /// The aim of the search.
+    /// Returns the aim of the search.
     pub(crate) fn aim(&self) -> Aim {
         self.strategy.aim
     }
 
-    /// Statistics.
+    /// Returns the statistics.
     pub(crate) fn counts(&self) -> Counts {
         Counts {
             actions: 0,
@@ -246,53 +248,54 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Counts a candidate that came to nothing: so many choices were taken again. Any number of such
+    /// Counts a rejected candidate, for which `choices` steps were replayed. Any number of such
     /// candidates may follow each other, each of them longer than the last one.
     pub(crate) fn waste(&mut self, choices: usize) {
         self.wasted += choices as u64;
     }
 
-    /// How much there is to an estimate: the number of operators.
+    /// Returns the size of an estimate: the number of operators.
     pub(crate) fn size(&self) -> u64 {
         self.relaxed.size()
     }
 
-    /// The same, with all that the operators change: what an estimate may take at most.
+    /// Returns the maximum work of an estimate: the number of operators and of their effects.
     pub(crate) fn weight(&self) -> u64 {
         self.relaxed.weight()
     }
 
-    /// How many turns the last one counts for: more where much is unsettled.
+    /// Returns the cost of the last turn, in turns: more if many happenings are unsettled.
     pub(crate) fn price(&self) -> u64 {
         self.price
     }
 
-    /// What all turns took so far, those included in which no state was made.
+    /// Returns the work of all turns so far, including those that generated no state.
     pub(crate) fn labour(&self) -> u64 {
         self.labour
     }
 
-    /// Whether it compresses: its states take less time than those of others where actions are many.
+    /// Returns `true` if it compresses actions. Its states then take less time than others if there
+    /// are many actions.
     pub(crate) fn compresses(&self) -> bool {
         self.strategy.compresses.is_some()
     }
 
-    /// Whether a better estimate was found lately: see
-    /// [`Tuning::patience`](super::tuning::Tuning::patience). A search that only looks for what is
-    /// new has no estimates.
+    /// Returns `true` if a better estimate was found recently: see
+    /// [`Tuning::patience`](super::tuning::Tuning::patience). A search by the novelty of successors
+    /// has no estimates.
     pub(crate) fn has_come_nearer(&self) -> bool {
         self.strategy.novelty != Some(NoveltyOf::Successors)
             && self.idle < self.compiled.tuning.patience
     }
 
-    /// Work except turns and estimates, in lookups of the stronger bound. Words of known facts, and successors that
-    /// are made to compute their novelty, count for some lookups.
+    /// Returns the work except turns and estimates, in lookups of the stronger bound. Words of
+    /// known facts, and successors generated to compute their novelty, count for some lookups.
     pub(crate) fn lookups(&self) -> u64 {
         let words = self.novelty.as_ref().map_or(0, Novelty::words);
         self.dead_ends.lookups() + words + SUCCESSOR_LOOKUPS * self.weighed
     }
 
-    /// Looks at one more state.
+    /// Expands one more state.
     pub(crate) fn turn(&mut self) -> Turn {
         self.price = 1;
         self.labour += 1;
@@ -324,7 +327,7 @@ impl<'a> Search<'a> {
         self.visit(parent, step, state)
     }
 
-    /// Whose turn it is.
+    /// Returns the next successor.
     fn next_entry(&mut self) -> Option<(u32, Step)> {
         self.drawn += 1;
         if self
@@ -353,7 +356,8 @@ impl<'a> Search<'a> {
         Some((waiting.parent, waiting.next()?))
     }
 
-    /// Whether no better estimate was found for a while, in a search where only that decides.
+    /// Returns `true` if no better estimate was found for some time, in a search that uses
+    /// estimates only.
     fn is_on_plateau(&self) -> bool {
         let tuning = &self.compiled.tuning;
         self.strategy.alternates()
@@ -393,8 +397,8 @@ impl<'a> Search<'a> {
             self.relaxed.list(&state)
         };
         let Some(mut estimate) = estimate else {
-            // Where actions are compressed, what the relaxed plan does without may be what a plan
-            // needs.
+            // Where actions are compressed, the relaxed plan may lack facts that hold only while an
+            // action runs.
             self.has_lost |= self.strategy.compresses.is_some();
             return Turn::Nothing;
         };
@@ -403,8 +407,8 @@ impl<'a> Search<'a> {
         let is_goal = is_goal(self.compiled, &state);
         let due = self.compiled.timed_until_goal.saturating_sub(state.timed);
         if state.symbolic.is_some() && !is_goal {
-            // The estimate takes tests that depend on times for granted. Where only ends are to come, no times
-            // may meet them.
+            // The estimate assumes that tests which depend on times hold. If only ends are left,
+            // possibly no times satisfy them.
             let ends = u32::try_from(state.open.len()).unwrap_or(u32::MAX);
             let least = due.saturating_add(ends);
             if estimate.steps <= least && (ends == 0 || misses_goal(self.compiled, &state)) {
@@ -416,8 +420,8 @@ impl<'a> Search<'a> {
         let notes = Notes { projection, drift };
         let number = self.add(Waiting::step(parent, step), (accepted, left), state, notes);
         self.known.push(hash);
-        // A state in which the goal holds may still have successors worth looking at: the judge can
-        // refuse the plan, and another one can be better.
+        // A goal state may still have useful successors: the validator can reject the plan, and
+        // another plan can be better.
         self.expand(number, &estimate);
         if may_be_better {
             return Turn::Goal(self.steps_to(number));
@@ -425,7 +429,8 @@ impl<'a> Search<'a> {
         Turn::Nothing
     }
 
-    /// Adds a node, and returns its number. `left`: the accepted landmarks, and the number of those left.
+    /// Adds a node, and returns its number. `left` are the accepted landmarks, and the number of
+    /// remaining ones.
     fn add(&mut self, origin: Waiting, left: (Vec<u64>, u32), state: State, notes: Notes) -> u32 {
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
         let (accepted, left) = left;
@@ -451,8 +456,8 @@ impl<'a> Search<'a> {
         number
     }
 
-    /// Whether the stronger bound shows that no plan begins like this. It is asked when the first
-    /// successor of a state has its turn.
+    /// Returns `true` if the stronger bound proves that no plan has this beginning. It is computed
+    /// at the turn of the first successor of a state.
     fn is_cut(&mut self, number: u32, state: &State) -> bool {
         let node = &mut self.nodes[number as usize];
         match node.dead_end {
@@ -478,7 +483,8 @@ impl<'a> Search<'a> {
         is_dead_end
     }
 
-    /// The latest time at which a plan may end that begins like this; `None` if there is none.
+    /// Returns the latest time at which a plan with this beginning may end, or `None` if there is
+    /// no such plan.
     fn latest_end(&self, state: &State) -> Option<Ticks> {
         let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
             return Some(self.horizon);
@@ -487,7 +493,8 @@ impl<'a> Search<'a> {
         Some(latest.min(self.horizon))
     }
 
-    /// Sets the horizon for what follows a state. Whether anything can follow it.
+    /// Sets the horizon for the successors of a state. Returns `false` if no plan can continue from
+    /// it.
     fn looks_no_later_than(&mut self, latest_end: Option<Ticks>) -> bool {
         let Some(horizon) = latest_end else {
             return false;

@@ -15,11 +15,11 @@ use super::hash::Map;
 use super::mutex::Mutexes;
 use super::root::root;
 
-/// Work limit of the search for mutex groups. Without a group, an action only gets an annotation that it
-/// would not need.
+/// Work limit of the search for mutex groups. If a group is not found, an action only gets an
+/// unnecessary annotation.
 const MOST_WORK: u64 = 2_000_000;
 
-/// Keeps the instances of each ground action apart.
+/// Adds exclusions between instances of each ground action that may overlap.
 pub(super) fn keep_apart(compiled: &mut Compiled) {
     let mutexes = Mutexes::of(compiled, &root(compiled), MOST_WORK);
     let groups = groups_of_running(compiled, &mutexes);

@@ -1,18 +1,18 @@
-//! When what is under way can end, seen from what was chosen last, where choices come in the order
-//! of time.
+//! Earliest and latest ends of the running actions, relative to the last choice, where choices come
+//! in chronological order.
 
 use super::compile::Compiled;
 use super::network::SETTLED;
 use super::state::State;
 use super::time::{NEVER, Ticks};
 
-/// See the module.
+/// Ends of the running actions relative to the last choice.
 #[derive(Clone, Debug)]
 pub(crate) struct Spans {
-    /// The earliest time of what was chosen last; nothing new happens before.
+    /// The earliest time of the last choice. New happenings are no earlier.
     pub(crate) now: Ticks,
-    /// For each action under way, its earliest and its latest end if what was chosen last happens
-    /// at [`now`](Self::now). What happens later than that moves them all alike.
+    /// For each running action, its earliest and its latest end if the last choice happens at
+    /// [`now`](Self::now). If it happens later, all of them move equally.
     pub(crate) ends: Vec<(Ticks, Ticks)>,
 }
 
@@ -35,12 +35,12 @@ impl Spans {
             if newest == SETTLED || !is_closed {
                 return (now, NEVER);
             }
-            // The start comes at most so long before the last one, and at least so long.
+            // The network bounds the distance between the start and the last choice.
             let shortest = match network.distance(newest, open.node) {
                 back if back > -NEVER => (back + open.least).max(0),
                 _ => 0,
             };
-            // Timed initials do not move along.
+            // Timed initials do not move.
             if has_timed || open.most >= NEVER {
                 return (now + shortest, NEVER);
             }

@@ -1,4 +1,4 @@
-//! A state of the search: what holds after the happenings chosen so far, and what is known of
+//! A state of the search: facts and numbers after the happenings chosen so far, and constraints on
 //! their times.
 
 mod projection;
@@ -15,12 +15,11 @@ use super::network::{Network, NodeId, SETTLED};
 use super::time::{NEVER, Ticks};
 pub(crate) use projection::Projection;
 
-/// See the module.
+/// State of the search.
 ///
-/// The happenings chosen so far come in some order; only what interferes keeps its order in time
-/// too, so that a later choice may well happen earlier. That is how a sequence of choices stands
-/// for a plan in which things happen side by side (Coles et al., "Forward-chaining partial-order
-/// planning", ICAPS 2010).
+/// The happenings chosen so far are in some order. Only interfering happenings keep this order in
+/// time, so a later choice may happen earlier. In this way, a sequence of choices represents a plan
+/// with concurrent actions (Coles et al., "Forward-chaining partial-order planning", ICAPS 2010).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct State {
     /// A bit for each fact.
@@ -28,21 +27,21 @@ pub(crate) struct State {
     pub(crate) values: Vec<Option<Rational>>,
     /// The metric's sum: see [`Metric`](super::compile::Metric).
     pub(crate) cost: Rational,
-    /// The latest settled time at which each kind of thing happened.
+    /// The latest settled time of each annotation.
     pub(crate) annotations: Vec<Ticks>,
     /// The actions that have started and not ended.
     pub(crate) open: Vec<Open>,
-    /// How many of the timed initials have happened.
+    /// Number of timed initials that have happened.
     pub(crate) timed: u32,
     pub(crate) network: Network,
-    /// The last choice, where choices come in the order of time.
+    /// The last choice, where choices come in chronological order.
     pub(crate) last: Last,
-    /// The incomplete moment, if an over-all condition is false. The next choice happens at the same
-    /// moment.
+    /// The incomplete moment, if an over-all condition is false. The next choice happens at the
+    /// same moment.
     pub(crate) joint: Option<Joint>,
     /// The time of the last settled happening.
     pub(crate) settled_end: Ticks,
-    /// The numbers that depend on times, in a problem that has such.
+    /// The numbers that depend on times, in a problem with such numbers.
     pub(crate) symbolic: Option<Box<Symbolic>>,
 }
 
@@ -59,7 +58,7 @@ pub(crate) struct Joint {
 pub(crate) struct Last {
     /// Its node, or [`SETTLED`].
     pub(crate) node: NodeId,
-    /// The time at which it happened, if that is settled; what follows does not happen earlier.
+    /// The time at which it happened, if that is settled. Later happenings are no earlier.
     pub(crate) floor: Ticks,
 }
 
@@ -73,7 +72,7 @@ impl Default for Last {
 }
 
 impl Last {
-    /// Its earliest time.
+    /// Returns its earliest time.
     pub(crate) fn earliest(self, network: &Network) -> Ticks {
         match self.node {
             SETTLED => self.floor,
@@ -82,7 +81,7 @@ impl Last {
     }
 }
 
-/// An action under way.
+/// A running action.
 #[derive(Clone, Debug)]
 pub(crate) struct Open {
     pub(crate) action: u32,
@@ -93,24 +92,24 @@ pub(crate) struct Open {
     pub(crate) least: Ticks,
     /// [`NEVER`] if there is no bound.
     pub(crate) most: Ticks,
-    /// The duration, if it leaves no choice.
+    /// The duration, if only one is possible.
     pub(crate) duration: Option<Rational>,
-    /// Which of the action's guards held at the start.
+    /// The action's guards that held at the start, as a bit mask.
     pub(crate) guards: u64,
-    /// The node of its end, where numbers depend on times and it started in the plan; else
+    /// The node of its end, if numbers depend on times and it started in the plan; otherwise
     /// [`SETTLED`].
     pub(crate) end: NodeId,
     /// The fluents that it changes continuously, with their rates.
     pub(crate) flows: Vec<(u32, Rational)>,
-    /// The strict tests of its over-all condition, with their differences just after its start. Empty once
-    /// a fluent of the over-all condition has jumped, or its rate has changed.
+    /// The strict tests of its over-all condition, with their differences just after its start.
+    /// Empty after an instantaneous change of a fluent of the over-all condition, or of its rate.
     pub(crate) beginnings: Vec<(u32, Form)>,
     /// For each disjunction of its over-all condition, the alternative that was demanded last.
     pub(crate) chosen: Vec<Option<usize>>,
 }
 
 impl Open {
-    /// An action that was under way before the search began.
+    /// Returns an action that was running before the search began.
     pub(crate) fn under_way(action: u32, start: Ticks, least: Ticks, most: Option<Ticks>) -> Self {
         Self {
             action,
@@ -140,7 +139,7 @@ impl Open {
 }
 
 impl State {
-    /// The state in which the search begins; nothing is under way yet.
+    /// Returns the initial state of the search, without running actions.
     pub(crate) fn new(compiled: &Compiled, facts: &[bool], values: Vec<Option<Rational>>) -> Self {
         let mut bits = vec![0; compiled.facts.len().div_ceil(64)];
         for (fact, &truth) in facts.iter().enumerate() {
@@ -150,7 +149,7 @@ impl State {
             facts: bits,
             values,
             annotations: vec![-NEVER; compiled.annotation_count],
-            // Before anything that happens now.
+            // Before all happenings at the current time.
             settled_end: compiled.now - 1,
             ..Self::default()
         };
@@ -164,7 +163,7 @@ impl State {
         action.exclusion != NONE && self.open.iter().any(is_same)
     }
 
-    /// Settles the truth of derived facts.
+    /// Computes the truth of derived facts.
     pub(crate) fn derive(&mut self, compiled: &Compiled) {
         for (rules, heads) in compiled.strata.iter().zip(&compiled.derived) {
             for &head in heads {
@@ -191,7 +190,8 @@ impl State {
         }
     }
 
-    /// Whether a numeric test holds. One that reads something without a value does not.
+    /// Returns `true` if a numeric test holds. A test that reads a fluent without a value does not
+    /// hold.
     pub(crate) fn passes(
         &self,
         compiled: &Compiled,
@@ -204,8 +204,8 @@ impl State {
             .is_some_and(|value| test.comparison.holds(&value, &Rational::ZERO))
     }
 
-    /// The earliest time at which all that was chosen can be over; of what is under way, its least
-    /// duration counts.
+    /// Returns the earliest time at which all chosen happenings and all running actions, with their
+    /// least durations, can be over.
     pub(crate) fn earliest_end(&self) -> Ticks {
         let open = self.open.iter().map(|open| {
             let start = if open.node == SETTLED {
@@ -221,7 +221,7 @@ impl State {
         )
     }
 
-    /// A hash of all but the times.
+    /// Returns a hash of all parts except the times.
     pub(crate) fn discrete_hash(&self) -> u64 {
         let mut mixer = Mixer::default();
         for word in &self.facts {
@@ -238,7 +238,8 @@ impl State {
         mixer.finish()
     }
 
-    /// A hash of the facts, the running actions and the timed initials to come, without any number.
+    /// Returns a hash of the facts, the running actions and the timed initials to come, without
+    /// numbers.
     pub(crate) fn fact_hash(&self) -> u64 {
         let mut mixer = Mixer::default();
         for word in &self.facts {
@@ -251,7 +252,7 @@ impl State {
         mixer.finish()
     }
 
-    /// Whether two states differ in times only.
+    /// Returns `true` if two states differ only in times.
     pub(crate) fn is_discretely(&self, other: &Self) -> bool {
         self.facts == other.facts
             && self.timed == other.timed
@@ -261,8 +262,8 @@ impl State {
             && self.symbolic == other.symbolic
     }
 
-    /// Whether everything settled was no later here, and what is not settled can be as early as
-    /// there. Both must be discretely the same.
+    /// Returns `true` if all settled happenings were no later than in the other state, and the
+    /// unsettled ones can be as early. Both must be discretely the same.
     pub(crate) fn has_no_later_annotations_than(&self, other: &Self) -> bool {
         if self.settled_end > other.settled_end {
             return false;
@@ -273,7 +274,7 @@ impl State {
         at_most(&self.latest_annotations(), &other.latest_annotations())
     }
 
-    /// The annotations, those of unsettled happenings at their earliest.
+    /// Returns the annotations, with those of unsettled happenings at their earliest times.
     fn latest_annotations(&self) -> Vec<Ticks> {
         let mut annotations = self.annotations.clone();
         for &(annotation, node) in &self.network.marks {
@@ -283,13 +284,13 @@ impl State {
         annotations
     }
 
-    /// What has been spent of the metric, without the time; `None` if that depends on times that
-    /// are not chosen yet.
+    /// Returns the cost so far by the metric, without the time. Returns `None` if it depends on
+    /// times that are not chosen yet.
     pub(crate) fn spent(&self, metric: &Metric) -> Option<Rational> {
         Some(metric.values.value(&self.values, None)? + &self.cost)
     }
 
-    /// An estimate of the memory it takes, in bytes.
+    /// Returns an estimate of the memory, in bytes.
     pub(crate) fn size(&self) -> usize {
         size_of::<Self>()
             + 8 * (self.facts.len() + self.annotations.len())

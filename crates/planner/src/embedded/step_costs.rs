@@ -1,4 +1,4 @@
-//! What steps cost, in small whole numbers: to guide a search, not to decide anything.
+//! Costs of steps as small integers. They guide the search, but decide nothing.
 
 use elbowroom_num::Rational;
 
@@ -6,14 +6,14 @@ use super::compile::{Action, Compiled, Metric, NONE, Snap};
 use super::formula::{Linear, Numeric};
 use super::state::State;
 
-/// See the module.
+/// Costs of the starts and ends of actions.
 #[derive(Clone, Debug)]
 pub(crate) struct StepCosts {
-    /// For each action what its start and its end count for.
+    /// For each action, the costs of its start and its end.
     counts: Vec<(u32, u32)>,
-    /// How much of the metric one step more counts as much as.
+    /// Amount of the metric that counts as much as one step.
     unit: f64,
-    /// The cost at the beginning, without time.
+    /// The initial cost, without time.
     initial: f64,
 }
 
@@ -60,17 +60,17 @@ impl StepCosts {
         }
     }
 
-    /// The cost of the start of an action, or of the instantaneous action.
+    /// Returns the cost of the start of an action, or of the instantaneous action.
     pub(crate) fn start(&self, action: u32) -> u32 {
         self.counts[action as usize].0
     }
 
-    /// The cost of the end of an action.
+    /// Returns the cost of the end of an action.
     pub(crate) fn end(&self, action: u32) -> u32 {
         self.counts[action as usize].1
     }
 
-    /// The cost of a state since the beginning, in the same units.
+    /// Returns the cost of a state since the beginning, in the same units.
     pub(crate) fn spent(&self, compiled: &Compiled, state: &State) -> i64 {
         let Some(metric) = &compiled.metric else {
             return 0;
@@ -84,13 +84,13 @@ impl StepCosts {
     }
 }
 
-/// The cost of a state, as far as it is known without choosing times.
+/// Returns the cost of a state, as far as it is known before times are chosen.
 fn spent(metric: &Metric, state: &State) -> f64 {
     let spent = state.spent(metric);
     spent.map_or_else(|| state.cost.to_f64(), |spent| spent.to_f64())
 }
 
-/// The cost before anything is chosen.
+/// Returns the cost before the first choice.
 fn initial(compiled: &Compiled, metric: &Metric) -> f64 {
     let beginning = &compiled.beginning;
     let read = metric.values.value(&beginning.values, None);
@@ -105,7 +105,7 @@ fn least_duration(compiled: &Compiled, action: &Action) -> Rational {
     known.fold(action.duration.least.clone(), Rational::max)
 }
 
-/// The cost of a happening, with the numbers that it reads as they are at the beginning.
+/// Returns the cost of a happening, given the initial values of the numbers that it reads.
 fn cost(compiled: &Compiled, metric: &Metric, snap: &Snap, duration: &Rational) -> f64 {
     let values = &compiled.beginning.values;
     let own = snap.cost.as_ref();

@@ -1,11 +1,10 @@
-//! Numbers that depend on when things happen: on durations that can be chosen, and on how far
-//! continuous changes have come.
+//! Numbers that depend on the times of happenings: on durations that can be chosen, and on the
+//! progress of continuous changes.
 //!
 //! Such a number is a linear expression over the times of the happenings chosen so far (COLIN,
-//! Coles, Coles, Fox & Long, IJCAI 2009). What conditions demand of it are linear inequalities;
-//! together with the temporal network they are a linear program, and a state is possible only if
-//! that has a solution. Here the network keeps all happenings, since a choice made long ago may
-//! still matter.
+//! Coles, Coles, Fox & Long, IJCAI 2009). Conditions on it are linear inequalities. Together with
+//! the temporal network they form a linear program, and a state is possible only if it has a
+//! solution. The network keeps all happenings in this case, since an early choice may still matter.
 
 mod levels;
 mod program;
@@ -22,7 +21,7 @@ use super::state::{Open, State};
 pub(crate) use levels::highest_level;
 pub(crate) use program::{Exact, KnownEnd, exact_distance, is_possible, not_before, solve};
 
-/// The value of an expression at some moment.
+/// Returns the value of an expression at some moment.
 pub(crate) fn value(state: &State, numeric: &Numeric, moment: &Moment) -> Option<Form> {
     let symbolic = state.symbolic.as_ref()?;
     let Numeric::Linear(linear) = numeric else {
@@ -60,7 +59,7 @@ fn linear_value(
     Some(sum)
 }
 
-/// Demands `form comparison 0`; `None` if that is false whatever the times.
+/// Demands `form comparison 0`. Returns `None` if it is false for all times.
 pub(crate) fn demand(state: &mut State, form: Form, comparison: Comparison) -> Option<()> {
     if let Some(constant) = form.as_constant() {
         return comparison.holds(constant, &Rational::ZERO).then_some(());
@@ -70,8 +69,8 @@ pub(crate) fn demand(state: &mut State, form: Form, comparison: Comparison) -> O
     Some(())
 }
 
-/// Demands a formula. Of a choice, the first alternative that is possible at this stage is taken;
-/// `has_chosen` is set if another one might have been possible.
+/// Demands a formula. For a choice, demands the first alternative that is possible at this stage.
+/// Sets `has_chosen` if another alternative might have been possible.
 pub(crate) fn demand_formula(
     compiled: &Compiled,
     state: &mut State,
@@ -123,16 +122,18 @@ fn demand_choice(
 pub(crate) enum Piece<'a> {
     /// The first piece begins, excluding the moment.
     Begins(&'a mut Vec<(u32, Form)>),
-    /// A piece ends, excluding the moment. The first piece: began with these differences of strict tests.
+    /// A piece ends, excluding the moment. For the first piece, these are the initial differences
+    /// of strict tests.
     Ends(&'a [(u32, Form)]),
     /// The moment lies inside the interval.
     Within,
 }
 
 /// Demands an over-all condition at a moment. A strict test need not hold at an open end: it holds
-/// throughout a piece if it holds, not strictly, at both ends, and strictly at one of them. Of a choice, the
-/// alternative at the end of a piece is that of its beginning if it is about numbers: one may hold at one end
-/// and another one at the other end, and none in between.
+/// throughout a piece if it holds, not strictly, at both ends, and strictly at one of them. For a
+/// choice on numbers, the alternative at the end of a piece must be that of its beginning:
+/// otherwise one alternative may hold at one end and another one at the other end, and none in
+/// between.
 pub(crate) fn demand_over_all(
     compiled: &Compiled,
     state: &mut State,
@@ -189,7 +190,7 @@ pub(crate) fn demand_over_all(
     Some(())
 }
 
-/// Reads what an update will add or assign.
+/// Evaluates the amount that an update adds or assigns.
 pub(crate) fn read(
     state: &State,
     update: &Update,
@@ -199,7 +200,7 @@ pub(crate) fn read(
     Some((update.fluent, update.operator, form))
 }
 
-/// Carries out an update.
+/// Applies an update.
 pub(crate) fn update(
     state: &mut State,
     fluent: u32,
@@ -222,7 +223,7 @@ pub(crate) fn update(
     Some(())
 }
 
-/// Lets a fluent move at a rate from some time on, or end doing so with the opposite rate.
+/// Starts a continuous change of a fluent at a time, or ends it if called with the opposite rate.
 pub(crate) fn flow(state: &mut State, fluent: u32, rate: &Rational, time: &Form) -> Option<()> {
     let mut course = course_of(state, fluent)?;
     course.base = course.base.plus(&-rate, time);
@@ -231,8 +232,8 @@ pub(crate) fn flow(state: &mut State, fluent: u32, rate: &Rational, time: &Form)
     Some(())
 }
 
-/// The value of a fluent after the ends of all running actions, if nothing else starts and the value does not
-/// depend on times.
+/// Returns the value of a fluent after the ends of all running actions, if nothing else starts and
+/// the value does not depend on times.
 pub(crate) fn settled_value(compiled: &Compiled, state: &State, fluent: u32) -> Option<Rational> {
     let symbolic = state.symbolic.as_ref()?;
     if is_assigned_later(compiled, state, fluent) {
@@ -261,14 +262,14 @@ pub(crate) fn settled_value(compiled: &Compiled, state: &State, fluent: u32) -> 
     }
 }
 
-/// Returns `true` if a timed initial to come assigns the fluent.
+/// Returns `true` if a future timed initial assigns the fluent.
 fn is_assigned_later(compiled: &Compiled, state: &State, fluent: u32) -> bool {
     let mut to_come = compiled.timed[state.timed as usize..].iter();
     to_come.any(|timed| timed.assigns.iter().any(|(own, _)| *own == fluent))
 }
 
-/// The course of a fluent after the ends of all running actions, without its jumps at these ends. `None` if
-/// its value does not depend on times.
+/// Returns the course of a fluent after the ends of all running actions, without its jumps at these
+/// ends, or `None` if its value does not depend on times.
 fn settled_course(symbolic: &Symbolic, state: &State, fluent: u32) -> Option<Course> {
     let mut course = symbolic.course(fluent)?.clone();
     for open in &state.open {
@@ -281,8 +282,8 @@ fn settled_course(symbolic: &Symbolic, state: &State, fluent: u32) -> Option<Cou
     Some(course)
 }
 
-/// The time of an action's end. A fixed duration counts from the start, so that the total of a continuous
-/// change is a constant.
+/// Returns the time of an action's end. A fixed duration counts from the start, so that the total
+/// of a continuous change is a constant.
 pub(crate) fn end_form(open: &Open, end: NodeId) -> Form {
     match &open.duration {
         Some(duration) if open.node != SETTLED => {

@@ -1,9 +1,9 @@
-//! Objects that can stand for each other.
+//! Interchangeable objects.
 //!
-//! Two objects are interchangeable if the problem stays the same when they change places. Where a
-//! state also stays the same, a step with one of them leads to nothing that a step with the other
-//! does not lead to, so only one is tried (Fox & Long, "The detection and exploitation of symmetry
-//! in planning problems", IJCAI 1999).
+//! Two objects are interchangeable if swapping them leaves the problem unchanged. If a state is
+//! also unchanged, a step with one of them leads to nothing that a step with the other does not
+//! lead to, so only one is tried (Fox & Long, "The detection and exploitation of symmetry in
+//! planning problems", IJCAI 1999).
 
 use std::collections::BTreeSet;
 
@@ -19,12 +19,12 @@ use super::state::State;
 /// A pair of interchangeable objects.
 #[derive(Clone, Debug)]
 struct Exchange {
-    /// The facts that change places.
+    /// The facts that are swapped.
     facts: Vec<(u32, u32)>,
     fluents: Vec<(u32, u32)>,
-    /// The annotations of these facts that change places.
+    /// The annotations of these facts that are swapped.
     annotations: Vec<(u32, u32)>,
-    /// The actions with one of the objects, and what they become; ascending.
+    /// The actions with one of the objects, and their images; ascending.
     actions: Vec<(u32, u32)>,
 }
 
@@ -41,7 +41,8 @@ impl Symmetry {
         let mut finder = Finder::new(task, compiled);
         let mut exchanges = Vec::new();
         for second in 1..problem.objects.len() {
-            // The last object before this one that it can stand for: this makes chains.
+            // Use the nearest object before this one that is interchangeable with it, so that pairs
+            // form chains.
             let candidates = (0..second).rev().filter(|&first| {
                 let types = |object: usize| &problem.objects[object].types;
                 types(first) == types(second)
@@ -98,7 +99,7 @@ impl Symmetry {
 }
 
 impl Exchange {
-    /// Returns the action that an action becomes.
+    /// Returns the image of an action.
     fn image(&self, action: u32) -> u32 {
         let found = self.actions.binary_search_by_key(&action, |pair| pair.0);
         found.map_or(action, |place| self.actions[place].1)
@@ -137,7 +138,7 @@ struct Finder<'a> {
     compiled: &'a Compiled,
     facts: Map<(u32, Vec<ObjectId>), u32>,
     fluents: Map<(u32, Vec<ObjectId>), u32>,
-    /// By schema, arguments, and whether it takes time.
+    /// By schema, arguments, and whether the action is durative.
     actions: Map<(u32, Vec<ObjectId>, bool), u32>,
     budget: usize,
 }
@@ -175,7 +176,7 @@ impl<'a> Finder<'a> {
         }
     }
 
-    /// The exchange of two objects, if it leaves the problem as it is.
+    /// Returns the exchange of two objects, if it leaves the problem unchanged.
     fn exchange(&mut self, pair: (ObjectId, ObjectId)) -> Option<Exchange> {
         if self.budget < self.compiled.actions.len() {
             return None;
@@ -189,7 +190,7 @@ impl<'a> Finder<'a> {
         let mut actions = Vec::new();
         for (number, action) in (0..).zip(&self.compiled.actions) {
             if action.start == NONE {
-                // What is under way stays as it is.
+                // Running actions must not change.
                 let is_touched = action.arguments.iter().any(|&o| o == pair.0 || o == pair.1);
                 if is_touched {
                     return None;
@@ -212,7 +213,7 @@ impl<'a> Finder<'a> {
             pairs.filter(|(from, to)| from < to).collect()
         };
         let facts = moved(&images.facts);
-        // The annotations of actions' marks: equal for snaps that change places.
+        // The annotations that the actions mark, which are equal for swapped snaps.
         let mut annotations: Vec<(u32, u32)> = Vec::new();
         for &(from, to) in &actions {
             let (from, to) = (self.compiled.action(from), self.compiled.action(to));
@@ -270,7 +271,7 @@ impl Images {
         self.same_facts(facts, facts)
     }
 
-    /// Whether the facts become the others.
+    /// Returns `true` if the image of `facts` is `others`.
     fn same_facts(&self, facts: &[u32], others: &[u32]) -> bool {
         facts.len() == others.len()
             && facts
@@ -302,8 +303,8 @@ impl Images {
         self.formula_is(compiled, formula, formula)
     }
 
-    /// Whether the formula becomes the other; what is not plain enough to tell counts as different,
-    /// unless nothing in it moves.
+    /// Returns `true` if the image of the formula is the other formula. Formulas that are too
+    /// complex to compare count as different, unless they are unchanged.
     fn formula_is(&self, compiled: &Compiled, formula: &Formula, other: &Formula) -> bool {
         let test_is = |a: u32, b: u32| {
             let (a, b) = (&compiled.tests[a as usize], &compiled.tests[b as usize]);
@@ -387,7 +388,7 @@ impl Images {
     }
 }
 
-/// Where the symbols go; `None` if some image is not among them.
+/// Returns the images of the symbols, or `None` if an image is not a symbol.
 fn images(table: &Map<(u32, Vec<ObjectId>), u32>, pair: (ObjectId, ObjectId)) -> Option<Vec<u32>> {
     let image = |(key, &number): (&(u32, Vec<ObjectId>), &u32)| {
         if key.1.iter().any(|&o| o == pair.0 || o == pair.1) {

@@ -1,4 +1,4 @@
-//! What tests of the parts have in common.
+//! Helpers shared by the module tests.
 
 use elbowroom_model::reachability::{self, Answer};
 use elbowroom_model::{Situation, Task};
@@ -8,12 +8,12 @@ use super::compile::{Compiled, Wanted, compile};
 use super::state::State;
 use super::tuning::Tuning;
 
-/// A small task from its initial state on.
+/// Compiles a small task from its initial state.
 pub(crate) fn compiled(task: &Task) -> Compiled {
     compiled_with(task, &Tuning::default()).expect("a small task without unsupported features")
 }
 
-/// The same with other constants; `None` if something of it is refused.
+/// Compiles a small task with this tuning. Returns `None` if it is not supported.
 pub(crate) fn compiled_with(task: &Task, tuning: &Tuning) -> Option<Compiled> {
     let situation = Situation::initial(task);
     let limits = reachability::Settings::default();
@@ -28,7 +28,7 @@ pub(crate) fn compiled_with(task: &Task, tuning: &Tuning) -> Option<Compiled> {
     compile(task, &grounding, wanted, &mut || true).ok()
 }
 
-/// All choices in a state, possible or not.
+/// Returns all choices in a state, applicable or not.
 pub(crate) fn choices(compiled: &Compiled, state: &State) -> impl Iterator<Item = Step> + use<> {
     let count = |length: usize| u32::try_from(length).expect("few");
     let starts = (0..count(compiled.actions.len())).map(Step::Start);

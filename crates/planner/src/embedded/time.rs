@@ -8,7 +8,7 @@ pub(crate) type Ticks = i64;
 /// Later than any time that occurs; sums of two of them still fit.
 pub(crate) const NEVER: Ticks = i64::MAX / 4;
 
-/// The finest grid worth having: times up to some hundred million units still fit.
+/// The finest useful grid: times up to some hundred million units still fit.
 const FINEST: i64 = 10_000_000_000;
 
 /// The grid used when the exact one would be too fine: it fits times of milliseconds and of a
@@ -17,17 +17,18 @@ const ROUNDED: i64 = 3_000_000;
 
 /// The time grid: ticks per unit of time.
 ///
-/// The grid is chosen so that all times and constant durations that the problem mentions lie on
-/// it. Where that is impossible, or a duration that depends on the state falls between two ticks,
-/// the search works with rounded numbers; the times of the plan it finds are computed exactly
-/// afterwards, and the search claims no proof.
+/// The grid contains all times and constant durations of the problem if possible. Otherwise, or if
+/// a duration that depends on the state falls between two ticks, the search works with rounded
+/// numbers. The times of its plans are then computed exactly afterwards, and the search claims no
+/// proof.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scale {
     ticks_per_unit: i64,
 }
 
 impl Scale {
-    /// The coarsest grid that holds all of these numbers, or a fine one if there is none.
+    /// Returns the coarsest grid that contains all of these numbers, or a fine one if there is
+    /// none.
     pub(crate) fn of<'a>(numbers: impl Iterator<Item = &'a Rational>) -> Self {
         let mut common = CommonDenominator::default();
         let mut largest = 1.0_f64;
@@ -53,7 +54,7 @@ impl Scale {
         }
     }
 
-    /// The number in ticks, if it lies on the grid and is not enormous.
+    /// Returns the number in ticks, if it is on the grid and not too large.
     pub(crate) fn exactly(self, number: &Rational) -> Option<Ticks> {
         let (numerator, denominator) = number.as_small()?;
         if self.ticks_per_unit % denominator != 0 {
@@ -63,7 +64,7 @@ impl Scale {
         (ticks.abs() < NEVER).then_some(ticks)
     }
 
-    /// The largest number of ticks not above the number, and whether it is exact.
+    /// Returns the largest number of ticks not above the number, and whether it is exact.
     pub(crate) fn floor(self, number: &Rational) -> (Ticks, bool) {
         if let Some(ticks) = self.exactly(number) {
             return (ticks, true);
@@ -76,13 +77,13 @@ impl Scale {
         }
     }
 
-    /// The smallest number of ticks not below the number, and whether it is exact.
+    /// Returns the smallest number of ticks not below the number, and whether it is exact.
     pub(crate) fn ceil(self, number: &Rational) -> (Ticks, bool) {
         let (ticks, exact) = self.floor(&-number);
         (-ticks, exact)
     }
 
-    /// The time as a number of units.
+    /// Returns the time as a number of units.
     pub(crate) fn units(self, ticks: Ticks) -> Rational {
         Rational::new(ticks, self.ticks_per_unit)
     }

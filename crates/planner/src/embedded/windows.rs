@@ -1,11 +1,11 @@
 //! Temporal windows: the intervals of time in which a condition holds that only timed initials
 //! change.
 //!
-//! That a happening lies in one of several disjoint intervals, or that a start and its end lie in
-//! the same one, is closed under the minimum, as simple temporal constraints are: of two
-//! assignments of times that meet it, the earlier time of each happening makes another one (for a
-//! pair, the earlier start decides the interval of both). So constraints of both kinds together
-//! have a least solution, if they have one, and propagation of lower bounds finds it without any
+//! The constraint that a happening is in one of several disjoint intervals, or that a start and its
+//! end are in the same one, is closed under the minimum, as simple temporal constraints are: of two
+//! assignments of times that satisfy it, the earlier time of each happening makes another one (for
+//! a pair, the earlier start decides the interval of both). So constraints of both kinds together
+//! have a least solution, if they have one, and propagation of lower bounds finds it without
 //! branching (min-closed constraints; Jeavons & Cooper, "Tractable constraints on ordered domains",
 //! Artificial Intelligence 79, 1995; for temporal problems: Kumar, "On the tractability of
 //! restricted disjunctive temporal problems", ICAPS 2005).

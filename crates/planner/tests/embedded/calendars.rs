@@ -1,5 +1,5 @@
-//! Calendars as windows of the temporal network, and as choices of the search: the same answers, and
-//! the same best makespans.
+//! Calendars as windows of the temporal network, compared with calendars as choices of the search:
+//! the same answers, and the same best makespans.
 
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -33,11 +33,11 @@ struct Draft {
     actions: Vec<DraftAction>,
     initial: u8,
     goal: Vec<Literal>,
-    /// For each calendar, its first truth, and the times at which it changes or is said again.
+    /// For each calendar, its first truth, and the times at which it changes or is repeated.
     calendars: Vec<(bool, Vec<(u8, bool)>)>,
     /// A timed initial of a fact that actions change.
     timed: Option<(u8, Literal)>,
-    /// Whether the goal reads a calendar.
+    /// `true` if the goal reads a calendar.
     goal_is_dated: bool,
 }
 
@@ -181,7 +181,8 @@ impl Draft {
     }
 }
 
-/// What the planner comes to in so many turns, with calendars as windows or as choices.
+/// Returns the planner's answer within a limited number of reports, with calendars as windows or as
+/// choices.
 fn answer_with(task: &Task, situation: &Situation, is_first: bool, as_windows: bool) -> Answer {
     let mut tuning = Tuning::default();
     if !as_windows {
@@ -204,7 +205,7 @@ fn answer_with(task: &Task, situation: &Situation, is_first: bool, as_windows: b
     })
 }
 
-/// A situation at some time between 2 and 6 in which the first action that takes time has been
+/// Returns a situation at some time between 2 and 6 in which the first durative action has been
 /// running since 1, and may last 2 time units longer than planned.
 fn situation_of(draft: &Draft, task: &Task, time: &Rational) -> Situation {
     let mut situation = Situation::initial(task);
@@ -221,7 +222,7 @@ fn situation_of(draft: &Draft, task: &Task, time: &Rational) -> Situation {
         let predicate = task.problem().predicate(name).unwrap();
         task.find_fact(predicate, &[])
     };
-    // In each calendar, changes stand in the order of time.
+    // In each calendar, changes are in order of time.
     for (_, name, truth) in changes.into_iter().filter(|change| change.0 <= *time) {
         let Some(fact) = fact_of(&name) else { continue };
         if truth {
@@ -251,7 +252,7 @@ fn check_valid(task: &Task, situation: &Situation, answer: &Answer) {
     }
 }
 
-/// Checks that both plans are valid, and that there is no plan where there is proved to be none.
+/// Checks that both plans are valid, and that no plan exists if one answer proves so.
 fn check_agreement(task: &Task, situation: &Situation, answers: &[Answer; 2]) {
     for answer in answers {
         check_valid(task, situation, answer);

@@ -1,4 +1,4 @@
-//! Told to stop at any of its reports, the planner makes no further one.
+//! The planner makes no further report after it is stopped at any of its reports.
 
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -9,7 +9,7 @@ use elbowroom_planner::{Answer, Phase, Settings, Stopped, plan};
 use crate::world::task;
 
 /// Stops the planner at its report of that number. Returns the answer, and the phase of each
-/// report that was made.
+/// report.
 fn stopped_at(task: &Task, number: usize) -> (Answer, Vec<Phase>) {
     let task = task.clone();
     let situation = Situation::initial(&task);
@@ -25,7 +25,7 @@ fn stopped_at(task: &Task, number: usize) -> (Answer, Vec<Phase>) {
     (answer, phases)
 }
 
-/// Trips through three of 20 places: thousands of ground actions, of which few are needed.
+/// Trips through three of 20 places: thousands of ground actions, few of which are needed.
 fn travels() -> Task {
     let names: String = (0..20).map(|n| format!("p{n} ")).collect();
     let mut been = String::new();

@@ -1,4 +1,4 @@
-//! Plans in which things must happen at the same time, and for long enough.
+//! Plans with required concurrency, including minimum durations of overlap.
 
 use std::ops::ControlFlow;
 
@@ -7,7 +7,7 @@ use elbowroom_planner::{Answer, Counts, Member, Settings, Technique, Tuning, pla
 
 use crate::world::{answer, answer_without_cleanup, describe, task};
 
-/// The answer with other constants of the search, within so many states.
+/// Returns the answer with this tuning, within `states` states.
 fn tuned(domain: &str, problem: &str, tuning: Tuning, states: u64) -> Answer {
     let task = task(domain, problem);
     let settings = Settings {
@@ -29,7 +29,7 @@ fn tuned(domain: &str, problem: &str, tuning: Tuning, states: u64) -> Answer {
     )
 }
 
-/// The counts of a search that found a plan.
+/// Returns the counts of a search that found a plan.
 fn counts(answer: &Answer) -> Counts {
     match answer {
         Answer::Plan { counts, .. } => *counts,
@@ -137,8 +137,9 @@ fn jugs_that_nobody_asks_for_are_left_out() {
     assert_eq!(actions, 2 + 24 + 24 + 12);
 }
 
-/// Jars with lids that stay open for a while are filled from cans, a cup at a time, and shipped;
-/// what is shipped, or waits for it, is not opened again. All cans together hold just enough.
+/// Jars with lids that stay open for some time are filled from cans, a cup at a time, and shipped.
+/// Shipped jars, and jars that wait for shipping, are not opened again. All cans together hold just
+/// enough.
 fn filling(cans: &[usize], jars: &[usize]) -> (String, String) {
     let domain = "
         (:requirements :typing :durative-actions :numeric-fluents :negative-preconditions)
@@ -198,8 +199,8 @@ fn a_search_that_compresses_keeps_what_is_needed_too() {
     assert!(without.found().is_none(), "{}", describe(&without));
 }
 
-/// One descent of a single search leads to the goal. Interrupted on the way, it has to wait for all
-/// others.
+/// One descent of a single search leads to the goal. If it is interrupted on the way, it has to
+/// wait for all others.
 #[test]
 fn a_search_that_comes_nearer_keeps_its_turn() {
     let (domain, problem) = pottery(40);

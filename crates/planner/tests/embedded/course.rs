@@ -37,7 +37,7 @@ fn answered(task: &Task) -> Answer {
     answer_from(task, &Situation::initial(task), 400)
 }
 
-/// The first plan, which the judge has accepted, or why there is none.
+/// Returns the first plan, which the validator has accepted, or the reason why there is none.
 fn found(constraints: &str) -> String {
     let task = world(constraints);
     let answer = answered(&task);
@@ -92,7 +92,7 @@ fn what_no_plan_can_keep_is_not_kept() {
         found("(always (not (at a)))"),
         "no plan exists: the constraint (always (not (at a))) is broken from the beginning"
     );
-    // In no time to get there.
+    // Too early to get there.
     assert_eq!(found("(within 3 (seen c))"), "none found: Exhausted");
     assert_eq!(found("(always (not (at c)))"), "none found: Exhausted");
 }
@@ -101,14 +101,14 @@ fn what_no_plan_can_keep_is_not_kept() {
 fn what_is_owed_comes_later() {
     let steps = found("(sometime-after (seen c) (at a))");
     assert!(steps.contains("(go b a)"), "{steps}");
-    // At b, it is paid.
+    // At b, the obligation is fulfilled.
     let steps = found("(sometime-after (at c) (or (at b) (seen c)))");
     assert!(!steps.contains("(go c b)"), "{steps}");
 }
 
 #[test]
 fn an_answer_comes_in_time() {
-    // A lamp that is lit on the way to b, and burns no longer than b is near.
+    // A lamp that is lit on the way to b, and burns only until b is near.
     let steps = found("(and (sometime (lit)) (always-within 3 (lit) (at b)))");
     assert!(
         steps.contains("(go a b)") && steps.contains("(shine)"),
@@ -117,7 +117,7 @@ fn an_answer_comes_in_time() {
     assert!(found("(and (within 3 (lit)) (always-within 3 (lit) (at b)))").contains("(shine)"));
     let late = found("(and (within 0.5 (lit)) (always-within 3 (lit) (at b)))");
     assert!(late.contains("none found"), "{late}");
-    // From the beginning on: the way to b takes 4.
+    // From the beginning on: going to b takes 4.
     assert!(found("(always-within 4 (at a) (at b))").contains("(go a b)"));
     assert!(found("(always-within 3 (at a) (at b))").contains("none found"));
 }
@@ -140,7 +140,7 @@ fn a_condition_holds_during_a_window() {
         );
     }
     assert!(found("(hold-during 3 9 (at b))").contains("none found"));
-    // What holds in the end holds for ever.
+    // A condition that holds at the end holds for ever.
     assert!(found("(hold-during 1000 1001 (at c))").contains("(go a c)"));
 }
 
@@ -191,13 +191,13 @@ fn a_number_stays_within_bounds() {
     assert!(!free.contains("(fill)"), "{free}");
     let bounded = of_tank("(always (>= (level) 0))", "");
     assert!(bounded.contains("(fill)"), "{bounded}");
-    // Two fillings would be more than 5, before anything is taken.
+    // Two fillings would exceed 5, before anything is taken.
     let both = of_tank(
         "(and (always (and (>= (level) 0) (<= (level) 5))) (sometime (warm)))",
         "",
     );
     assert!(both.contains("(fill)") && both.contains("(warm)"), "{both}");
-    // One of 3 is more than 4.
+    // A single filling of 3 exceeds 4.
     let full = of_tank("(always (and (>= (level) 0) (<= (level) 4)))", "");
     assert!(full.contains("(fill)") && full.contains("(take"), "{full}");
     assert!(of_tank("(always (and (>= (level) 0) (<= (used) 2)))", "").contains("none found"));
@@ -338,7 +338,7 @@ fn preferences_that_pay_are_kept() {
         .map(|one| names[one.preference.index()].as_str())
         .collect();
     violated.sort_unstable();
-    // To see b, on the way to c, takes 6 more, which is less than 20. To be home again, or to burn
-    // the lamp, would take more than it is worth.
+    // Visiting b on the way to c takes 6 more, which is less than 20. Returning home, or burning
+    // the lamp, would cost more than it is worth.
     assert_eq!(violated, ["home", "lamp", "never"]);
 }

@@ -1,5 +1,5 @@
-//! Plans under constraints of every form: of all plans on a grid of times, which the judge sees, one
-//! exists only if the planner finds one, too.
+//! Plans under constraints of every form, compared with all plans on a grid of times: if the
+//! validator accepts one of these, the planner also finds a plan.
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
@@ -13,7 +13,7 @@ use elbowroom_planner::{Answer, plan};
 
 use crate::world::{answer_from, describe, task};
 
-/// A source of numbers that is the same each time (Marsaglia's xorshift).
+/// Pseudo-random numbers with a fixed seed (Marsaglia's xorshift).
 pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {
@@ -70,7 +70,8 @@ const EFFECTS: [&str; 9] = [
     "(when (q) (p))",
 ];
 
-/// Three actions, which last longer or not at all, and never end when another one does.
+/// Returns a domain with three actions that are durative or instantaneous, and never end when
+/// another one does.
 pub(crate) fn domain(dice: &mut Dice) -> String {
     let mut text = "(:predicates (p) (q) (r) (g)) (:functions (x))".to_owned();
     for action in 0..3 {
@@ -78,7 +79,7 @@ pub(crate) fn domain(dice: &mut Dice) -> String {
         for effect in &mut effects {
             for _ in 0..dice.below(3) {
                 let new = dice.one(&EFFECTS);
-                // Not the same twice, nor the opposite.
+                // Neither the same literal twice, nor its negation.
                 let about = ["(p)", "(q)", "(r)", "(x)"];
                 let about = about.iter().find(|fact| new.contains(*fact)).expect("one");
                 if !effect.contains(about) {
@@ -122,7 +123,7 @@ pub(crate) fn domain(dice: &mut Dice) -> String {
     text.replace("(at end )", "")
 }
 
-/// The lists in a row of lists.
+/// Returns the lists in a sequence of lists.
 fn parts(all: &str) -> Vec<&str> {
     let mut parts = Vec::new();
     let (mut depth, mut begin) = (0, 0);
@@ -146,7 +147,7 @@ fn parts(all: &str) -> Vec<&str> {
     parts
 }
 
-/// With the constraint as a preference that alone counts, or as one that must be kept.
+/// Returns a problem with the constraint as the only counted preference, or as a hard constraint.
 fn problem(form: &str, is_soft: bool, dice: &mut Dice) -> String {
     let from = dice.below(7);
     let constraint = form
@@ -168,8 +169,8 @@ fn problem(form: &str, is_soft: bool, dice: &mut Dice) -> String {
     )
 }
 
-/// A plan of up to two steps, or among many of three, whose happenings are all apart, and which
-/// violates no preference.
+/// Returns a plan of up to two steps, or among many of three, whose happenings are all separate,
+/// and which violates no preference.
 fn twin(task: &Task, dice: &mut Dice) -> Option<TimeTriggeredPlan> {
     let schemas = 0..task.problem().schemas.len();
     let actions: Vec<Arc<Action>> = schemas
@@ -246,7 +247,7 @@ fn where_there_is_a_plan_under_constraints_it_is_found() {
             assert!(!matches!(answer, Answer::Unsolvable { .. }), "{text}");
             missed.push(text);
         }
-        // What a timed initial may have ended is over.
+        // A condition that a timed initial may have ended is over.
         let is_known = |text: &&String| !form.contains("at-most-once") || !text.contains("(r))");
         let missed: Vec<_> = missed.iter().filter(is_known).collect();
         assert!(missed.is_empty(), "{form}: {}\n{}", missed.len(), missed[0]);

@@ -1,4 +1,5 @@
-//! Deadlines of goals in mid-execution, beside the same problem at its beginning with `within`.
+//! Compares deadlines of goals in mid-execution with the same problem from its beginning with
+//! `within`.
 
 use std::sync::Arc;
 
@@ -42,7 +43,7 @@ fn problems(dice: &mut Dice) -> (Task, Task, String) {
     )
 }
 
-/// Returns the plan as one of `task`, with all starts later by [`BEFORE`], or earlier.
+/// Returns the plan as one of `task`, with all starts shifted later by [`BEFORE`], or earlier.
 fn moved(task: &Task, plan: &TimeTriggeredPlan, is_later: bool) -> TimeTriggeredPlan {
     let by = Rational::from(if is_later { BEFORE } else { -BEFORE });
     let steps = plan.steps.iter().map(|step| Step {

@@ -1,4 +1,5 @@
-//! Known and open continuous change, with linear programs of few happenings and of all: the same answers.
+//! Known and open continuous changes, with linear programs of few happenings and of all: the same
+//! answers.
 
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -18,11 +19,11 @@ struct DraftAction {
     room: Option<u8>,
     level: u8,
     rate: i8,
-    /// A fact that holds at the start, and one that holds throughout.
+    /// A fact that must hold at the start, and one that must hold over all.
     needs: [Option<u8>; 2],
     /// Thresholds of the level: at start, over all, at end.
     tests: [Option<(bool, i8)>; 3],
-    /// `true` if a fact is taken at the start and given back at the end.
+    /// A fact that is deleted at the start and added at the end.
     takes: Option<u8>,
     gives: u8,
     /// A jump of the level at the end.
@@ -36,7 +37,8 @@ struct Draft {
     levels: [i8; 2],
     goal: Vec<u8>,
     least: Option<(u8, i8)>,
-    /// A bit for each action that needs the idle machine of its level, and takes it while it runs.
+    /// A bit for each action that needs the idle machine of its level, and occupies it while it
+    /// runs.
     machines: u8,
 }
 
@@ -108,7 +110,7 @@ impl Draft {
             }
             for (when, test) in ["at start", "over all", "at end"].iter().zip(action.tests) {
                 if let Some((is_least, bound)) = test {
-                    // A level that falls has a least one, and one that rises a most one.
+                    // A falling level has a lower bound, and a rising one an upper bound.
                     let compare = if is_least == (rate <= 1) { ">=" } else { "<=" };
                     write!(needs, " ({when} ({compare} (l{level}) {bound}))").unwrap();
                 }
@@ -166,7 +168,7 @@ impl Draft {
     }
 }
 
-/// The planner's answer within a number of turns. Its plans have been validated.
+/// Returns the planner's answer within a number of reports. Its plans have been validated.
 fn answer(task: &Task, without: &[Technique]) -> Answer {
     let mut tuning = Tuning::default();
     tuning.without.push(Technique::Cleanup);
@@ -194,7 +196,7 @@ proptest! {
     fn problem_is_solvable_with_few_happenings_exactly_when_it_is_with_all(draft in drafts()) {
         let task = draft.task();
         let answers = [&[][..], &[Technique::Projection]].map(|without| answer(&task, without));
-        // Where one ran out of turns, nothing is known.
+        // If one search was interrupted, there is nothing to compare.
         if !answers.iter().any(is_interrupted) {
             prop_assert_eq!(describe(&answers[0]), describe(&answers[1]));
         }

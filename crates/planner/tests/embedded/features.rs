@@ -30,8 +30,9 @@ fn three_fuses_do_not_fit_under_one_match() {
     assert!(matches!(answer(MATCH, problem), Answer::Unsolvable { .. }));
 }
 
-/// The second instance starts later, takes less, and ends with the first: both make false, at one time,
-/// what both need until then. The search does not find it, and must not deny it.
+/// The second instance starts later, takes less, and ends with the first: at one time, both delete
+/// the fact that both need until then. The search does not find this plan, and must not claim that
+/// none exists.
 #[test]
 fn two_instances_that_start_apart_and_end_together_are_not_denied() {
     let domain = "
@@ -80,11 +81,11 @@ fn a_window_that_is_too_short_is_a_proof_with_a_reason() {
 #[test]
 fn the_goal_counts_after_all_timed_initials() {
     let plan = |problem: &str| describe(&answer(DOOR, problem));
-    // Nothing waits for what comes by itself.
+    // No action is needed for facts that timed initials add.
     let closing = "(:init (open) (at 17 (not (open)))) (:goal (and (in) (not (open))))";
     assert_eq!(plan(closing), "0: (enter) [10]");
     assert_eq!(plan("(:init (at 7 (open))) (:goal (open))"), "");
-    // What is taken away again has to be done later, or not at all.
+    // Facts that a timed initial deletes have to be achieved later, or not at all.
     let turned_out = "(:init (open) (at 20 (not (in)))) (:goal (in))";
     assert_eq!(plan(turned_out), "10001/1000: (enter) [10]");
     let closed = "(:init (open) (at 17 (not (open)))) (:goal (and (in) (open)))";
@@ -100,8 +101,8 @@ fn the_goal_counts_after_all_timed_initials() {
     );
 }
 
-/// Neither the lamp nor its hours matter to the goal. Without them nothing but one action and one window
-/// is left to try, and an exhausted search proves that the second item has no time.
+/// Neither the lamp nor its hours matter to the goal. Without them, only one action and one window
+/// remain to be tried, and an exhausted search proves that the second item has no time.
 #[test]
 fn irrelevant_actions_and_their_timed_initials_are_left_out() {
     let domain = "
@@ -209,8 +210,8 @@ fn actions_that_use_up_a_stock_run_side_by_side() {
     assert_eq!(makespan(&answer(domain, problem)), "10");
 }
 
-/// A courier who carries a parcel to a counter; handing it over ends the carrying that it needs
-/// throughout.
+/// A courier carries a parcel to a counter. Handing it over ends the carrying, which is its
+/// over-all condition.
 const COUNTER: &str = "
     (:requirements :typing :durative-actions :timed-initial-literals)
     (:types place) (:predicates (at ?p - place) (open ?p - place) (parcel ?p - place)
@@ -229,7 +230,7 @@ fn what_must_be_carried_there_takes_both_ways() {
     let problem = "(:objects home shelf counter - place)
         (:init (at home) (parcel shelf) (open counter) (at 25.9 (not (open counter))))
         (:goal (delivered))";
-    // Each of being there, carrying, and the counter's being open is possible in time by itself.
+    // The place, the carrying, and the open counter are each possible in time separately.
     assert_eq!(
         describe(&answer(COUNTER, problem)),
         "no plan exists: `(delivered)` cannot be reached before `(open counter)` closes at 25.9"
@@ -334,7 +335,8 @@ fn interchangeable_objects_are_tried_once() {
 
 #[test]
 fn what_a_conditional_effect_never_makes_true_is_read_all_the_same() {
-    // (p) never changes, but the judge keeps its readers apart from who might change it.
+    // (p) never changes, but the validator separates its readers from the actions that may change
+    // it.
     let plan = describe(&answer(
         "(:predicates (p) (q) (g) (seen) (open))
          (:durative-action a :parameters () :duration (= ?duration 2) :condition (at start (and))

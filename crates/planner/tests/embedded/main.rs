@@ -1,4 +1,4 @@
-//! The embedded planner: what it handles, what it proves, and a slow twin.
+//! The embedded planner: supported features, proofs, and a comparison with an exhaustive search.
 
 #![allow(
     clippy::unwrap_used,

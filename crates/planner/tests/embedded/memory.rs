@@ -1,4 +1,4 @@
-//! What happens when the memory is used up: searches give way to others.
+//! Exhausted memory: searches are abandoned in favour of others.
 
 use std::ops::ControlFlow;
 
@@ -9,7 +9,7 @@ use crate::portfolio::shelf;
 use crate::refinement::{made_up, shop};
 use crate::world::{describe, task};
 
-/// Deep shelves need a search for what is new; the others, which come first, would use up all memory.
+/// Deep shelves need a search by novelty; the others, which come first, would use up all memory.
 #[test]
 fn the_search_that_takes_most_gives_way_to_one_that_finds_a_plan() {
     let (domain, problem) = shelf(6);
@@ -51,10 +51,11 @@ fn the_search_that_takes_most_gives_way_to_one_that_finds_a_plan() {
     assert_eq!(stopped, Stopped::OutOfMemory);
 }
 
-/// How many reports there are at most.
+/// Maximum number of reports.
 const MOST_REPORTS: usize = 200;
 
-/// How many reports there are about better plans of a shop, what the searches took at most, and why it ended.
+/// Returns the number of reports about better plans of a shop, the maximum memory of the searches,
+/// and the reason for the end.
 fn better_plans(max_memory: usize) -> (usize, usize, Stopped) {
     let task = shop(&made_up(1, 8, 4), true);
     let mut settings = Settings {
@@ -63,7 +64,7 @@ fn better_plans(max_memory: usize) -> (usize, usize, Stopped) {
     };
     settings.tuning.first_leg = 2_000;
     settings.tuning.leg = 20_000;
-    // It would end some time after the last search has given way.
+    // It would end some time after the last search has been abandoned.
     settings.tuning.improving_round = u64::MAX;
     let (mut reports, mut most) = (0, 0);
     let answer = plan(
@@ -91,7 +92,7 @@ fn better_plans_are_looked_for_near_the_best_one_when_the_searches_have_no_room(
     let (reports, needed, stopped) = better_plans(usize::MAX);
     assert_eq!((reports, stopped), (MOST_REPORTS, Stopped::Interrupted));
     let limit = needed / 4;
-    // As long as with all the memory that there is, and the searches have less of it.
+    // It runs as long as with unlimited memory, and the searches use less memory.
     let (others, most, stopped) = better_plans(limit);
     assert_eq!((others, stopped), (reports, Stopped::Interrupted));
     assert!(most < needed / 2, "{most} of {limit}");

@@ -1,4 +1,4 @@
-//! Plans of a better metric: small problems whose best plans are known.
+//! Plans with a better metric: small problems whose best plans are known.
 
 use std::ops::ControlFlow;
 
@@ -7,7 +7,7 @@ use elbowroom_planner::{Answer, Found, Objective, Settings, Stopped, plan};
 
 use crate::world::{describe, task};
 
-/// Searches until there is nothing left, and returns all plans that were reported.
+/// Searches until the space is exhausted, and returns all plans that were reported.
 fn plans(domain: &str, problem: &str, settings: &Settings) -> (Vec<Found>, Answer) {
     let task = task(domain, problem);
     let situation = Situation::initial(&task);
@@ -24,7 +24,7 @@ fn plans(domain: &str, problem: &str, settings: &Settings) -> (Vec<Found>, Answe
     (plans, answer)
 }
 
-/// The best plan's metric and makespan, the search having ended by itself.
+/// Returns the best plan's metric and makespan from a search that has ended by itself.
 fn best(domain: &str, problem: &str) -> (String, String) {
     let (plans, answer) = plans(domain, problem, &Settings::default());
     let Answer::Plan { found, stopped, .. } = &answer else {
@@ -131,7 +131,7 @@ fn what_is_maximized_grows_from_plan_to_plan() {
 
 #[test]
 fn a_price_that_is_paid_for_time_is_kept_low() {
-    // The longer the lamp burns, the dearer; it must burn as long as the work lasts.
+    // The cost grows with the time that the lamp burns; it must burn while the work lasts.
     let domain = "(:requirements :durative-actions :numeric-fluents :duration-inequalities)
         (:predicates (light) (done) (dark)) (:functions (oil))
         (:durative-action burn :parameters ()
@@ -146,7 +146,7 @@ fn a_price_that_is_paid_for_time_is_kept_low() {
 
 #[test]
 fn a_fluent_that_conditions_read_can_be_measured() {
-    // Fuel is what conditions read and the metric measures: the way round needs less.
+    // The conditions read the fuel that the metric measures: the way round needs less.
     let domain = "(:requirements :durative-actions :numeric-fluents)
         (:predicates (a) (b) (c)) (:functions (fuel))
         (:durative-action straight :parameters () :duration (= ?duration 2)

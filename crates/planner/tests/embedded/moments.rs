@@ -1,5 +1,5 @@
-//! Over-all conditions at the moments of start and end: what the start itself brings about, what several
-//! happenings of one moment bring about together, durations of 0, and open ends.
+//! Over-all conditions at the moments of start and end: effects of the start itself, joint effects
+//! of several happenings of one moment, durations of 0, and open ends.
 
 use elbowroom_planner::Answer;
 
@@ -17,7 +17,7 @@ fn finds(domain: &str, problem: &str) {
     assert!(answer.found().is_some(), "{}", describe(&answer));
 }
 
-/// One action whose over-all condition is false before its start.
+/// Checks one action whose over-all condition is false before its start.
 fn finds_with(predicates: &str, over_all: &str, start_effect: &str, init: &str) {
     finds(
         &format!(
@@ -139,7 +139,8 @@ fn duration_zero_needs_start_and_end_that_do_not_interfere() {
     assert!(answer.found().is_none(), "{}", describe(&answer));
 }
 
-/// A tank that an action drains or fills by 20 each unit of time, under a strict over-all condition.
+/// Returns the answer for a tank that an action drains or fills by 20 each unit of time, under a
+/// strict over-all condition.
 fn tank(duration: u8, condition: &str, change: &str, level: u8) -> Answer {
     answer(
         &format!(

@@ -1,4 +1,4 @@
-//! Numbers that change continuously, where a condition on them decides what happens.
+//! Numbers that change continuously, and conditions on them.
 
 use std::ops::ControlFlow;
 
@@ -8,7 +8,7 @@ use elbowroom_planner::{Answer, Settings, plan};
 
 use crate::world::{describe, task};
 
-/// The most states per problem.
+/// Maximum number of states per problem.
 const STATES: u64 = 100;
 
 fn answered(task: &Task) -> Answer {
@@ -30,7 +30,8 @@ fn answered(task: &Task) -> Answer {
     )
 }
 
-/// The names of the steps of the first plan in the order of their starts, without repetition.
+/// Returns the names of the steps of the first plan in the order of their starts, without
+/// repetition.
 fn found(domain: &str, problem: &str) -> Vec<String> {
     let task = task(domain, problem);
     let answer = answered(&task);

@@ -1,4 +1,4 @@
-//! Times that lie on no grid that the planner can work with, as worlds tell them.
+//! Times that are not on any grid of the planner, as worlds report them.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use elbowroom_planner::{Answer, Found, Settings, Stopped, plan};
 
 use crate::world::{describe, task};
 
-/// The first plan, or what is known after so many states.
+/// Returns the first plan, or the answer after `states` states.
 fn answer_within(task: &Task, situation: &Situation, states: u64) -> Answer {
     let settings = Settings {
         first_plan_only: true,
@@ -29,7 +29,7 @@ fn found(answer: &Answer) -> &Found {
     found.unwrap_or_else(|| panic!("{}", describe(answer)))
 }
 
-/// An action that has been under way since `start`.
+/// Returns an action that has been running since `start`.
 fn running(
     task: &Task,
     (schema, arguments): (&str, &[&str]),
@@ -50,7 +50,7 @@ fn fixed(duration: i64) -> Interval {
     Interval::closed(duration.into(), duration.into())
 }
 
-/// Couriers that bring letters, and rest as long as they like.
+/// Couriers that bring letters, and rest for any duration.
 const COURIERS: &str = "
     (:requirements :typing :durative-actions :numeric-fluents :duration-inequalities)
     (:types courier place letter)
@@ -75,7 +75,7 @@ const COURIERS: &str = "
       :effect (and (at start (not (idle ?c))) (at end (idle ?c))
         (at end (increase (strength ?c) (* 2 ?duration)))))";
 
-/// Ann and Bob between three places.
+/// Returns a task with Ann and Bob between three places.
 fn couriers(init: &str, goal: &str) -> Task {
     task(
         COURIERS,
@@ -90,7 +90,8 @@ fn couriers(init: &str, goal: &str) -> Task {
     )
 }
 
-/// Both are on their way. How long somebody rests can be chosen, so that linear programs find the times.
+/// Returns a situation with both on their way. The durations of rests can be chosen, so that linear
+/// programs compute the times.
 fn on_the_way() -> (Task, Situation) {
     let task = couriers(
         "(has ann blue) (has bob red) (= (strength ann) 20) (= (strength bob) 16) (accessible mill)",
@@ -130,7 +131,7 @@ fn what_is_under_way_ends_exactly_when_it_should_though_other_durations_are_chos
     );
 }
 
-/// Up to the first plan, also while its times are looked for.
+/// Up to the first plan, including the computation of its times.
 #[test]
 fn each_report_can_be_the_last_one() {
     let (task, situation) = on_the_way();
@@ -233,8 +234,8 @@ fn what_is_under_way_keeps_off_a_bound_that_is_no_possible_duration() {
     assert!(duration > 2.into() && duration < "2.0001".parse().unwrap());
 }
 
-/// By less than a tick, there is no time to pass; so the judge refuses every plan, and there are ever
-/// longer ones.
+/// Off the grid by less than a tick, no time is left. So the validator rejects every plan, and the
+/// candidates become longer and longer.
 #[test]
 fn candidates_that_the_judge_refuses_count_as_states() {
     let task = task(
@@ -250,6 +251,6 @@ fn candidates_that_the_judge_refuses_count_as_states() {
     let Answer::NoneFound { counts, .. } = &answer else {
         panic!("{}", describe(&answer));
     };
-    // No state is made without having been generated, but for the first one of each search.
+    // Except for the first one of each search, each evaluated state has been generated before.
     assert!(counts.evaluated > 2 * counts.generated, "{counts:?}");
 }

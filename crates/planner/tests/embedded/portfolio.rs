@@ -7,8 +7,9 @@ use elbowroom_planner::{Answer, Member, Settings, Technique, Tuning, plan};
 
 use crate::world::{describe, task};
 
-/// A shelf is one cell wide and `depth` deep; a crane stands before it. Boxes have to fill it, so
-/// the deepest cell comes first: what stands in a cell keeps the crane from those behind.
+/// Returns a problem with a shelf that is one cell wide and `depth` deep, and a crane in front of
+/// it. Boxes have to fill the shelf, so the deepest cell comes first: a box in a cell blocks the
+/// cells behind it.
 pub(crate) fn shelf(depth: usize) -> (String, String) {
     let domain = "
         (:requirements :typing :durative-actions)
@@ -54,7 +55,7 @@ pub(crate) fn shelf(depth: usize) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// The first plan within so many states.
+/// Returns the first plan within `states` states.
 fn found(domain: &str, problem: &str, tuning: Tuning, states: u64) -> Answer {
     let task = task(domain, problem);
     let situation = Situation::initial(&task);
@@ -94,7 +95,7 @@ fn each_technique_can_be_done_without() {
     }
 }
 
-/// The shelf must be filled from its end, which no relaxed plan sees.
+/// The shelf must be filled from its end, which relaxed plans do not represent.
 #[test]
 fn a_shelf_is_filled_from_its_end_by_looking_for_new_states() {
     let (domain, problem) = shelf(6);
@@ -104,7 +105,7 @@ fn a_shelf_is_filled_from_its_end_by_looking_for_new_states() {
     assert!(answer.found().is_some(), "{}", describe(&answer));
 }
 
-/// Whatever is switched off, a full shelf takes no more, and none is claimed to.
+/// With any technique switched off, a full shelf holds no further box, and no plan is reported.
 #[test]
 fn one_box_too_many_has_no_plan_whatever_is_switched_off() {
     let (domain, problem) = shelf(1);
@@ -124,7 +125,7 @@ fn one_box_too_many_has_no_plan_whatever_is_switched_off() {
     }
 }
 
-/// Relations that no action and no rule brings about stay false, whatever the intervals do.
+/// Relations that no action and no rule achieves stay false for all intervals.
 #[test]
 fn a_goal_that_nothing_achieves_is_proved_to_be_out_of_reach() {
     let domain = "

@@ -1,5 +1,5 @@
-//! Better plans near the best one: as short as the shortest there is, alike in each run, and
-//! stopped when told so.
+//! Better plans near the best one: as short as the optimum, the same in each run, and stopped on
+//! request.
 
 use std::ops::ControlFlow;
 
@@ -9,10 +9,10 @@ use elbowroom_planner::{Answer, Found, Member, Phase, Settings, Stopped, Techniq
 
 use crate::world::{describe, task};
 
-/// Jobs of several operations, one after the other; `durations[job][machine]`. Each job goes over
-/// the machines in its own order, and each machine does one at a time. With `takes_hands`, each
-/// operation takes one of many hands: a search that compresses actions lets one wait for the other
-/// because of that.
+/// Jobs of several operations, one after the other; `durations[job][machine]`. Each job visits the
+/// machines in its own order, and each machine processes one job at a time. With `takes_hands`,
+/// each operation takes one of many hands: a search that compresses actions makes operations wait
+/// for each other because of that.
 pub(crate) type Shop = Vec<Vec<(usize, i64)>>;
 
 pub(crate) fn shop(jobs: &Shop, takes_hands: bool) -> Task {
@@ -53,7 +53,8 @@ pub(crate) fn shop(jobs: &Shop, takes_hands: bool) -> Task {
     )
 }
 
-/// The shortest time, by all orders of operations: each as early as its job and its machine allow.
+/// Returns the shortest makespan over all orders of operations, each as early as its job and its
+/// machine allow.
 fn shortest(jobs: &Shop) -> i64 {
     fn best(
         jobs: &Shop,
@@ -88,7 +89,7 @@ fn shortest(jobs: &Shop) -> i64 {
     )
 }
 
-/// The plans that are reported up to that report, and the answer.
+/// Returns the plans that are reported up to report `most`, and the answer.
 fn run(task: &Task, settings: &Settings, most: usize) -> (Vec<Found>, Answer) {
     let situation = Situation::initial(task);
     let (mut plans, mut reports) = (Vec::new(), 0);
@@ -106,7 +107,7 @@ fn run(task: &Task, settings: &Settings, most: usize) -> (Vec<Found>, Answer) {
 
 const NEAR_THE_BEST: [Technique; 2] = [Technique::Rescheduling, Technique::Repair];
 
-/// One search alone, with or without what it is about.
+/// Returns settings for a single search, with or without refinement.
 fn settings(is_refining: bool) -> Settings {
     let mut settings = Settings::default();
     settings.tuning.only = Some(Member::Compressing);
@@ -116,7 +117,7 @@ fn settings(is_refining: bool) -> Settings {
     settings
 }
 
-/// Shops made up by a counter.
+/// Returns a shop generated from a seed.
 pub(crate) fn made_up(seed: usize, jobs: usize, machines: usize) -> Shop {
     let job = |job: usize| {
         let operation = |number: usize| {
@@ -166,7 +167,7 @@ fn what_was_chosen_one_after_the_other_happens_side_by_side() {
 
 #[test]
 fn the_search_for_everything_finds_nothing_better() {
-    // Two jobs: all of it can be searched.
+    // Two jobs: the whole space can be searched.
     for seed in 0..4 {
         let jobs = made_up(seed, 2, 2);
         let task = shop(&jobs, false);
@@ -181,7 +182,8 @@ fn the_search_for_everything_finds_nothing_better() {
 
 #[test]
 fn work_is_moved_to_who_is_idle() {
-    // Six jobs of four, for three workers; who is chosen first is no matter to the number of steps.
+    // Six jobs of four, for three workers. The choice of the first worker does not change the
+    // number of steps.
     let task = task(
         "(:requirements :typing :durative-actions) (:types worker job)
          (:predicates (idle ?w - worker) (open ?j - job) (done ?j - job) (can ?w - worker ?j - job))

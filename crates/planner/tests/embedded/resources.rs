@@ -1,4 +1,4 @@
-//! Numbers that are used up, lent out, and filled up again.
+//! Numbers that are used up, lent out, and replenished.
 
 use std::ops::ControlFlow;
 
@@ -30,8 +30,9 @@ fn what_is_lent_in_numbers_is_no_proof_that_it_is_missing() {
     assert!(alone.found().is_none(), "{}", describe(&alone));
 }
 
-/// A rover on a road of places in a row, with a battery for so many steps; it is charged, by one
-/// step each time, at the beginning only. A sample lies at each end.
+/// Returns a problem with a rover on a road of places in a row, with a battery for `capacity`
+/// steps. It is charged by one step at a time, only at the rover's initial place in the middle.
+/// There is a sample at each end.
 fn road(length: usize, capacity: usize) -> (String, String) {
     let domain = "
         (:requirements :typing :durative-actions :numeric-fluents)
@@ -70,8 +71,8 @@ fn what_a_relaxed_plan_uses_up_is_filled_up_before() {
     let Answer::Plan { counts, .. } = &answer else {
         panic!("{}", describe(&answer));
     };
-    // Nothing else tells the rover to charge before it is stranded: without counting what is used
-    // up, this takes ten times as many states.
+    // Only the accounting of consumption makes the rover charge before it is stranded. Without it,
+    // the search takes ten times as many states.
     assert!(counts.evaluated < 150, "{} states", counts.evaluated);
 }
 
@@ -137,8 +138,9 @@ fn a_battery_that_is_too_small_is_no_plan() {
     );
 }
 
-/// A laboratory with two robots, which carry samples to benches and instruments. People prepare samples and fill
-/// reagents up during shifts; samples are archived at night.
+/// Returns a problem with a laboratory and two robots, which carry samples to benches and
+/// instruments. People prepare samples and replenish reagents during shifts; samples are archived
+/// at night.
 fn laboratory(samples: usize) -> (String, String) {
     let domain = "
         (:requirements :typing :durative-actions :numeric-fluents :timed-initial-literals)
@@ -202,8 +204,8 @@ fn laboratory(samples: usize) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// Refilling in estimates, and estimates alone, leave a search on plateaus here: without the turns of BFWS(f₂) that
-/// does not refill, this takes more than 14,000 states.
+/// Replenishing in estimates, and estimates alone, leave a search on plateaus here: without the
+/// turns of BFWS(f₂) without replenishing, this takes more than 14,000 states.
 #[test]
 fn search_for_new_states_without_refilling_leaves_plateaus() {
     let (domain, problem) = laboratory(10);

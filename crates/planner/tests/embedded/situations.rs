@@ -18,8 +18,8 @@ const DELIVERY: &str = "
       :condition (and (over all (there)) (over all (open)) (at start (loaded)))
       :effect (and (at start (not (loaded))) (at end (delivered))))";
 
-/// It is 6; an action without arguments has been under way since 0, and its start has made a fact
-/// false.
+/// Returns the situation at time 6 in which an action without arguments has been running since 0,
+/// and its start has made a fact false.
 fn under_way(task: &Task, schema: &str, gone: &str, duration: Interval) -> Situation {
     let schema = task.problem().schema(schema).expect("as written");
     let action = task.instantiate(schema, &[]).expect("as written");
@@ -36,7 +36,7 @@ fn under_way(task: &Task, schema: &str, gone: &str, duration: Interval) -> Situa
     situation
 }
 
-/// On the way since 0 with the parcel; it is 6 now.
+/// Returns the situation at 6, on the way since 0 with the parcel.
 fn on_the_way(closing: &str, duration: Interval) -> (Task, Situation) {
     let problem =
         format!("(:init (here) (loaded) (open) (at {closing} (not (open)))) (:goal (delivered))");
@@ -90,7 +90,7 @@ const TIMELY: &str = "
       :condition (at start (idle))
       :effect (and (at start (not (idle))) (at end (idle)) (at end (increase (water) (* ?duration 2)))))";
 
-/// Worlds tell the time in floats, which no grid holds.
+/// Worlds report the time in floats, which no grid contains.
 #[test]
 fn a_plan_that_begins_at_once_begins_at_no_earlier_time_than_it_is() {
     for goal in ["(done)", "(>= (water) 5)", "(and (done) (>= (water) 5))"] {
@@ -108,7 +108,7 @@ fn a_plan_that_begins_at_once_begins_at_no_earlier_time_than_it_is() {
             let Answer::Plan { found, .. } = answer else {
                 panic!("{goal} at {time}: {answer}", answer = describe(&answer));
             };
-            // The first step waits for nothing.
+            // The first step does not wait for anything.
             let first = &found.plan.steps[0].start;
             assert_eq!(*first, situation.time, "{goal} at {time}");
         }
@@ -124,7 +124,7 @@ const GRID: &str = "
       :effect (and (at start (not (at ?a))) (at end (at ?b)) (at end (been ?b))
                    (at end (increase (steps) 1))))";
 
-/// A ring in which the goal asks for more steps than anyone would wait for.
+/// Returns a task on a ring, with a goal that requires more steps than any search can make.
 fn endless() -> Task {
     task(
         GRID,
@@ -184,7 +184,8 @@ fn the_same_problem_has_the_same_answer_and_reports() {
     assert_eq!(run(), run());
 }
 
-/// A tank that is being filled since 0, by two for each unit of time, when it is done; it is 6 now.
+/// Returns the situation at 6 of a tank that has been filling since 0, by two for each unit of
+/// time, until the action ends.
 fn filling(duration: Interval) -> (Task, Situation) {
     let domain = "
         (:requirements :durative-actions :numeric-fluents)
@@ -218,11 +219,11 @@ fn what_is_under_way_changes_numbers_by_how_long_it_lasts() {
 
 #[test]
 fn what_takes_longer_than_it_should_changes_numbers_more() {
-    // The duration is known, and not the domain's.
+    // The duration is known, but differs from the domain's.
     let (task, situation) = filling(Interval::closed(10.into(), 10.into()));
     let answer = answer_from(&task, &situation, 100);
     assert_eq!(describe(&answer), "0: (fill) [10]\n10001/1000: (drain) [1]");
-    // It may last from 7 to 10: then it lasts as long as it has to.
+    // It may last from 7 to 10: the plan uses the duration that it needs.
     let (task, situation) = filling(Interval::closed(7.into(), 10.into()));
     let answer = answer_from(&task, &situation, 100);
     assert!(

@@ -1,4 +1,4 @@
-//! The same reports and the same answer, whatever the number of threads.
+//! The reports and the answer do not depend on the number of threads.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -13,7 +13,8 @@ use crate::refinement::{made_up, shop};
 use crate::twin::drafts::{METRICS, drafts, thrifty_drafts};
 use crate::world::{describe, task};
 
-/// Strands begin side by side at once, and exchange what they find after little work.
+/// Returns settings with which strands start concurrently at once, and exchange their plans after
+/// little work.
 fn settings(threads: usize) -> Settings {
     let mut settings = Settings {
         threads,
@@ -26,8 +27,8 @@ fn settings(threads: usize) -> Settings {
     settings
 }
 
-/// All that is reported until the `most`th report, and the answer. The task is made anew each time: planning
-/// names facts in it.
+/// Returns all reports until report `most`, and the answer. Each run creates its own task, since
+/// planning adds facts to its table.
 fn run(make: &dyn Fn() -> Task, settings: &Settings, most: usize) -> (Vec<Progress>, Answer) {
     let task = make();
     let situation = Situation::initial(&task);
@@ -43,7 +44,7 @@ fn run(make: &dyn Fn() -> Task, settings: &Settings, most: usize) -> (Vec<Progre
     (reports, answer)
 }
 
-/// Whether threads make no difference. How many plans were told of.
+/// Checks that the number of threads makes no difference. Returns the number of reported plans.
 fn agree(make: &dyn Fn() -> Task, adapt: &dyn Fn(&mut Settings), most: usize) -> usize {
     let run = |threads| {
         let mut settings = settings(threads);
@@ -145,7 +146,7 @@ fn our_own_cases_have_the_same_plans() {
     }
 }
 
-/// The second strand does something.
+/// The second strand changes the result.
 #[test]
 fn a_second_strand_makes_a_difference() {
     let differ = (0..3).any(|seed| {

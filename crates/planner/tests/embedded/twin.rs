@@ -1,5 +1,5 @@
-//! A slow search over all sequences of happenings, each scheduled by Bellman and Ford and shown to
-//! the judge, finds a plan exactly when the planner does, and the same metric at best.
+//! An exhaustive search over all sequences of happenings, each scheduled by Bellman and Ford and
+//! validated, finds a plan exactly when the planner does, and the same best metric.
 
 pub(crate) mod drafts;
 mod walk;
@@ -55,7 +55,7 @@ proptest! {
                 prop_assert_ne!(found, Some(true), "{}", describe(&answer));
             }
             Answer::NoneFound { .. } | Answer::Unsupported(_) => {
-                // Ends of one time that run the store out together are beyond the planner.
+                // The planner does not support ends of one time that use up the store together.
                 let is_plain = draft.actions.iter().all(|action| !action.minds);
                 prop_assert!(!is_plain || found != Some(true), "{}", describe(&answer));
             }
@@ -72,7 +72,7 @@ proptest! {
         let task = draft.task_with(&prices, METRICS[metric]);
         let situation = Situation::initial(&task);
         let mut turns = 0;
-        // Now and then there is no end to what a search may look at.
+        // For some problems the search space is infinite.
         let settings = Settings { max_memory: 8 << 20, self_overlap, ..Settings::default() };
         let answer = plan(&task, &situation, &settings, &mut |_| {
             turns += 1;

@@ -6,7 +6,7 @@ use elbowroom_model::{Situation, Task};
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_planner::{Answer, Settings, Technique, plan};
 
-/// The task of a domain's and a problem's inner parts.
+/// Returns the task of a domain's and a problem's inner parts.
 pub(crate) fn task(domain: &str, problem: &str) -> Task {
     let domain = format!("(define (domain d) {domain})");
     let problem = format!("(define (problem p) (:domain d) {problem})");
@@ -20,7 +20,7 @@ pub(crate) fn task(domain: &str, problem: &str) -> Task {
     }
 }
 
-/// The first plan, or what is known after so many reports.
+/// Returns the first plan, or the answer after `turns` reports.
 pub(crate) fn answer_from(task: &Task, situation: &Situation, turns: usize) -> Answer {
     answer_by(task, situation, turns, &Settings::default())
 }
@@ -47,7 +47,7 @@ pub(crate) fn answer(domain: &str, problem: &str) -> Answer {
     answer_from(&task, &situation, 400)
 }
 
-/// The same without clean-up, so that the counts are those of the first plan.
+/// As above, without clean-up, so that the counts are those of the first plan.
 pub(crate) fn answer_without_cleanup(domain: &str, problem: &str) -> Answer {
     let task = task(domain, problem);
     let mut settings = Settings::default();
@@ -55,7 +55,7 @@ pub(crate) fn answer_without_cleanup(domain: &str, problem: &str) -> Answer {
     answer_by(&task, &Situation::initial(&task), 400, &settings)
 }
 
-/// The same, with self-overlap allowed.
+/// As above, with self-overlap allowed.
 pub(crate) fn answer_with_self_overlap(domain: &str, problem: &str) -> Answer {
     let task = task(domain, problem);
     let settings = Settings {
@@ -65,7 +65,7 @@ pub(crate) fn answer_with_self_overlap(domain: &str, problem: &str) -> Answer {
     answer_by(&task, &Situation::initial(&task), 400, &settings)
 }
 
-/// The steps of a plan, or why there is none.
+/// Returns the steps of a plan, or the reason why there is none.
 pub(crate) fn describe(answer: &Answer) -> String {
     match answer {
         Answer::Plan { found, .. } => {

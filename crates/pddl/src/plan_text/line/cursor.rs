@@ -23,7 +23,7 @@ impl<'s> Cursor<'s> {
         Self { text, at: 0, start }
     }
 
-    /// The place in the text.
+    /// Returns the position in the text.
     pub(super) fn place(&self) -> usize {
         self.start + self.at
     }
@@ -114,7 +114,7 @@ impl<'s> Cursor<'s> {
         }
     }
 
-    /// Reads an action behind `time:`.
+    /// Reads an action after `time:`.
     fn timed(&mut self, time: Word<'s>) -> Step<'s> {
         let is_spaced = !self.rest().starts_with(|c: char| c.is_ascii_digit());
         self.skip_space();
@@ -144,7 +144,7 @@ impl<'s> Cursor<'s> {
         }
     }
 
-    /// `step 0:`
+    /// Reads `step 0:`.
     fn step_number(&mut self) -> Option<Word<'s>> {
         let begin = self.at;
         if self.word(is_delimiter).text.eq_ignore_ascii_case("step") {
@@ -160,7 +160,7 @@ impl<'s> Cursor<'s> {
         None
     }
 
-    /// `3||0 ---`
+    /// Reads `3||0 ---`.
     fn node(&mut self) -> Option<(Word<'s>, Word<'s>)> {
         let begin = self.at;
         let level = self.word(|c| c.is_whitespace() || c == '|');
@@ -176,7 +176,7 @@ impl<'s> Cursor<'s> {
         None
     }
 
-    /// `NAME ARGUMENT … --- SON: 4||0`
+    /// Reads `NAME ARGUMENT … --- SON: 4||0`.
     fn contingent(&mut self, level: Word<'s>, node: Word<'s>) -> Result<RawStep<'s>, Mistake> {
         let mut words = Vec::new();
         loop {
@@ -210,7 +210,7 @@ impl<'s> Cursor<'s> {
         })
     }
 
-    /// `(name argument …)`, `name(argument, …)`, or behind a time `name argument …`.
+    /// Reads `(name argument …)`, `name(argument, …)`, or, after a time, `name argument …`.
     fn action(&mut self, time: Option<Word<'s>>) -> Step<'s> {
         let begin = self.place();
         if self.eat("(") {
@@ -261,7 +261,7 @@ impl<'s> Cursor<'s> {
         }
     }
 
-    /// Words up to the closing parenthesis, `None` if there is none.
+    /// Returns the words up to the closing parenthesis, or `None` if there is none.
     fn arguments(&mut self, with_commas: bool) -> Option<Vec<Word<'s>>> {
         let mut words = Vec::new();
         loop {
@@ -283,9 +283,9 @@ impl<'s> Cursor<'s> {
         }
     }
 
-    /// `[10.0]`, `[D:10.0; C:0.1]`, or at the end of the line a number without brackets.
+    /// Reads `[10.0]`, `[D:10.0; C:0.1]`, or a number without brackets at the end of the line.
     ///
-    /// The plan files of LPG-td have a parenthesis more than they open: `0: (NAME) [10.0])`.
+    /// The plan files of LPG-td have a superfluous closing parenthesis: `0: (NAME) [10.0])`.
     fn with_duration(&mut self, mut step: RawStep<'s>) -> Step<'s> {
         self.skip_space();
         let begin = self.at;
@@ -334,7 +334,8 @@ impl<'s> Cursor<'s> {
         Ok(Some(step))
     }
 
-    /// A line with a time is meant as an action; others may be anything.
+    /// Returns a mistake for a line with a time, which is meant as an action. Other lines may be
+    /// anything.
     fn broken(&self, time: Option<&Word<'s>>, expected: &'static str) -> Step<'s> {
         match time {
             Some(_) => Err((self.place(), expected)),

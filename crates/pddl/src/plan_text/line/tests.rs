@@ -1,6 +1,6 @@
 use super::*;
 
-/// `time/word word/duration` of each step.
+/// Returns `time/word word/duration` of each step.
 fn shown(text: &str) -> String {
     match line(text, 0) {
         Line::Steps(steps) => steps

@@ -1,4 +1,4 @@
-//! What must hold, now or throughout.
+//! Conditions that must hold at one moment, or while an action runs.
 
 use elbowroom_num::Rational;
 
@@ -10,7 +10,7 @@ use super::super::state::{Open, State};
 use super::super::symbolic::{self, Piece};
 use super::{Stepper, duration_form};
 
-/// Most alternatives of a goal that are tried one by one.
+/// Maximum number of alternatives of a goal that are tried one by one.
 const MOST_GOALS: usize = 32;
 
 /// Position of a moment relative to the open interval of an over-all condition.
@@ -25,7 +25,7 @@ pub(super) enum Side {
 }
 
 impl Stepper<'_> {
-    /// Demands the goal of the times: the first of its alternatives that some times meet.
+    /// Demands the goal: adds the first of its alternatives that some times satisfy.
     pub(crate) fn reach_goal(&mut self, state: &mut State) -> Option<()> {
         let goal = &self.compiled.goal;
         let has_tests = |part: &Formula| {
@@ -51,7 +51,7 @@ impl Stepper<'_> {
         })
     }
 
-    /// Requires a condition, now or, where numbers depend on times, of the times.
+    /// Requires a condition now. If numbers depend on times, adds a demand on the times.
     pub(super) fn demand(
         &mut self,
         state: &mut State,
@@ -98,7 +98,7 @@ impl Stepper<'_> {
         symbolic::demand_over_all(self.compiled, state, over_all, at, lost)
     }
 
-    /// Demands the over-all conditions that read one of the fluents, of all that is under way.
+    /// Demands the over-all conditions of all running actions that read one of the fluents.
     pub(super) fn watch(
         &mut self,
         state: &mut State,
@@ -135,7 +135,7 @@ impl Stepper<'_> {
             .then_some(())
     }
 
-    /// Whether the over-all conditions of the actions under way still hold.
+    /// Returns `Some` if the over-all conditions of the running actions still hold.
     pub(super) fn keeps_conditions(&self, state: &State) -> Option<()> {
         if state.symbolic.is_some() {
             return self.keeps_facts(state);
@@ -151,7 +151,8 @@ impl Stepper<'_> {
             .then_some(())
     }
 
-    /// The same where numbers depend on times and are watched as they change.
+    /// As [`keeps_conditions`](Self::keeps_conditions), where numbers depend on times and are
+    /// watched as they change.
     fn keeps_facts(&self, state: &State) -> Option<()> {
         let symbolic = state.symbolic.as_ref()?;
         let may_pass = |test: u32, open: &Open| {
@@ -172,7 +173,7 @@ impl Stepper<'_> {
             .then_some(())
     }
 
-    /// Which of the action's guards hold now, a bit each.
+    /// Returns the set of the action's guards that hold now, as a bit mask.
     pub(super) fn guards(
         &self,
         state: &State,

@@ -1,4 +1,4 @@
-//! How long an action may take.
+//! Durations of actions.
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
@@ -11,7 +11,8 @@ use super::super::time::{NEVER, Ticks};
 use super::Stepper;
 
 impl Stepper<'_> {
-    /// The bounds of an action that would start now, and the duration if there is only one.
+    /// Returns the duration bounds of an action that would start now, and the duration if only one
+    /// is possible.
     pub(super) fn duration_bounds(
         &mut self,
         state: &State,
@@ -21,7 +22,7 @@ impl Stepper<'_> {
         let mut most = action.duration.most.clone();
         for bound in action.duration.bounds.iter().filter(|bound| !bound.at_end) {
             let value = match bound.value.value(&state.values, None) {
-                // It depends on times, and is demanded of them.
+                // The value depends on times; it becomes a demand.
                 None if state.symbolic.is_some() => continue,
                 value => value?,
             };
@@ -48,7 +49,7 @@ impl Stepper<'_> {
                 down
             }
         };
-        // Between two ticks, take the lower one for both.
+        // Between two ticks, use the lower one for both bounds.
         let least = if up > down { down } else { up };
         Some((least, down, duration))
     }
@@ -93,7 +94,7 @@ pub(super) fn demand_duration(
     Some(())
 }
 
-/// Whether a duration constraint bounds from below, and from above.
+/// Returns whether a duration constraint is a lower bound, and whether it is an upper bound.
 fn sides(comparison: Comparison) -> (bool, bool) {
     match comparison {
         Comparison::Less | Comparison::AtMost => (false, true),

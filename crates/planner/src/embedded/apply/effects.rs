@@ -1,4 +1,4 @@
-//! What a happening changes.
+//! Effects of happenings.
 
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
@@ -12,7 +12,7 @@ use super::Stepper;
 use super::conditions::Side;
 
 impl Stepper<'_> {
-    /// Carries out the effects: all read the state on arrival.
+    /// Applies the effects. All of them read the state before the happening.
     pub(super) fn take_effect(
         &mut self,
         state: &mut State,
@@ -41,8 +41,8 @@ impl Stepper<'_> {
             return None;
         }
         for cost in costs {
-            // Of something that was under way before, the duration may be open. Then its cost is
-            // not counted, but the judge counts it.
+            // The duration of an action that was running in the situation may be open. Its cost is
+            // not counted here, but the validator counts it.
             if let Some(cost) = cost.value(&state.values, duration) {
                 state.cost += cost;
             }
@@ -86,7 +86,7 @@ impl Stepper<'_> {
     }
 }
 
-/// Carries out numeric effects; all read the state on arrival.
+/// Applies numeric effects. All of them read the state before the happening.
 fn update_values(
     state: &mut State,
     updates: &[&Update],

@@ -1,4 +1,4 @@
-//! The place of a happening in time.
+//! Placement of happenings in time.
 
 use super::super::compile::{Action, Snap};
 use super::super::network::{NodeId, SETTLED, Within};
@@ -15,7 +15,7 @@ pub(super) struct Place {
 }
 
 impl Stepper<'_> {
-    /// When the snap may happen, after all that was chosen before.
+    /// Returns the time window of the snap after all earlier choices.
     pub(super) fn place(&self, state: &State, snap: &Snap) -> Place {
         let mut place = Place {
             earliest: self.compiled.now,
@@ -50,7 +50,7 @@ impl Stepper<'_> {
         place
     }
 
-    /// Lets the happening be at the moment that is not complete yet, if there is one.
+    /// Adds the happening to the moment that is not yet complete, if there is one.
     pub(super) fn join(&mut self, state: &mut State, node: NodeId) -> Option<()> {
         self.newest = node;
         let Some(joint) = state.joint.filter(|joint| joint.node != node) else {
@@ -63,8 +63,8 @@ impl Stepper<'_> {
         state.network.add_edge(node, joint.node, 0).ok()
     }
 
-    /// Notes what was chosen last, where choices come in the order of time: what is under way ends
-    /// no earlier.
+    /// Records the last choice, if choices come in chronological order. Running actions end no
+    /// earlier than it.
     pub(super) fn note_last(
         &mut self,
         state: &mut State,
@@ -91,8 +91,8 @@ impl Stepper<'_> {
         Some(())
     }
 
-    /// Puts the new one among those under way: where the end of one breaks the over-all condition
-    /// of another, that one must be over by then.
+    /// Constrains the ends of the new running action and the others. If the end of one breaks the
+    /// over-all condition of another, the other must have ended by then.
     pub(super) fn nest(&self, state: &mut State, new: &Open) -> Option<()> {
         if !self.compiled.tuning.uses(Technique::Nesting) {
             return Some(());
@@ -110,7 +110,7 @@ impl Stepper<'_> {
         Some(())
     }
 
-    /// Whether the end of one action makes the over-all condition of another false.
+    /// Returns `true` if the end of one action makes the over-all condition of another false.
     fn breaks(&self, ending: u32, running: u32) -> bool {
         let end = self.compiled.snap(self.compiled.action(ending).end);
         let over_all = &self.compiled.action(running).over_all.literals;
@@ -125,7 +125,7 @@ impl Stepper<'_> {
     }
 }
 
-/// Lets a timed initial happen after what was chosen last, and before what follows.
+/// Places a timed initial after the last choice and before all later ones.
 pub(super) fn reach_timed(state: &mut State, time: Ticks) -> Option<()> {
     if state.last.node == SETTLED {
         if state.last.floor > time {
@@ -138,8 +138,8 @@ pub(super) fn reach_timed(state: &mut State, time: Ticks) -> Option<()> {
     Some(())
 }
 
-/// Gives the happening its place in time. It is settled if nothing can push it and nothing
-/// pushes back.
+/// Inserts the happening into the network. It is settled if no other happening can delay it and it
+/// delays no other happening.
 pub(super) fn insert(
     state: &mut State,
     settles: bool,
@@ -180,7 +180,7 @@ pub(super) fn insert(
     Some(node)
 }
 
-/// Lets two happenings of an action lie in one window of its over-all condition, with `tail` left
+/// Keeps two happenings of an action in one window of its over-all condition, with `tail` remaining
 /// after the second one.
 pub(super) fn keep_within(
     state: &mut State,
@@ -200,7 +200,7 @@ pub(super) fn keep_within(
     state.network.keep_within(within).ok()
 }
 
-/// Lets an action end whose end has been in the network since its start.
+/// Ends an action whose end has been in the network since its start.
 pub(super) fn reach_foreseen_end(
     state: &mut State,
     snap: &Snap,
@@ -218,9 +218,10 @@ pub(super) fn reach_foreseen_end(
     Some(())
 }
 
-/// Takes out of the network what nothing that follows can tell from what was chosen last, where
-/// choices come in the order of time. Nobody needs to keep away from a happening that is so much
-/// earlier than the last one.
+/// Projects the network to the nodes that later happenings depend on, if choices come in
+/// chronological order: the last choice, the running actions, the marks, and happenings that may
+/// move to a later window. Marks that precede the last choice by at least `longest_distance` are
+/// dropped, since no later happening needs a separation from them.
 pub(super) fn forget_past(state: &mut State, longest_distance: Ticks) {
     let last = state.last.node;
     if last == SETTLED || state.open.iter().all(|open| open.node == SETTLED) {
@@ -235,7 +236,7 @@ pub(super) fn forget_past(state: &mut State, longest_distance: Ticks) {
         }
     }
     let network = &mut state.network;
-    // What may have to move to a later window.
+    // Happenings that may have to move to a later window.
     let is_reached = network.reach(kept.iter().copied());
     for within in network.within() {
         for node in [within.first, within.last] {
@@ -259,7 +260,7 @@ pub(super) fn forget_past(state: &mut State, longest_distance: Ticks) {
     network.marks = marks.into_iter().filter(|mark| is_near(mark.1)).collect();
 }
 
-/// Lets all that was chosen happen at its earliest time.
+/// Settles all choices at their earliest times.
 fn settle_all(state: &mut State) {
     if state.network.is_empty() {
         return;
@@ -274,7 +275,7 @@ fn settle_all(state: &mut State) {
     });
 }
 
-/// Takes what nothing can push any more out of the network.
+/// Removes the happenings that can no longer be delayed from the network.
 pub(super) fn settle(state: &mut State) {
     if state.network.is_empty() {
         return;
@@ -292,7 +293,7 @@ pub(super) fn settle(state: &mut State) {
             open.node = names[open.node as usize];
         }
     }
-    // At its earliest, what is left may be earlier than what was settled; but it cannot end
-    // earlier than it does now.
+    // The earliest end of the remaining network may be before settled happenings, but the plan
+    // cannot end before `end`.
     state.settled_end = state.settled_end.max(end);
 }

@@ -1,4 +1,4 @@
-//! Where plans begin, in the numbers of the search.
+//! The initial situation in compiled form.
 
 use elbowroom_model::{RunningAction, Situation};
 use elbowroom_num::{End, Rational};
@@ -7,33 +7,33 @@ use super::Action;
 use super::times::known_duration;
 use crate::embedded::time::{Scale, Ticks};
 
-/// A situation: what holds, and what is under way.
+/// A compiled situation: its state and its running actions.
 #[derive(Clone, Debug)]
 pub(crate) struct Beginning {
-    /// When it is, exactly.
+    /// Exact time.
     pub(crate) time: Rational,
-    /// By the search's numbers; the truth of derived facts is left open.
+    /// Facts by their compiled numbers. The truth of derived facts is not set.
     pub(crate) facts: Vec<bool>,
     pub(crate) values: Vec<Option<Rational>>,
-    /// The cost so far, by the metric.
+    /// Cost so far, for the metric.
     pub(crate) cost: Rational,
-    /// The actions under way: the first actions, in their order.
+    /// The running actions: the first actions, in their order.
     pub(crate) running: Vec<Running>,
 }
 
-/// An action that is under way.
+/// A running action.
 #[derive(Clone, Debug)]
 pub(crate) struct Running {
     pub(crate) start: Ticks,
-    /// When it started, whether that is on the grid or not.
+    /// Exact start time, which may be off the grid.
     pub(crate) exact_start: Rational,
     pub(crate) least: Ticks,
     pub(crate) most: Option<Ticks>,
-    /// The duration, if it leaves no choice.
+    /// The duration, if only one is possible.
     pub(crate) duration: Option<Rational>,
 }
 
-/// The actions under way in a situation, and whether their times lie on the grid.
+/// Returns the running actions of a situation, and whether their times are on the grid.
 pub(super) fn running(situation: &Situation, scale: Scale) -> (Vec<Running>, bool) {
     let mut is_exact = true;
     let running = situation.running.iter().map(|running| {
@@ -60,7 +60,8 @@ fn one(running: &RunningAction, now: &Rational, scale: Scale) -> (Running, bool)
         }
         End::Open(value) => (Some(scale.ceil(value).0 - 1), false),
     };
-    // Between two ticks there is nothing: a duration that is still possible takes the next one.
+    // No value exists between two ticks: a duration that is still possible is rounded up to the
+    // next one.
     let can_end = running
         .duration
         .upper
@@ -78,7 +79,7 @@ fn one(running: &RunningAction, now: &Rational, scale: Scale) -> (Running, bool)
     (running, start_is_exact && least_is_exact && most_is_exact)
 }
 
-/// Whether all that changes continuously in the beginning has a value to change.
+/// Returns `true` if all fluents that change continuously at the beginning have a value.
 pub(super) fn has_values_to_change(
     actions: &[Action],
     running: usize,

@@ -34,29 +34,29 @@ use crate::embedded::formula::Formula;
 use crate::embedded::time::{Scale, Ticks};
 use crate::embedded::tuning::Tuning;
 
-/// The number of actions compiled between two questions whether to go on.
+/// Number of actions compiled between two calls of `goes_on`.
 const ACTIONS_PER_QUESTION: usize = 256;
 
-/// Why there is no compiled problem.
+/// Reason why there is no compiled problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Failure {
     Unsupported(Unsupported),
-    /// It was told to stop.
+    /// `goes_on` returned `false`.
     Stopped,
 }
 
 /// The compilation's input besides the problem.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted<'a> {
-    /// Where plans begin.
+    /// The initial situation.
     pub(crate) situation: &'a Situation,
-    /// Whether the problem's metric matters.
+    /// `true` if the problem's metric is the objective.
     pub(crate) metric: bool,
     pub(crate) tuning: &'a Tuning,
 }
 
-/// Compiles `grounding`, which is what `task` can reach from the situation, as long as `goes_on`
-/// says so.
+/// Compiles `grounding`, the part of `task` that is reachable from the situation. Stops when
+/// `goes_on` returns `false`.
 pub(crate) fn compile(
     task: &Task,
     grounding: &Grounding,
@@ -135,13 +135,13 @@ struct Builder<'a> {
     actions: Vec<Action>,
     over_all: Vec<Condition>,
     metric: Option<Draft>,
-    /// The fluents whose values may depend on when things happen.
+    /// The fluents whose values may depend on the times of happenings.
     moving: BTreeSet<FluentId>,
     /// `true` if some effect multiplies moving numbers.
     has_products: bool,
 }
 
-/// The grid for all times and constant durations.
+/// Returns the grid for all times and constant durations.
 fn scale_of(task: &Task, grounding: &Grounding, situation: &Situation) -> Scale {
     let mut numbers: Vec<&Rational> = vec![task.epsilon(), &situation.time];
     numbers.extend(task.timed().iter().map(|timed| &timed.time));
@@ -178,8 +178,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Numbers all facts that are read, and all fluents that matter, before any effect is looked
-    /// at: what nothing reads is left out of the states.
+    /// Numbers all facts that are read, and all relevant fluents, before any effects are compiled.
+    /// Other facts and fluents are not part of the states.
     fn read_conditions(&mut self, grounding: &Grounding, situation: &Situation) {
         let symbols = &mut self.symbols;
         symbols.formula(&grounding.goal);
@@ -191,7 +191,7 @@ impl<'a> Builder<'a> {
         for action in running.clone().chain(&grounding.actions) {
             read_action(symbols, action);
         }
-        // A value that another fluent's change reads matters if that fluent does.
+        // If a fluent matters, so do the values that its changes read.
         loop {
             let before = symbols.fluents.len();
             if let Some(metric) = &mut self.metric {
@@ -210,13 +210,13 @@ impl<'a> Builder<'a> {
                 break;
             }
         }
-        // Updates of one moment that do not commute are mistakes that the validator would find.
+        // Non-commuting updates at one moment are errors that the validator would report.
         for action in running.clone().chain(&grounding.actions) {
             visit_disputed(action, &mut |fluent| {
                 symbols.fluent(fluent);
             });
         }
-        // An increase of a fluent without a value is a mistake that the judge would find.
+        // An increase of a fluent without a value is an error that the validator would report.
         for action in running.chain(&grounding.actions) {
             visit_changes(action, &mut |fluent, _| {
                 if !situation.state.values.contains_key(&fluent) {
@@ -238,7 +238,7 @@ impl<'a> Builder<'a> {
         narrow(self.snaps.len() - 1)
     }
 
-    /// An action that is under way: only its end is to come.
+    /// Adds an action that is already running; only its end is compiled.
     fn running(&mut self, action: &ground::Action) {
         let Some(body) = action.durative() else {
             return;
@@ -297,7 +297,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds the form without duration of an action whose duration may be 0, if it has one.
+    /// Adds the form without duration of an action whose duration may be 0, if there is such a
+    /// form.
     fn action_without_duration(&mut self, action: &ground::Action, full: Option<&ground::Action>) {
         let Some(body) = without_duration(self.task, action, full) else {
             return;
@@ -347,7 +348,7 @@ impl<'a> Builder<'a> {
         });
     }
 
-    /// The end of an action that is under way; its guards are decided.
+    /// Adds the end of a running action, whose guards are already decided.
     fn end_of(&mut self, body: &DurativeBody, footprint: &Footprint) -> u32 {
         let mut decided = body.clone();
         for effect in &mut Arc::make_mut(&mut decided.end).effects {

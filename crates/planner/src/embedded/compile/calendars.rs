@@ -1,8 +1,8 @@
 //! Calendars: literals that only timed initials change, such as opening hours.
 //!
-//! Conditions on them restrict the times of happenings, not the states. So they leave the
-//! conditions, and each happening keeps the [windows](Windows) in which all of its own hold. The
-//! timed initials behind them are no choices of the search.
+//! Conditions on them restrict the times of happenings, not the states. They are removed from the
+//! conditions, and each happening stores the [windows](Windows) in which all of its calendar
+//! literals hold. The search does not branch over their timed initials.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +15,7 @@ use crate::embedded::windows::{Interval, Windows, intersection};
 #[derive(Clone, Debug)]
 pub(crate) struct Calendar {
     pub(crate) literal: Literal,
-    /// From when until when it holds.
+    /// The intervals while it holds.
     pub(crate) spans: Vec<Interval>,
 }
 
@@ -23,7 +23,7 @@ pub(crate) struct Calendar {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Dates {
     pub(crate) literals: Vec<Literal>,
-    /// The windows in which all of them hold; `None` without literals.
+    /// The windows in which all of them hold; `None` if there are no literals.
     pub(crate) windows: Option<u32>,
 }
 
@@ -31,18 +31,18 @@ pub(crate) struct Dates {
 pub(super) struct DatedFact {
     pub(super) fact: u32,
     pub(super) is_true_first: bool,
-    /// Its changes, by time, which is rounded down and up.
+    /// Its changes in order of time; each time is rounded down and rounded up.
     pub(super) changes: Vec<(Ticks, Ticks, bool)>,
 }
 
 impl DatedFact {
-    /// From when until when the literal holds.
+    /// Returns the intervals in which the literal holds.
     pub(super) fn spans(&self, truth: bool) -> Vec<Interval> {
         spans(self.is_true_first == truth, truth, &self.changes)
     }
 
-    /// The times at which a happening that reads the literal finds it true: no timed initial that
-    /// changes the fact, or says what it is already, is closer than `epsilon`.
+    /// Returns the times at which a happening may read the literal as true: no timed initial that
+    /// writes the fact, even without a change, is closer than `epsilon`.
     fn reading_times(&self, truth: bool, epsilon: Ticks) -> Vec<Interval> {
         let mut times = Vec::new();
         let mut begin = -NEVER;
@@ -61,8 +61,8 @@ impl DatedFact {
     }
 }
 
-/// From when until when a literal of that truth holds, whose fact changes so.
-/// The times of the changes are rounded down and up; the intervals to the inside.
+/// Returns the intervals in which a literal of that truth holds, given the changes of its fact. The
+/// times of the changes are rounded down and up; the intervals are rounded to the inside.
 pub(crate) fn spans(
     holds_first: bool,
     truth: bool,
@@ -84,7 +84,7 @@ pub(crate) fn spans(
     spans
 }
 
-/// The facts that are read other than as conjuncts of conditions of actions.
+/// Returns the facts that are read other than as conjuncts of conditions of actions.
 pub(super) fn nested_reads<'a>(
     actions: &[Action],
     snaps: &[Snap],
@@ -113,8 +113,8 @@ pub(super) fn nested_reads<'a>(
     nested
 }
 
-/// Takes the conditions on these facts out of happenings and actions, and notes their windows.
-/// Returns the calendars that they are on.
+/// Removes the conditions on these facts from happenings and actions, and records their windows.
+/// Returns the calendars used by the conditions.
 pub(super) fn take_out(
     facts: &[DatedFact],
     epsilon: Ticks,

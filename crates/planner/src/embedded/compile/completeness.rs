@@ -1,17 +1,17 @@
-//! What a search over sequences of happenings cannot express.
+//! Obstacles to the completeness of a search over sequences of happenings.
 //!
-//! All that happens at one time forms a group, and over-all conditions are looked at between
-//! groups only. The search puts the happenings of a group into some order. That loses nothing
-//! where one order keeps every over-all condition: an addition comes before the starts that need
-//! it from then on, and an end before the deletions that it no longer minds. Only circles of
-//! starts, circles of ends, and numbers or disjunctions that several happenings repair together
-//! have no such order. They are rare; where they are possible, nothing is proved.
+//! All happenings of one time form a group, and over-all conditions are checked only between
+//! groups. The search puts the happenings of a group into a sequence. No plan is lost if some
+//! sequence keeps every over-all condition: an addition precedes the starts that need it, and an
+//! end precedes the deletions that would break its over-all condition. Such a sequence can be
+//! missing only with cycles of starts, cycles of ends, and numbers or disjunctions that several
+//! happenings keep together. These cases are rare; where they are possible, nothing is proved.
 
 use super::own_start::Changes;
 use super::{Action, Change, Conditional, NONE, Rule, Snap, Timed};
 use crate::embedded::formula::{Formula, Literal, Test};
 
-/// The compiled parts that decide whether a search over sequences may miss plans.
+/// The compiled parts that determine whether a search over sequences may miss plans.
 #[derive(Clone, Copy)]
 pub(super) struct Parts<'a> {
     pub(super) actions: &'a [Action],
@@ -22,9 +22,9 @@ pub(super) struct Parts<'a> {
     pub(super) fact_count: usize,
 }
 
-/// Whether two instances of the action that end together are one and the same but for their
-/// number, and so leave the facts as one of them does. Where the duration depends on the state, they
-/// can have started one after the other.
+/// Returns `true` if several instances of the action that end together change the facts as one
+/// instance does. This requires a constant duration, because instances that end together could
+/// otherwise have started at different times.
 fn is_idempotent(action: &Action, snaps: &[Snap]) -> bool {
     let end = snaps.get(action.end as usize);
     action.start != NONE
@@ -37,7 +37,7 @@ fn updates_numbers(snap: &Snap) -> bool {
     !snap.updates.is_empty() || snap.conditional.iter().any(is_update)
 }
 
-/// Whether an action changes numbers.
+/// Returns `true` if an action changes numbers.
 fn counts(action: &Action, snaps: &[Snap]) -> bool {
     !action.flows.is_empty()
         || [action.start, action.end]
@@ -46,7 +46,7 @@ fn counts(action: &Action, snaps: &[Snap]) -> bool {
 }
 
 /// Returns `true` if an over-all condition reads numbers that several happenings of one moment may
-/// change, perhaps those of several instances of one action.
+/// change, possibly those of several instances of one action.
 fn has_shared_test(parts: Parts<'_>) -> bool {
     let has_test = |action: &Action| {
         let mut has_test = false;
@@ -64,7 +64,8 @@ fn has_shared_test(parts: Parts<'_>) -> bool {
     writers > 1
 }
 
-/// Why a search over sequences may miss plans on account of numbers, if so.
+/// Returns the reason why a search over sequences may miss plans because of numbers, if there is
+/// one.
 pub(super) fn obstacle_among_numbers(parts: Parts<'_>) -> Option<&'static str> {
     if has_shared_test(parts) {
         return Some(
@@ -79,7 +80,7 @@ pub(super) fn obstacle_among_numbers(parts: Parts<'_>) -> Option<&'static str> {
     ends.exist().then_some(TOGETHER)
 }
 
-/// Why it may miss plans even if numbers do not count, if so.
+/// Returns the reason why it may miss plans even without numbers, if there is one.
 pub(super) fn obstacle_among_facts(parts: Parts<'_>) -> Option<&'static str> {
     if parts
         .actions
@@ -140,13 +141,13 @@ pub(super) fn do_starts_depend_on_each_other(parts: Parts<'_>) -> bool {
 const TOGETHER: &str =
     "actions may destroy each other's over-all conditions by ending at the same moment";
 
-/// Notes the literals that a start may bring about. Starts that need one of them come later.
+/// Records the literals that a start may make true. Starts that need one of them come later.
 fn start_gives(action: &Action, parts: Parts<'_>, uses: &mut Uses) {
     let changes = Changes::by_start(action, parts.snaps, parts.tests, parts.strata);
     uses.gives = changes.literals.into_iter().collect();
 }
 
-/// An end must come before what destroys its over-all condition.
+/// Records that an end must precede the happenings that break its over-all condition.
 fn end_uses(action: &Action, parts: Parts<'_>, uses: &mut Uses) {
     if let Some(end) = parts.snaps.get(action.end as usize) {
         let changes = Changes::by(end, parts.tests, parts.strata);
@@ -156,7 +157,7 @@ fn end_uses(action: &Action, parts: Parts<'_>, uses: &mut Uses) {
     }
 }
 
-/// The literals that a happening makes true.
+/// Returns the literals that a happening makes true.
 fn literals_after(snap: &Snap) -> Vec<Literal> {
     let adds = snap.adds.iter().map(|&fact| Literal::new(fact, true));
     let deletes = snap.deletes.iter().map(|&fact| Literal::new(fact, false));
@@ -167,16 +168,17 @@ fn opposite(literal: Literal) -> Literal {
     Literal::new(literal.fact(), !literal.truth())
 }
 
-/// The edges of one action in the graph: it follows what it needs, and comes before what it gives.
+/// The edges of one action in the graph: from the literals that it needs, to the literals that it
+/// gives.
 #[derive(Clone, Debug, Default)]
 struct Uses {
     needs: Vec<Literal>,
     gives: Vec<Literal>,
-    /// Whether a circle of this action alone does not count.
+    /// `true` if a cycle of this action alone does not count.
     may_wait_for_itself: bool,
 }
 
-/// A graph of actions and literals, in which circles are looked for.
+/// Graph of actions and literals, for the detection of cycles.
 struct Circles {
     uses: Vec<Uses>,
     literal_count: usize,
@@ -195,15 +197,15 @@ impl Circles {
         }
     }
 
-    /// Whether the graph has a circle: what is left when all without predecessors are taken away,
-    /// one after the other (Kahn 1962).
+    /// Returns `true` if the graph has a cycle: if nodes remain after repeatedly removing those
+    /// without predecessors (Kahn 1962).
     fn exist(&self) -> bool {
         let mut givers = vec![0_usize; self.literal_count];
         for literal in self.uses.iter().flat_map(|uses| &uses.gives) {
             givers[literal.index()] += 1;
         }
         let mut needed_by: Vec<Vec<usize>> = vec![Vec::new(); self.literal_count];
-        // Those that wait for all other givers, not for the literal.
+        // Actions that wait for all other givers, not for the literal.
         let mut rivals: Vec<Vec<usize>> = vec![Vec::new(); self.literal_count];
         let mut waits = vec![0_usize; self.uses.len()];
         for (action, uses) in self.uses.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! What is lost if an action ends before anything else happens, in the order of happenings.
+//! Compressibility: the loss of plans if an action ends before any other happening, in the order of
+//! happenings.
 
 use super::{Action, Change, Compressibility, Snap};
 use crate::embedded::formula::{Formula, Literal};
@@ -25,7 +26,7 @@ impl Readers {
     }
 }
 
-/// For each literal, who needs it.
+/// Returns for each literal the actions that need it.
 pub(super) fn readers(actions: &[Action], snaps: &[Snap], count: usize) -> Vec<Readers> {
     let mut readers = vec![Readers::None; 2 * count];
     for (number, action) in (0..).zip(actions) {
@@ -78,7 +79,7 @@ pub(super) fn compressibility(
     }
 }
 
-/// Whether what the action needs at its start is gone afterwards.
+/// Returns `true` if the start makes a literal of its own condition false.
 pub(super) fn excludes_itself(start: &Snap) -> bool {
     start.condition.literals.iter().any(|literal| {
         if literal.truth() {

@@ -1,16 +1,17 @@
-//! Which actions may end before anything else happens, in the order of happenings, without losing
-//! a plan.
+//! Compression-safe actions: actions that may end before any other happening, in the order of
+//! happenings, without losing plans.
 //!
-//! Take a plan in which some happenings come between the start and the end of an action. If none
-//! of them can touch what the end adds, the end may as well stand right after the start: its time
-//! is the same, and so are all distances. They cannot touch a fact if that fact is false after the
-//! start and cannot become true without the end, and whoever reads or deletes it needs it true.
-//! The first is for the search to find out, state by state; the second is settled here.
+//! Consider a plan with happenings between the start and the end of an action. If none of them can
+//! interact with the facts that the end adds, the end can directly follow the start in the order:
+//! its time is the same, and so are all distances. A happening cannot interact with a fact if the
+//! fact is false after the start and cannot become true without the end, and if every happening
+//! that reads or deletes the fact needs it to be true. The search checks the first condition state
+//! by state; this module decides the second.
 
 use super::{Action, Change, NONE, Snap, Timed};
 use crate::embedded::formula::{Formula, Literal};
 
-/// The facts that matter only where they are true.
+/// The facts that matter only when true.
 #[derive(Debug)]
 pub(super) struct Ends {
     matters_only_true: Vec<bool>,
@@ -41,7 +42,7 @@ impl Ends {
                 };
                 ends.note_formula(&snap.condition);
                 for effect in &snap.conditional {
-                    // Whether it happens decides whether it deletes, or reads.
+                    // The truth of the condition decides whether the effect deletes, or reads.
                     effect
                         .now
                         .visit_literals(&mut |literal| ends.exclude(literal));
@@ -77,7 +78,7 @@ impl Ends {
         self.matters_only_true[literal.fact() as usize] = false;
     }
 
-    /// Whether the end of the action does nothing but add such facts.
+    /// Returns `true` if the end of the action only adds such facts.
     pub(super) fn only_add(&self, action: &Action, snaps: &[Snap]) -> bool {
         if action.start == NONE || action.end == NONE {
             return false;

@@ -1,9 +1,10 @@
-//! Up or down: which changes of numbers can spoil an over-all condition, and which can mend it.
+//! Directions of change: whether an increase or a decrease of a number can break an over-all
+//! condition, or satisfy it.
 //!
-//! `(over all (>= (charge) 0))` minds a decrease and welcomes an increase. What spoils it must not
-//! slip, in time, into an action that it comes after in the order of choices; what mends it must
-//! not slip out. The other way round both are welcome, so that actions that only use up a
-//! consumable are free to run side by side.
+//! `(over all (>= (charge) 0))` can be broken by a decrease and satisfied by an increase. A
+//! breaking change that follows an action in the order of choices must not move, in time, into the
+//! action. A satisfying change must not move out of it. Moves in the other direction are harmless,
+//! so actions that only consume a resource may run concurrently.
 
 use elbowroom_model::ground::{Change, Condition, Effect, Expression, FluentId};
 use elbowroom_model::problem::{Comparison, UpdateOperator};
@@ -11,7 +12,7 @@ use elbowroom_model::problem::{Comparison, UpdateOperator};
 use crate::embedded::formula::Numeric;
 use crate::embedded::hash::Map;
 
-/// Up, down, or both if it is not known.
+/// Up, down, or both if it is unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Direction {
     pub(super) up: bool,
@@ -19,7 +20,7 @@ pub(super) struct Direction {
 }
 
 impl Direction {
-    /// Anything may be.
+    /// Both directions are possible.
     pub(super) const BOTH: Self = Self {
         up: true,
         down: true,
@@ -33,12 +34,12 @@ impl Direction {
     }
 }
 
-/// The directions in which a happening may change fluents.
+/// The directions of the changes of fluents by a happening.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shifts(Map<FluentId, Direction>);
 
 impl Shifts {
-    /// The shifts by these effects, whether or not they come about.
+    /// Returns the shifts by these effects, regardless of their conditions.
     pub(super) fn of(effects: &[Effect]) -> Self {
         let mut shifts = Self::default();
         for effect in effects {
@@ -55,7 +56,7 @@ impl Shifts {
                 _ => None,
             };
             let direction = match (operator, amount) {
-                // The judge minds a shift by nothing all the same.
+                // The validator also counts a change by zero as a change.
                 (_, Some(amount)) if amount.is_zero() => Direction::BOTH,
                 (UpdateOperator::Increase, Some(amount)) => Direction {
                     up: amount.is_positive(),
@@ -73,13 +74,14 @@ impl Shifts {
         shifts
     }
 
-    /// Where a fluent may be shifted that is shifted at all.
+    /// Returns the possible directions of a changed fluent.
     pub(super) fn of_fluent(&self, fluent: FluentId) -> Direction {
         self.0.get(&fluent).copied().unwrap_or(Direction::BOTH)
     }
 }
 
-/// Which fluents a condition reads, and where each must go to make it true rather than false.
+/// Returns the fluents that a condition reads, each with the directions of change that can make it
+/// true.
 pub(super) fn wanted(condition: &Condition) -> Vec<(FluentId, Direction)> {
     let mut wanted: Vec<(FluentId, Direction)> = Vec::new();
     let mut note = |fluent: FluentId, direction: Direction| match wanted

@@ -1,10 +1,11 @@
-//! Fluents whose continuous changes concern one action at a time, such as the battery of a robot that drives,
-//! works or charges.
+//! Fluents whose continuous changes affect one action at a time, such as the battery of a robot
+//! that drives, works or charges.
 //!
-//! Each action that reads or changes such a fluent needs a fact at its start and takes it (the robot is idle), and
-//! only the ends of these actions give it back. So no two of them run at the same time, and nothing uses the
-//! fluent between start and end of an action. A continuous change then counts as a change at the end: the
-//! over-all condition and the condition of the end are about the value at the start and the duration.
+//! Each action that reads or changes such a fluent needs a fact at its start and deletes it (the
+//! robot is idle), and only the ends of these actions add it again. So no two of them run at the
+//! same time, and nothing uses the fluent between start and end of an action. A continuous change
+//! then counts as a change at the end: the over-all condition and the condition of the end depend
+//! on the value at the start and the duration.
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
@@ -13,7 +14,7 @@ use super::symbols::Symbols;
 use super::{Action, Change, NONE, Rule, Snap, Timed, Update};
 use crate::embedded::formula::{Formula, Linear, Literal, Numeric, Test};
 
-/// The parts of the compiled problem that decide about exclusive fluents.
+/// The parts of the compiled problem that determine exclusive fluents.
 #[derive(Clone, Copy)]
 pub(super) struct Parts<'a> {
     pub(super) actions: &'a [Action],
@@ -26,11 +27,12 @@ pub(super) struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    /// For each fluent, `true` if no two actions that read or change it run at the same time, and nothing else
-    /// changes it. Plans may still read it in the goal.
+    /// Returns for each fluent `true` if no two actions that read or change it run at the same
+    /// time, and nothing else changes it. The goal may still read it.
     pub(super) fn exclusive_fluents(self) -> Vec<bool> {
         let count = self.symbols.fluents.len();
-        // For each fluent, the facts that all its visited actions take; `None` before the first action.
+        // For each fluent, the facts that all its visited actions delete; `None` before the first
+        // action.
         let mut taken: Vec<Option<Vec<u32>>> = vec![None; count];
         let mut used = Vec::new();
         for action in self.actions {
@@ -66,7 +68,7 @@ impl Parts<'_> {
         exclusive
     }
 
-    /// The facts that the action may occupy.
+    /// Returns the facts that the action may occupy.
     fn facts_of(self, action: &Action) -> Vec<u32> {
         let facts: Vec<u32> = match self.snaps.get(action.start as usize) {
             Some(start) => start.condition.literals.iter().map(|l| l.fact()).collect(),
@@ -78,8 +80,8 @@ impl Parts<'_> {
             .collect()
     }
 
-    /// Returns `true` if the action needs the fact and takes it as long as it runs. Of an action that started
-    /// before the situation, only the end is known.
+    /// Returns `true` if the action needs the fact and makes it false while it runs. For an action
+    /// that started before the situation, only the end is known.
     fn occupies(self, action: &Action, fact: u32) -> bool {
         let Some(start) = self.snaps.get(action.start as usize) else {
             return self.snaps[action.end as usize].adds.contains(&fact);
@@ -89,8 +91,8 @@ impl Parts<'_> {
         is_needed && (action.end == NONE || is_taken)
     }
 
-    /// Returns `true` if at most one action that occupies the fact runs at a time: the fact, and that one of them
-    /// is running, are a mutex group.
+    /// Returns `true` if at most one action that occupies the fact runs at a time: the fact and the
+    /// running actions that occupy it form a mutex group.
     fn is_lock(self, fact: u32) -> bool {
         let adds = |snap: &Snap| {
             let mut conditional = snap.conditional.iter();
@@ -157,8 +159,8 @@ impl Parts<'_> {
     }
 }
 
-/// Tests at the start of an action that its continuous changes of exclusive fluents imply: the value at its end is
-/// the one at its start and at least the change in the least duration.
+/// Returns tests at the start of an action that its continuous changes of exclusive fluents imply:
+/// the value at its end is the one at its start plus at least the change in the least duration.
 pub(super) fn implied_tests(
     action: &Action,
     exclusive: &[bool],
@@ -208,7 +210,7 @@ pub(super) fn implied_tests(
         .collect()
 }
 
-/// The rate at which the action changes the fluent, if that is certain.
+/// Returns the rate at which the action changes the fluent, if it is certain.
 fn rate(action: &Action, fluent: u32) -> Option<Rational> {
     let mut flows = action.flows.iter().filter(|flow| flow.fluent == fluent);
     flows.try_fold(Rational::ZERO, |sum, flow| {

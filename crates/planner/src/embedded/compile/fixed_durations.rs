@@ -1,8 +1,8 @@
-//! Variants of actions with a fixed duration, where a number is not linear in the duration.
+//! Variants of actions with a fixed duration, for numbers that are not linear in the duration.
 //!
-//! The search knows numbers as linear expressions of times. A product of `?duration` and another number
-//! is none, unless the duration is a constant. Where the duration can be chosen, a few constants are tried
-//! beside the whole interval.
+//! The search represents numbers as linear expressions of times. A product of `?duration` and
+//! another number is not linear, unless the duration is a constant. If the duration can be chosen,
+//! a few constants are tried in addition to the whole interval.
 
 use elbowroom_model::ground::{
     Action, Body, Change, DurationConstraint, Effect, Expression, FluentId, SnapAction,
@@ -13,8 +13,8 @@ use elbowroom_num::Rational;
 use super::builder;
 use crate::embedded::formula::Linear;
 
-/// Returns `true` if the search cannot carry out the action unless its duration is fixed: an effect on a fluent
-/// that matters always takes place, and is not linear in a duration that can be chosen.
+/// Returns `true` if the search cannot apply the action unless its duration is fixed: an effect on
+/// a fluent that matters always takes place, and is not linear in a duration that can be chosen.
 pub(super) fn needs_fixed_duration(action: &Action, matters: &dyn Fn(FluentId) -> bool) -> bool {
     let fails = |effect: &Effect| {
         let writes = match &effect.change {
@@ -32,11 +32,11 @@ pub(super) fn needs_fixed_duration(action: &Action, matters: &dyn Fn(FluentId) -
     })
 }
 
-/// Returns the action with each duration that is worth a variant; nothing where all numbers are linear in
-/// the duration.
+/// Returns the action with each duration that needs a variant, or no actions if all numbers are
+/// linear in the duration.
 ///
-/// `has_products`: some effect multiplies numbers that depend on times. Then whatever such a number can depend on
-/// the duration of is worth variants.
+/// `has_products` is `true` if some effect multiplies numbers that depend on times. Then all
+/// dependences of such a number on the duration need variants.
 pub(super) fn variants_with_fixed_duration(action: &Action, has_products: bool) -> Vec<Action> {
     let Some(body) = action.durative() else {
         return Vec::new();

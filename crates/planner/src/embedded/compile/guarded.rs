@@ -1,9 +1,9 @@
-//! Variants of actions by what depends on moving numbers.
+//! Variants of actions by the truth of conditions on moving numbers.
 //!
-//! A number moves if its value depends on when things happen. Whether a condition on it holds is decided by
-//! the times, which the search chooses last. So the search chooses the truth, as a condition on the times. An
-//! action with a conditional effect has two variants: with the effect and without it. An action with a
-//! disjunction has a variant for each alternative.
+//! A number moves if its value depends on the times of happenings. The times, which the search
+//! chooses last, decide whether a condition on it holds. So the search chooses the truth, as a
+//! condition on the times. An action with a conditional effect has two variants: with the effect
+//! and without it. An action with a disjunction has a variant for each alternative.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -16,10 +16,10 @@ use elbowroom_model::reachability::Grounding;
 
 use crate::embedded::formula::Linear;
 
-/// Most conditions of one action whose truth is chosen.
+/// Maximum number of conditions of one action whose truth is chosen.
 const MOST_DECIDED: usize = 4;
 
-/// Returns the fluents whose values may depend on when things happen.
+/// Returns the fluents whose values may depend on the times of happenings.
 pub(super) fn moving_fluents(grounding: &Grounding) -> BTreeSet<FluentId> {
     let mut moving = BTreeSet::new();
     loop {
@@ -96,15 +96,15 @@ fn moves(expression: &Expression, reads_duration: bool, moving: &BTreeSet<Fluent
     moves
 }
 
-/// When a condition is read.
+/// Time at which a condition is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Moment {
     Start,
     End,
 }
 
-/// Returns the variants of an action by the truth of conditions under which its effects take place: those that
-/// read moving numbers. The action itself if it has none.
+/// Returns the variants of an action by the truth of the conditions of its effects that read moving
+/// numbers, or the action itself if it has none.
 pub(super) fn variants_by_guards(action: &Action, moving: &BTreeSet<FluentId>) -> Vec<Action> {
     let guards = moving_guards(action, moving);
     let mut variants = vec![action.clone()];
@@ -119,7 +119,7 @@ pub(super) fn variants_by_guards(action: &Action, moving: &BTreeSet<FluentId>) -
     variants
 }
 
-/// The conditions of effects that read moving numbers.
+/// Returns the conditions of effects that read moving numbers.
 fn moving_guards(action: &Action, moving: &BTreeSet<FluentId>) -> Vec<(Moment, Condition)> {
     let duration_is_chosen = has_chosen_duration(action);
     let mut found: Vec<(Moment, Condition)> = Vec::new();
@@ -155,8 +155,8 @@ fn moving_guards(action: &Action, moving: &BTreeSet<FluentId>) -> Vec<(Moment, C
     found
 }
 
-/// Returns the action with a demand that a condition has this truth. Effects under the condition become
-/// unconditional, or are left out.
+/// Returns the action with a demand that a condition has this truth. Effects under the condition
+/// become unconditional, or are removed.
 fn decided(action: &Action, (moment, condition): (Moment, &Condition), truth: bool) -> Action {
     let settle = |part: &mut Condition| {
         let is_meant = part == condition;

@@ -1,5 +1,5 @@
-//! Which happenings must keep what distance: separations first, then annotations for those that
-//! matter.
+//! Separations between happenings: distances first, then annotations for the accesses that need
+//! them.
 
 use elbowroom_model::Footprint;
 use elbowroom_model::Task;
@@ -11,23 +11,23 @@ use crate::embedded::time::Ticks;
 use super::NONE;
 use super::directions::{self, Direction, Shifts};
 
-/// Something that happened to a fact or fluent.
+/// A kind of access to a fact or fluent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Access {
     Added(FactId),
     Deleted(FactId),
     Read(FactId),
-    /// An action ended that needed the fact true throughout.
+    /// An action ended whose over-all condition required the fact.
     NeededTrue(FactId),
-    /// An action ended that needed the fact false throughout.
+    /// An action ended whose over-all condition required the fact to be false.
     NeededFalse(FactId),
     Raised(FluentId),
     Lowered(FluentId),
     Assigned(FluentId),
     ReadValue(FluentId),
-    /// An action ended that needed the fluent not to fall too low throughout.
+    /// An action ended whose over-all condition bounded the fluent from below.
     NeededHigh(FluentId),
-    /// An action ended that needed the fluent not to rise too high throughout.
+    /// An action ended whose over-all condition bounded the fluent from above.
     NeededLow(FluentId),
 }
 
@@ -36,31 +36,31 @@ use Access::{
     Read, ReadValue,
 };
 
-/// The distances a happening must keep, and the accesses it makes.
+/// The distances that a happening must keep, and its accesses.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Separations {
-    /// At least so long after the last access of that kind.
+    /// Accesses that the happening must follow, with the minimum distance from the latest one.
     pub(super) after: Vec<(Access, Ticks)>,
     pub(super) makes: Vec<Access>,
 }
 
-/// Facts and fluents that over-all conditions read together, so that the order in which they
-/// change matters even where no rule of PDDL keeps the changes apart.
+/// Facts and fluents that over-all conditions read together. The order of their changes matters
+/// even where no rule of PDDL separates the changes.
 ///
-/// What can spoil such a condition comes after what could have mended it before, so that whoever
-/// saw the condition true sees it true in time as well.
+/// A change that can break such a condition follows the earlier changes that could have satisfied
+/// it. So a condition that holds in the order of choices also holds in time.
 #[derive(Debug, Default)]
 pub(super) struct Links {
-    /// For each access, those that it must not overtake.
+    /// For each access, the accesses that it must not overtake.
     overtaken: Map<Access, Vec<Access>>,
-    /// Whether the direction of a change tells whether it can spoil a condition. Where numbers
-    /// depend on times, each change must stay in its place.
+    /// `true` if the direction of a change decides whether it can break a condition. Where numbers
+    /// depend on times, each change must keep its place in the order.
     has_directions: bool,
 }
 
 impl Separations {
-    /// The distances and accesses of a happening that reads and writes this, and shifts fluents
-    /// in these directions.
+    /// Returns the distances and accesses of a happening with this footprint that shifts fluents in
+    /// these directions.
     pub(super) fn of(
         footprint: &Footprint,
         shifts: &Shifts,
@@ -118,8 +118,8 @@ impl Separations {
             .extend(accesses.into_iter().map(|access| (access, distance)));
     }
 
-    /// Adds what the start of an action needs for its over-all condition: what it reads was
-    /// brought about by then.
+    /// Adds the separations that an over-all condition requires at the start of its action: the
+    /// facts and fluents that it reads were changed before.
     pub(super) fn need_from_now_on(&mut self, task: &Task, condition: &Condition, links: &Links) {
         for conjunct in condition.conjuncts() {
             for fact in Footprint::of_condition(task, conjunct).reads {
@@ -138,7 +138,8 @@ impl Separations {
         }
     }
 
-    /// Adds what the end of an action tells those who come later about its over-all condition.
+    /// Adds the accesses of the end of an action by its over-all condition, from which later
+    /// happenings must be separated.
     pub(super) fn needed_until_now(&mut self, task: &Task, condition: &Condition, links: &Links) {
         for conjunct in condition.conjuncts() {
             match conjunct {
@@ -169,7 +170,7 @@ impl Separations {
 }
 
 impl Links {
-    /// No conditions so far.
+    /// Returns links without conditions.
     pub(super) fn new(has_directions: bool) -> Self {
         Self {
             overtaken: Map::default(),
@@ -185,7 +186,7 @@ impl Links {
         }
     }
 
-    /// Notes an over-all condition.
+    /// Adds an over-all condition.
     pub(super) fn note(&mut self, task: &Task, condition: &Condition) {
         for conjunct in condition.conjuncts() {
             let is_literal = match conjunct {
@@ -228,7 +229,7 @@ impl Links {
     }
 }
 
-/// Numbers for the accesses that someone makes and someone waits for.
+/// Numbers of the accesses that some happening makes and some happening waits for.
 #[derive(Debug)]
 pub(super) struct Annotations {
     numbers: Map<Access, u32>,
@@ -264,12 +265,12 @@ impl Annotations {
         self.count
     }
 
-    /// The annotations of the latest addition and deletion of a fact.
+    /// Returns the annotations of the latest addition and deletion of a fact.
     pub(super) fn of_fact(&self, fact: FactId) -> [u32; 2] {
         [Added(fact), Deleted(fact)].map(|access| self.number(access).unwrap_or(NONE))
     }
 
-    /// Whether someone makes the access and someone waits for it.
+    /// Returns `true` if some happening makes the access and some happening waits for it.
     pub(super) fn has(&self, access: Access) -> bool {
         self.number(access).is_some()
     }
@@ -279,7 +280,7 @@ impl Annotations {
         (number != NONE).then_some(number)
     }
 
-    /// The annotations to keep away from, each once with its largest distance.
+    /// Returns the annotations to keep a distance from, each once with its largest distance.
     pub(super) fn after(&self, separations: &Separations) -> Vec<(u32, Ticks)> {
         let mut list: Vec<(u32, Ticks)> = separations
             .after
@@ -291,7 +292,7 @@ impl Annotations {
         list
     }
 
-    /// The annotations to set.
+    /// Returns the annotations to set.
     pub(super) fn marks(&self, separations: &Separations) -> Vec<u32> {
         let mut list: Vec<u32> = separations
             .makes
@@ -304,7 +305,7 @@ impl Annotations {
     }
 }
 
-/// For each access, the timed initials that must come some distance after it.
+/// For each access, the timed initials that must keep a distance after it.
 #[derive(Debug, Default)]
 pub(super) struct TimedSeparations(Map<Access, Vec<(u32, Ticks)>>);
 
@@ -320,7 +321,8 @@ impl TimedSeparations {
         Self(waiting)
     }
 
-    /// The timed initials that must come some distance after these accesses, if they come later.
+    /// Returns the timed initials that must keep a distance after these accesses, if they come
+    /// later.
     pub(super) fn before(&self, makes: &[Access]) -> Vec<(u32, Ticks)> {
         if self.0.is_empty() {
             return Vec::new();

@@ -1,15 +1,15 @@
-//! Macro-operators of an envelope and one content: the door is held open, the robot passes, and the door is
-//! released, as one choice (macro-operators; Korf, Artificial Intelligence 26, 1985; envelope and content: Halsey,
-//! Long & Fox, ICAPS workshop 2004).
+//! Macro-operators of an envelope and one content: the door is held open, the robot passes, and the
+//! door is released, as one choice (macro-operators; Korf, Artificial Intelligence 26, 1985;
+//! envelope and content: Halsey, Long & Fox, ICAPS workshop 2004).
 //!
-//! Each envelope that is started for itself is a choice that brings the goal no nearer. Where many envelopes are
+//! Starting an envelope alone does not reduce the distance to the goal. If many envelopes are
 //! possible at any time, a search visits all sets of them.
 
 use super::{Action, Compiled, Compressibility, NONE, Snap};
 use crate::embedded::formula::{Formula, Literal};
 use crate::embedded::hash::Map;
 
-/// An envelope that runs for the sake of one other action.
+/// An envelope that runs only for one other action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Macro {
     pub(crate) envelope: u32,
@@ -63,7 +63,8 @@ fn can_be_content(compiled: &Compiled, action: &Action) -> bool {
     action.start != NONE && is_short && is_plain(compiled, action)
 }
 
-/// Returns `true` if the action has no conditional effects, and its end needs nothing that others bring about.
+/// Returns `true` if the action has no conditional effects, and its end needs no literals that
+/// other actions achieve.
 fn is_plain(compiled: &Compiled, action: &Action) -> bool {
     let start = compiled.snap(action.start);
     if !start.conditional.is_empty() {
@@ -101,7 +102,7 @@ fn needs<'a>(compiled: &'a Compiled, action: &'a Action) -> impl Iterator<Item =
     start.copied().chain(needs_throughout(compiled, action))
 }
 
-/// Returns the literals that the action needs while it runs, and does not bring about itself.
+/// Returns the literals that the action needs while it runs, and does not achieve itself.
 fn needs_throughout<'a>(
     compiled: &'a Compiled,
     action: &'a Action,

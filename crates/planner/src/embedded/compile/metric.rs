@@ -1,9 +1,9 @@
-//! The problem's metric, in the form in which the search reads it.
+//! The problem's metric in the form used by the search.
 //!
 //! Most metrics are sums of `total-time` and of fluents that nothing else reads, such as
-//! `total-cost`. These fluents are no part of what a state *is*: two states that differ in them
-//! only allow the same plans, and the cheaper one is the better one. So they are added up in
-//! `State::cost` and left out of `State::values`. Fluents that are read elsewhere, or not only
+//! `total-cost`. These fluents are not part of the identity of a state: two states that differ only
+//! in them allow the same plans, and the cheaper one is better. So they are added up in
+//! `State::cost` and omitted from `State::values`. Fluents that are read elsewhere, or not only
 //! added to, stay among the values.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,20 +18,20 @@ use super::symbols::Symbols;
 use super::{Action, Change, Snap, Timed, Update};
 use crate::embedded::formula::{Linear, Numeric};
 
-/// The metric, to be minimized. What is to be maximized is negated here.
+/// The metric, to be minimized. Metrics to be maximized are negated.
 #[derive(Clone, Debug)]
 pub(crate) struct Metric {
-    /// The part that is read off `State::values`.
+    /// The part that is computed from `State::values`.
     pub(crate) values: Numeric,
     /// The weight of `total-time`.
     pub(crate) time: Rational,
-    /// Whether no step lowers it: then what a state has spent is a bound for all plans that begin
-    /// like this.
+    /// `true` if no step lowers the metric. The cost of a state is then a lower bound for all plans
+    /// with the same beginning.
     pub(crate) only_grows: bool,
 }
 
 impl Metric {
-    /// The weight of a fluent among the values; zero if that is not constant.
+    /// Returns the weight of a fluent among the values, or zero if it is not constant.
     pub(crate) fn weight(&self, fluent: u32) -> Rational {
         let Numeric::Linear(linear) = &self.values else {
             return Rational::ZERO;
@@ -40,7 +40,8 @@ impl Metric {
         place.map_or(Rational::ZERO, |place| linear.terms[place].1.clone())
     }
 
-    /// How much an update adds to it, if that is the weighted amount itself.
+    /// Returns the amount by which an update increases the metric, if it is the weighted amount
+    /// itself.
     pub(crate) fn amount_of(&self, update: &Update) -> Option<Linear> {
         let weight = self.weight(update.fluent);
         let Numeric::Linear(value) = &update.value else {
@@ -59,11 +60,11 @@ impl Metric {
 /// The metric while symbols are being numbered.
 #[derive(Debug)]
 pub(super) struct Draft {
-    /// Over the task's fluents, `total-time` in the place of `?duration`.
+    /// Expression over the task's fluents, with `?duration` replaced by `total-time`.
     expression: Expression,
     /// The fluents that are added up in [`State::cost`].
     summed: BTreeMap<FluentId, Sum>,
-    /// Whether it is a weighted sum.
+    /// `true` if it is a weighted sum.
     is_linear: bool,
 }
 
@@ -76,8 +77,7 @@ struct Sum {
 }
 
 impl Draft {
-    /// The metric of a problem, if it has one that is more than the makespan and has a value
-    /// whatever happens.
+    /// Returns the metric of a problem if it is more than the makespan and always has a value.
     pub(super) fn of(
         task: &Task,
         grounding: &Grounding,
@@ -98,7 +98,7 @@ impl Draft {
             found.unwrap_or(FluentId(u32::MAX))
         });
         ground.visit_leaves(&mut |leaf| {
-            // How often preferences are violated, the judge says.
+            // The validator counts violations of preferences.
             is_defined &= !matches!(leaf, Expression::Violations(_));
         });
         if !is_defined {
@@ -136,8 +136,8 @@ impl Draft {
         })
     }
 
-    /// Numbers what the metric reads. To be called until nothing new is numbered, as other things
-    /// may turn out to read its fluents too.
+    /// Numbers the fluents that the metric reads. Must be called until no new fluent is numbered,
+    /// since other expressions may turn out to read the metric's fluents.
     pub(super) fn read(&mut self, symbols: &mut Symbols) {
         let is_unknown = |fluent: FluentId| symbols.known_fluent(fluent).is_none();
         self.summed.retain(|&fluent, _| is_unknown(fluent));
@@ -154,8 +154,8 @@ impl Draft {
         });
     }
 
-    /// The cost of a change of a fluent in the metric's sum; `None` if the fluent is not part of
-    /// it.
+    /// Returns the cost of a change of a fluent in the metric's sum, or `None` if the fluent is not
+    /// part of it.
     pub(super) fn cost(
         &self,
         fluent: FluentId,
@@ -171,7 +171,7 @@ impl Draft {
         Some(Expression::Multiply(parts))
     }
 
-    /// The cost at the beginning of the fluents in the metric's sum.
+    /// Returns the initial cost of the fluents in the metric's sum.
     pub(super) fn initial_cost(&self, situation: &Situation) -> Rational {
         let values = &situation.state.values;
         let costs = self.summed.iter();
@@ -179,10 +179,10 @@ impl Draft {
         costs.fold(Rational::ZERO, |sum, cost| sum + cost)
     }
 
-    /// The finished metric. Whether it only grows is for [`only_grows`] to say.
+    /// Returns the finished metric. [`only_grows`] determines whether it only grows.
     pub(super) fn finish(&self, symbols: &mut Symbols) -> Metric {
         if !self.is_linear {
-            // Whoever evaluates it does not know the total time.
+            // The total time is unknown where the expression is evaluated.
             let expression = self.expression.map_leaves(&mut |leaf| match leaf {
                 Expression::Duration => Some(Expression::TotalTime),
                 _ => None,
@@ -212,7 +212,7 @@ impl Draft {
     }
 }
 
-/// Whether no step lowers the metric.
+/// Returns `true` if no step lowers the metric.
 pub(super) fn only_grows(
     metric: &Metric,
     snaps: &[Snap],
@@ -223,7 +223,7 @@ pub(super) fn only_grows(
         return false;
     };
     let matters = |fluent: u32| values.terms.iter().any(|term| term.0 == fluent);
-    // What an expression over changing fluents comes to is not followed up.
+    // The values of expressions over changing fluents are not analysed.
     let is_growth = |amount: &Linear| {
         amount.terms.is_empty() && !amount.constant.is_negative() && !amount.duration.is_negative()
     };
@@ -249,12 +249,12 @@ pub(super) fn only_grows(
             .all(|timed| timed.assigns.iter().all(|(fluent, _)| !matters(*fluent)))
 }
 
-/// All that changes the metric's fluents.
+/// All changes of the metric's fluents.
 #[derive(Debug, Default)]
 struct Changes {
-    /// For each fluent the amounts that are added or taken away.
+    /// For each fluent, the amounts that are added or subtracted.
     additions: BTreeMap<FluentId, Vec<Expression>>,
-    /// The fluents that are changed otherwise.
+    /// The fluents that are changed in other ways.
     others: BTreeSet<FluentId>,
 }
 
@@ -311,7 +311,7 @@ impl Changes {
         self.others.contains(&fluent) || amounts.is_some_and(|amounts| !amounts.is_empty())
     }
 
-    /// The amounts, if the fluent is only added to, by amounts that a state determines.
+    /// Returns the amounts if the fluent is only added to, by amounts that a state determines.
     fn additions_to(&self, fluent: FluentId, has_fixed_numbers: bool) -> Option<&[Expression]> {
         let is_constant = |amount: &Expression| Numeric::of(amount.clone()).as_constant().is_some();
         let amounts = self.additions.get(&fluent)?;

@@ -6,9 +6,10 @@ use super::{Action, Change, Compiled, NONE, Rule, Snap};
 use crate::embedded::formula::{Formula, Literal, Test};
 
 impl Compiled {
-    /// Returns the part of the over-all condition that must hold before the action starts. The start may
-    /// bring about the other parts: at once, by a conditional effect, or through a rule. Numeric tests are
-    /// left out, and everything where starts of one moment depend on each other.
+    /// Returns the part of the over-all condition that must hold before the action starts. The
+    /// start may achieve the other parts: at once, by a conditional effect, or through a rule.
+    /// Numeric tests are omitted. If starts of one moment depend on each other, the result is
+    /// empty.
     pub(crate) fn needed_before_start(&self, action: &Action) -> Formula {
         if action.start == NONE || self.starts_depend_on_each_other {
             return Formula::default();
@@ -26,7 +27,7 @@ pub(super) struct Changes {
 }
 
 impl Changes {
-    /// Returns the changes by a happening, with what follows by rules.
+    /// Returns the changes by a happening, including consequences by rules.
     pub(super) fn by(snap: &Snap, tests: &[Test], strata: &[Vec<Rule>]) -> Self {
         let mut changes = Self::default();
         changes.add_effects(snap);
@@ -34,7 +35,8 @@ impl Changes {
         changes
     }
 
-    /// Returns the changes by the start of an action, those that begin with it included.
+    /// Returns the changes by the start of an action, including continuous changes that begin with
+    /// it.
     pub(super) fn by_start(
         action: &Action,
         snaps: &[Snap],

@@ -1,10 +1,10 @@
-//! What actions read and change.
+//! Facts and fluents that actions read and change.
 
 use elbowroom_model::ground::{self, Body, Change as ModelChange};
 
 use super::symbols::Symbols;
 
-/// Numbers what the action's conditions read.
+/// Numbers the facts and fluents in the action's conditions.
 pub(super) fn read_action(symbols: &mut Symbols, action: &ground::Action) {
     let snap = |symbols: &mut Symbols, snap: &ground::SnapAction| {
         symbols.formula(&snap.condition);

@@ -5,7 +5,7 @@ use elbowroom_model::Task;
 use super::Rule;
 use super::symbols::Symbols;
 
-/// The rules by strata, and the heads of each.
+/// Returns the rules by strata, and the heads of each stratum.
 pub(super) fn stratified(
     rules: Vec<Rule>,
     task: &Task,
@@ -16,8 +16,8 @@ pub(super) fn stratified(
     }
     let mut level = vec![0_usize; symbols.facts.len()];
     let is_derived: Vec<bool> = symbols.facts.iter().map(|&f| task.is_derived(f)).collect();
-    // As deep as there are derived facts, unless one rests on its own negation; the task has made
-    // sure that none does.
+    // The number of rounds is at most the number of derived facts, since the task has ensured that
+    // none depends on its own negation.
     for _ in 0..=rules.len() {
         let mut changed = false;
         for rule in &rules {

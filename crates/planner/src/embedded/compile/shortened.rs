@@ -1,4 +1,4 @@
-//! Actions of which grounding has dropped something that the judge still sees.
+//! Actions from which grounding removed parts that the validator still uses.
 
 use std::collections::BTreeSet;
 
@@ -7,12 +7,12 @@ use elbowroom_model::problem::{Change, FunctionId, PredicateId};
 use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{ground, problem};
 
-/// In full, as the judge sees them, the actions of which grounding may have dropped something that
-/// reads or writes a changing fact: a conditional effect that never happens, a part of a
-/// disjunction that other parts decide, or what is constant because such an effect never happens.
-/// These interfere all the same.
+/// Returns the full form, as the validator uses it, of the actions from which grounding may have
+/// removed a part that reads or writes a changing fact: a conditional effect that never happens, a
+/// part of a disjunction that other parts decide, or an expression that is constant because such an
+/// effect never happens. These parts still interfere.
 ///
-/// `None` if `goes_on` says that it shall end.
+/// Returns `None` if `goes_on` returned `false`.
 pub(super) fn full_actions(
     task: &Task,
     grounding: &Grounding,
@@ -34,14 +34,14 @@ pub(super) fn full_actions(
             if !is_shortened[action.schema.index()] {
                 return Some(None);
             }
-            // One with quantifiers can take a millisecond.
+            // Instantiating an action with quantifiers can take a millisecond.
             let full = task.instantiate(action.schema, &action.arguments).ok();
             goes_on().then_some(full)
         })
         .collect()
 }
 
-/// What conditional effects write.
+/// Predicates and functions that conditional effects write.
 #[derive(Default)]
 struct Perhaps {
     predicates: BTreeSet<PredicateId>,
@@ -74,7 +74,7 @@ impl Perhaps {
         perhaps
     }
 
-    /// Whether the conditions at the moments of an action read something of this.
+    /// Returns `true` if the conditions at the start or end of an action read one of them.
     fn is_read_by(&self, schema: &problem::Schema) -> bool {
         if self.predicates.is_empty() && self.functions.is_empty() {
             return false;
@@ -138,7 +138,7 @@ fn may_be_shortened(schema: &problem::Schema) -> bool {
     }
 }
 
-/// Whether nothing but constants can be dropped from a condition.
+/// Returns `true` if only constants can be removed from the condition.
 fn is_conjunction(condition: &problem::Condition) -> bool {
     match condition {
         problem::Condition::Atom(_)

@@ -1,4 +1,4 @@
-//! From the task's facts and fluents to the search's numbers, and from conditions to formulas.
+//! Mapping of the task's facts and fluents to the search's numbers, and of conditions to formulas.
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, Expression, FactId, FluentId};
@@ -32,7 +32,7 @@ impl Symbols {
         }
     }
 
-    /// The number of a fact that is read.
+    /// Returns the number of a fact that is read.
     pub(super) fn fact(&mut self, fact: FactId) -> u32 {
         let number = &mut self.numbers_of_facts[fact.index()];
         if *number == NONE {
@@ -42,13 +42,13 @@ impl Symbols {
         *number
     }
 
-    /// The number of a fact, if something reads it.
+    /// Returns the number of a fact, if something reads it.
     pub(super) fn known_fact(&self, fact: FactId) -> Option<u32> {
         let number = *self.numbers_of_facts.get(fact.index())?;
         (number != NONE).then_some(number)
     }
 
-    /// The number of a fluent that is read.
+    /// Returns the number of a fluent that is read.
     pub(super) fn fluent(&mut self, fluent: FluentId) -> u32 {
         let number = &mut self.numbers_of_fluents[fluent.index()];
         if *number == NONE {
@@ -58,13 +58,13 @@ impl Symbols {
         *number
     }
 
-    /// The number of a fluent, if something reads it.
+    /// Returns the number of a fluent, if something reads it.
     pub(super) fn known_fluent(&self, fluent: FluentId) -> Option<u32> {
         let number = *self.numbers_of_fluents.get(fluent.index())?;
         (number != NONE).then_some(number)
     }
 
-    /// An expression with the search's numbers for its fluents.
+    /// Returns an expression with the search's numbers for its fluents.
     pub(super) fn numeric(&mut self, expression: &Expression) -> Numeric {
         let numbered = expression.map_leaves(&mut |leaf| match leaf {
             Expression::Fluent(fluent) => Some(Expression::Fluent(FluentId(self.fluent(*fluent)))),
@@ -73,7 +73,7 @@ impl Symbols {
         Numeric::of(numbered)
     }
 
-    /// A condition, negations pushed to the leaves.
+    /// Returns a condition as a formula, with negations at the leaves.
     pub(super) fn formula(&mut self, condition: &Condition) -> Formula {
         self.signed(condition, true)
     }
@@ -152,12 +152,12 @@ impl Symbols {
         }
     }
 
-    /// The number of the test `difference comparison 0`.
+    /// Returns the number of the test `difference comparison 0`.
     pub(super) fn linear_test(&mut self, comparison: Comparison, difference: Linear) -> u32 {
         self.test(normal(comparison, Numeric::Linear(difference)))
     }
 
-    /// The number of a test.
+    /// Returns the number of a test.
     fn test(&mut self, test: Test) -> u32 {
         let next = narrow(self.tests.len());
         if let Numeric::Linear(linear) = &test.difference {
@@ -174,7 +174,8 @@ impl Symbols {
     }
 }
 
-/// The same test as "at least" or "greater" where it is linear, so that equal tests look equal.
+/// Returns the test in a normal form: "at least" or "greater" if it is linear, so that equal tests
+/// compare equal.
 fn normal(comparison: Comparison, difference: Numeric) -> Test {
     let turned = match comparison {
         Comparison::Less => Comparison::Greater,

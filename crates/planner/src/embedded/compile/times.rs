@@ -1,4 +1,4 @@
-//! Whether numbers depend on when things happen.
+//! Dependence of numbers on the times of happenings.
 
 use elbowroom_model::ground;
 use elbowroom_model::problem::Comparison;
@@ -9,8 +9,8 @@ use elbowroom_num::{End, Rational};
 use super::Action;
 use super::builder::reads_duration;
 
-/// Whether it is plain that no number depends on when things happen: nothing changes continuously,
-/// and no duration is chosen.
+/// Returns `true` if clearly no number depends on the times of happenings: no continuous effects,
+/// and no durations to choose.
 pub(super) fn has_fixed_numbers(grounding: &Grounding, situation: &Situation) -> bool {
     let fixed = |action: &ground::Action| {
         action.durative().is_none_or(|body| {
@@ -21,7 +21,7 @@ pub(super) fn has_fixed_numbers(grounding: &Grounding, situation: &Situation) ->
             body.continuous.is_empty() && is_fixed
         })
     };
-    // How long something takes that is under way is for the situation to say, not for the domain.
+    // The situation, not the domain, gives the duration of a running action.
     let certain = |running: &RunningAction| {
         let body = running.action.durative();
         known_duration(running).is_some() || !body.is_some_and(reads_duration)
@@ -33,7 +33,7 @@ pub(super) fn has_fixed_numbers(grounding: &Grounding, situation: &Situation) ->
             .all(|running| fixed(&running.action) && certain(running))
 }
 
-/// The duration of a running action, if it is certain.
+/// Returns the duration of a running action, if it is certain.
 pub(super) fn known_duration(running: &RunningAction) -> Option<&Rational> {
     match (&running.duration.lower, &running.duration.upper) {
         (End::Closed(least), End::Closed(most)) => (least == most).then_some(least),
@@ -41,10 +41,10 @@ pub(super) fn known_duration(running: &RunningAction) -> Option<&Rational> {
     }
 }
 
-/// Whether some number depends on when things happen: on a duration that can be chosen, or on
-/// how far a continuous change has come.
+/// Returns `true` if some number depends on the times of happenings: on a duration that can be
+/// chosen, or on the progress of a continuous change.
 pub(super) fn is_symbolic(actions: &[Action], situation: &Situation) -> bool {
-    // Those under way come first.
+    // Running actions come first.
     let under_way = situation.running.iter().map(Some);
     let running = under_way.chain(std::iter::repeat(None));
     actions.iter().zip(running).any(|(action, running)| {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use elbowroom_model::ground::{Action, Body, Condition, FactId, Guard, SnapAction};
 use elbowroom_model::reachability::Grounding;
 
-/// The most parts of all definitions together.
+/// Maximum number of parts of all definitions together.
 const MOST_PARTS: usize = 2_000;
 
 /// Returns the grounding without derived facts that read numbers, or `None` if there are none, some
@@ -42,7 +42,7 @@ pub(super) fn unfolded(grounding: &Grounding) -> Option<Grounding> {
     Some(result)
 }
 
-/// The derived facts that read numbers, directly or through other derived facts.
+/// Returns the derived facts that read numbers, directly or through other derived facts.
 fn numeric_heads(grounding: &Grounding) -> BTreeSet<FactId> {
     let mut heads = BTreeSet::new();
     loop {

@@ -1,18 +1,19 @@
-//! What cannot be searched.
+//! Features that cannot be searched.
 
 use elbowroom_model::ground;
 
-/// A feature that the embedded planner does not handle, with the action or the like that uses it.
+/// A feature that the embedded planner does not support, with the action or other element that uses
+/// it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the embedded planner does not handle {feature} ({place}); try an external planner")]
 pub struct Unsupported {
     /// The feature that is not supported.
     pub feature: String,
-    /// Where it was met.
+    /// The action or other element that uses it.
     pub place: String,
 }
 
-/// Refuses what cannot be searched.
+/// Rejects actions that cannot be searched.
 pub(super) fn check(action: &ground::Action) -> Result<(), Unsupported> {
     let refuse = |feature: &str| {
         Err(Unsupported {

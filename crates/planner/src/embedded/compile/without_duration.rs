@@ -1,8 +1,9 @@
 //! Durative actions whose duration may be 0.
 //!
-//! With that duration no moment lies between start and end, so the over-all condition is vacuous, and the
-//! conditions at start and at end read the same state. Such an instance happens at one moment like an
-//! instantaneous action. It exists only if its start does not interfere with its end.
+//! With that duration there is no moment between start and end, so the over-all condition is
+//! vacuous, and the conditions at start and at end read the same state. Such an instance happens at
+//! one moment like an instantaneous action. It exists only if its start does not interfere with its
+//! end.
 
 use elbowroom_model::ground::{self, Condition, Effect, Expression, Guard, SnapAction};
 use elbowroom_model::problem::Comparison;
@@ -23,9 +24,10 @@ pub(super) fn takes_no_time(action: &ground::Action) -> bool {
         .is_some_and(|body| !body.over_all.is_trivial() && body.duration.iter().any(is_zero))
 }
 
-/// Returns the single happening of an action with duration 0, or `None` if its duration cannot be 0, or
-/// it has no over-all condition, so that the durative form loses nothing. `full`: the action with all that
-/// the validator sees, if grounding has dropped some.
+/// Returns the single happening of an action with duration 0. Returns `None` if its duration cannot
+/// be 0, if its start interferes with its end, or if it has no over-all condition, so that the
+/// durative form loses nothing. `full` is the action with all parts that the validator uses, if
+/// grounding has removed some.
 pub(super) fn without_duration(
     task: &Task,
     action: &ground::Action,

@@ -1,4 +1,4 @@
-//! Actions that only look or wait, and what the actions of a problem change.
+//! Observer and waiting actions, and the changes by the actions of a problem.
 
 use std::collections::BTreeSet;
 
@@ -12,11 +12,11 @@ use super::regression::{all, not};
 use super::rewriting::Rewriting;
 
 impl Rewriting<'_> {
-    /// A new predicate without arguments.
+    /// Adds a predicate without arguments.
     pub(super) fn predicate(&mut self, name: &str) -> PredicateId {
         let number = self.problem.predicates.len();
         self.problem.predicates.push(Predicate {
-            // No name of a text has a space.
+            // No name in a text contains a space.
             name: format!("{name} {number}"),
             parameters: Vec::new(),
             is_derived: false,
@@ -24,12 +24,12 @@ impl Rewriting<'_> {
         PredicateId::from(number)
     }
 
-    /// One more timed initial.
+    /// Adds a timed initial.
     pub(super) fn timed(&mut self, time: Rational, change: TimedChange) {
         self.problem.timed.push(TimedInitial { time, change });
     }
 
-    /// An action that takes no time.
+    /// Adds an instantaneous action.
     pub(super) fn look(&mut self, needs: Vec<Condition>, changes: Vec<Change>) {
         let body = Body::Instantaneous {
             condition: all(needs),
@@ -38,8 +38,8 @@ impl Rewriting<'_> {
         self.schema("look", body);
     }
 
-    /// What becomes true when an action that only looks sees that a condition holds, no later than
-    /// `deadline`.
+    /// Adds an observer of a condition, and returns the fact that it adds when the condition holds,
+    /// no later than `deadline`.
     pub(super) fn observed(
         &mut self,
         condition: Condition,
@@ -52,26 +52,28 @@ impl Rewriting<'_> {
         seen
     }
 
-    /// A fact that what looks may need: it holds until what became true by this time has been seen.
+    /// Returns a fact that observers may need. It holds until conditions that become true by this
+    /// time have been observed.
     pub(super) fn open_until(&mut self, time: &Rational) -> PredicateId {
         let open = self.predicate("open");
         let epsilon = self.task.epsilon();
         self.problem.initial_facts.push((open, Vec::new()));
-        // ε after what becomes true then, and ε before the end.
+        // ε after changes at that time, and ε before the end.
         let close = time + epsilon + epsilon;
         self.timed(close, TimedChange::Delete(open, Vec::new()));
         open
     }
 
-    /// A fact that holds while an action runs which ends when a condition is true, at most so long
-    /// after whatever needed the fact.
+    /// Adds an action that ends when `answer` holds, at most `time` after a happening that needs
+    /// the returned fact. The fact holds while the action runs.
     pub(super) fn wait(&mut self, time: &Rational, answer: Condition) -> PredicateId {
         let waits = self.predicate("waits");
         let epsilon = self.task.epsilon();
         let body = Body::Durative {
             duration: vec![DurationConstraint {
                 comparison: Comparison::AtMost,
-                // It begins ε before what needs it, and ends ε after what it waits for.
+                // It begins ε before the happening that needs it, and ends ε after the condition
+                // becomes true.
                 bound: Expression::Constant(time + epsilon + epsilon),
                 at_end: false,
             }],
@@ -88,7 +90,7 @@ impl Rewriting<'_> {
 
     fn schema(&mut self, name: &str, body: Body) {
         self.problem.schemas.push(Schema {
-            // No name of a text has a space.
+            // No name in a text contains a space.
             name: format!("{name} {}", self.problem.schemas.len()),
             parameters: Vec::new(),
             unknowns: Vec::new(),
@@ -97,11 +99,11 @@ impl Rewriting<'_> {
     }
 }
 
-/// What can change in a problem.
+/// Predicates and functions that can change in a problem.
 pub(super) struct Changing {
     pub(super) predicates: BTreeSet<PredicateId>,
     pub(super) functions: BTreeSet<FunctionId>,
-    /// Functions that do not only change at happenings of actions.
+    /// Functions that also change outside of happenings of actions.
     pub(super) moving: BTreeSet<FunctionId>,
 }
 
@@ -152,7 +154,7 @@ impl Changing {
     }
 }
 
-/// The conditions of an action that are read at one moment, with what it does then.
+/// Returns the conditions of an action at each moment, with the effects at that moment.
 pub(super) fn snaps(body: &mut Body) -> Vec<(&mut Condition, &mut Vec<Effect>)> {
     match body {
         Body::Instantaneous { condition, effects } => vec![(condition, effects)],

@@ -9,10 +9,10 @@ use elbowroom_model::problem::{
     Atom, Comparison, Condition, Expression, Fluent, ObjectId, PredicateId, Term,
 };
 
-/// Most clauses of one condition.
+/// Maximum number of clauses of one condition.
 const MOST_CLAUSES: usize = 64;
 
-/// Most parts of one condition, with those that replace derived facts.
+/// Maximum number of parts of one condition, including those that replace derived facts.
 const MOST_PARTS: usize = 2_000;
 
 /// A fact, a comparison of numbers, or the negation of one.
@@ -22,11 +22,11 @@ pub(super) struct Literal {
     pub(super) truth: bool,
 }
 
-/// What a literal is about.
+/// The subject of a literal.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Matter {
     Fact(PredicateId, Vec<ObjectId>),
-    /// By its position among the [`Numbers`].
+    /// Index in [`Numbers`].
     Number(usize),
 }
 
@@ -52,7 +52,7 @@ impl Numbers {
 }
 
 impl Literal {
-    /// That a fact without arguments has this truth.
+    /// Returns the literal that a fact without arguments has this truth.
     pub(super) fn plain(predicate: PredicateId, truth: bool) -> Self {
         Self {
             matter: Matter::Fact(predicate, Vec::new()),
@@ -65,7 +65,7 @@ impl Literal {
         self
     }
 
-    /// As a condition.
+    /// Returns the literal as a condition.
     pub(super) fn condition(&self, numbers: &Numbers) -> Condition {
         let condition = match &self.matter {
             Matter::Fact(predicate, objects) => fact(*predicate, objects),
@@ -89,8 +89,9 @@ fn fact(predicate: PredicateId, objects: &[ObjectId]) -> Condition {
     })
 }
 
-/// Clauses that together say that the condition has this truth. Derived facts are replaced by the bodies of
-/// their rules. `None` if one depends on itself, or there are too many clauses.
+/// Returns clauses whose conjunction states that the condition has this truth. Derived facts are
+/// replaced by the bodies of their rules. Returns `None` if a derived fact depends on itself, or
+/// there are too many clauses.
 pub(super) fn clauses(
     task: &Task,
     condition: &ground::Condition,
@@ -107,7 +108,7 @@ pub(super) fn clauses(
     unfolding.clauses(condition, truth)
 }
 
-/// A condition on its way to clauses.
+/// Conversion of a condition to clauses.
 struct Unfolding<'a> {
     task: &'a Task,
     rules: Arc<Rules>,
@@ -157,7 +158,7 @@ impl Unfolding<'_> {
         }
     }
 
-    /// Clauses that say that all of the parts have this truth, or one of them.
+    /// Returns clauses which state that all of the parts, or one of them, have this truth.
     fn joined<'c>(
         &mut self,
         parts: impl IntoIterator<Item = &'c ground::Condition>,
@@ -187,7 +188,7 @@ impl Unfolding<'_> {
     }
 }
 
-/// The condition with objects in the place of numbers of facts.
+/// Returns the condition with predicates and objects instead of fact numbers.
 pub(super) fn lifted(task: &Task, condition: &ground::Condition) -> Condition {
     let many = |parts: &[ground::Condition]| parts.iter().map(|p| lifted(task, p)).collect();
     match condition {

@@ -8,8 +8,8 @@ use super::regression::{Difficulty, Moment, all, any, not};
 use super::rewriting::{Consequence, GUARDED, MOVING, Rewriting, Watched};
 
 impl Rewriting<'_> {
-    /// The conditions and effects that a happening has besides its own, because of the clauses that it can
-    /// make false.
+    /// Returns the conditions and effects that a happening gets in addition to its own, because of
+    /// the clauses that it can make false.
     pub(super) fn consequences(
         &self,
         moment: &Moment<'_>,
@@ -44,7 +44,8 @@ enum Consequent {
     Effect(Effect),
 }
 
-/// The consequence of a literal of a clause that an effect may make false; `None` if it never does.
+/// Returns the consequence of a literal of a clause that an effect may make false, or `None` if it
+/// never does.
 fn consequence(
     moment: &Moment<'_>,
     effect: &Effect,
@@ -53,7 +54,7 @@ fn consequence(
     let Some(falsifies) = moment.falsifies(effect, literal)? else {
         return Ok(None);
     };
-    // Another literal holds after; or this one, because of another effect.
+    // Another literal holds afterwards, or this one does because of another effect.
     let is_regained = match &literal.matter {
         Matter::Fact(..) => literal.truth && moment.adds(literal),
         Matter::Number(_) => true,

@@ -11,12 +11,12 @@ use elbowroom_num::Rational;
 use super::super::answer::Settings;
 use super::judged_without_observers;
 
-/// Most delays that are tried for one plan.
+/// Maximum number of delays that are tried for one plan.
 const MOST_DELAYS: usize = 32;
 
-/// Returns a plan with the same steps that satisfies the constraints: the steps from some start on are later
-/// by the same time, so that the first of them starts at, or just after, a time that a constraint or a timed
-/// initial names.
+/// Returns a plan with the same steps that satisfies the constraints. The steps from some start on
+/// are delayed by the same time, so that the first of them starts at, or just after, a time that a
+/// constraint or a timed initial names.
 pub(in super::super) fn delayed(
     task: &Task,
     situation: &Situation,

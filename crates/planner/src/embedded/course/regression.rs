@@ -1,7 +1,7 @@
-//! What holds after the effects of a happening, as a condition of the state before it.
+//! Regression: conditions after the effects of a happening, as conditions of the state before it.
 //!
-//! Effects are those of a schema, so their arguments may be variables; what a clause says has
-//! objects only.
+//! Effects are those of a schema, so their arguments may be variables. Clauses contain objects
+//! only.
 
 use elbowroom_model::problem::{
     Atom, Change, Condition, Effect, Expression, Fluent, FunctionId, ObjectId, PredicateId,
@@ -10,19 +10,20 @@ use elbowroom_model::problem::{
 
 use super::clauses::{Literal, Matter, Number, Numbers};
 
-/// Most ways in which the effects of one happening can change the fluents of a comparison.
+/// Maximum number of ways in which the effects of one happening can change the fluents of a
+/// comparison.
 const MOST_WAYS: usize = 64;
 
-/// What effects do that cannot be regressed.
+/// Effects that cannot be regressed.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Difficulty {
     /// An effect under a condition at another moment.
     Guarded,
-    /// A number changes all the time, or in too many ways.
+    /// A number that changes continuously, or in too many ways.
     Moving,
 }
 
-/// One moment of a schema: its parameters, and what happens then.
+/// One moment of a schema: its parameters and effects.
 #[derive(Clone, Copy)]
 pub(super) struct Moment<'a> {
     pub(super) problem: &'a Problem,
@@ -35,7 +36,8 @@ pub(super) struct Moment<'a> {
 type Ground = (FunctionId, Vec<ObjectId>);
 
 impl Moment<'_> {
-    /// When this effect makes a literal false, by itself; `None` if it never does.
+    /// Returns the condition under which this effect alone makes a literal false, or `None` if it
+    /// never does.
     pub(super) fn falsifies(
         &self,
         effect: &Effect,
@@ -55,7 +57,7 @@ impl Moment<'_> {
         }
     }
 
-    /// What must hold before for a literal to hold after.
+    /// Returns the condition before the happening under which a literal holds after it.
     pub(super) fn before(&self, literal: &Literal) -> Result<Condition, Difficulty> {
         let now = literal.condition(self.numbers);
         match &literal.matter {
@@ -80,7 +82,7 @@ impl Moment<'_> {
         }
     }
 
-    /// Whether some effect may make the fact of this literal true.
+    /// Returns `true` if some effect may make the fact of this literal true.
     pub(super) fn adds(&self, literal: &Literal) -> bool {
         self.effects
             .iter()
@@ -90,7 +92,8 @@ impl Moment<'_> {
             })
     }
 
-    /// What must hold before for one of these literals to hold after.
+    /// Returns for each of these literals the condition before the happening under which it holds
+    /// after it.
     pub(super) fn before_any<'l>(
         &self,
         clause: impl IntoIterator<Item = &'l Literal>,
@@ -111,7 +114,7 @@ impl Moment<'_> {
         Ok(found)
     }
 
-    /// When an effect gives a fact this truth.
+    /// Returns the condition under which an effect gives a fact this truth.
     fn writes(
         &self,
         effect: &Effect,
@@ -139,7 +142,7 @@ impl Moment<'_> {
         self.meets(effect, &atom.arguments, objects)
     }
 
-    /// When an effect changes a fluent.
+    /// Returns the condition under which an effect changes a fluent.
     fn updates(&self, effect: &Effect, fluent: &Ground) -> Result<Option<Condition>, Difficulty> {
         match &effect.change {
             Change::Update { fluent: own, .. } if own.function == fluent.0 => {
@@ -149,7 +152,7 @@ impl Moment<'_> {
         }
     }
 
-    /// When an effect on these arguments is one on these objects.
+    /// Returns the condition under which the arguments denote these objects.
     fn meets(
         &self,
         effect: &Effect,
@@ -181,9 +184,9 @@ impl Moment<'_> {
         }))
     }
 
-    /// What must hold before for a comparison to hold after.
+    /// Returns the condition before the happening under which a comparison holds after it.
     fn compared_after(&self, number: &Number) -> Result<Condition, Difficulty> {
-        /// What a way asks for, and which updates it consists of.
+        /// The conditions of a way, and the updates that it consists of.
         type Way = (Vec<Condition>, Vec<(usize, Ground)>);
         let fluents = fluents(number);
         let mut ways: Vec<Way> = vec![Way::default()];
@@ -242,7 +245,7 @@ impl Moment<'_> {
         Ok(any(found))
     }
 
-    /// A fluent's value after these effects.
+    /// Returns a fluent's value after these effects.
     fn value_after(
         &self,
         fluent: &Fluent,
@@ -260,7 +263,7 @@ impl Moment<'_> {
             else {
                 continue;
             };
-            // Only sums do not depend on their order.
+            // Only sums do not depend on the order of their parts.
             if !is_one && !operator.is_additive() {
                 return Err(Difficulty::Moving);
             }
@@ -277,7 +280,7 @@ impl Moment<'_> {
     }
 }
 
-/// The fluents that a comparison reads.
+/// Returns the fluents that a comparison reads.
 fn fluents(number: &Number) -> Vec<Ground> {
     let mut found: Vec<Ground> = Vec::new();
     for side in [&number.1, &number.2] {
@@ -295,7 +298,7 @@ fn ground(fluent: &Fluent) -> Ground {
     (fluent.function, objects(&fluent.arguments))
 }
 
-/// The objects among the arguments of what has no variables.
+/// Returns the objects among arguments without variables.
 pub(super) fn objects(arguments: &[Term]) -> Vec<ObjectId> {
     let object = |term: &Term| match term {
         Term::Object(object) => Some(*object),

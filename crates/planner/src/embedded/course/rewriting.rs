@@ -1,4 +1,4 @@
-//! A problem without constraints whose plans keep those of another.
+//! Compilation of a problem with constraints into one without, whose plans satisfy them.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use super::clauses::{Literal, Matter, Numbers, clauses, lifted};
 use super::regression::{Moment, all, not};
 use super::{Obstacle, counts_violations};
 
-/// Most clauses that always hold.
+/// Maximum number of clauses that must always hold.
 const MOST_CLAUSES: usize = 5_000;
 
 const LONG: Obstacle =
@@ -25,32 +25,33 @@ pub(super) const MOVING: Obstacle = Obstacle::Feature(
 );
 const TOO_MANY: Obstacle = Obstacle::Feature("too many trajectory constraints");
 
-/// A clause, and what comes of a happening that makes it false.
+/// A clause, and the consequence of a happening that makes it false.
 #[derive(Clone, Debug)]
 pub(super) struct Watched {
     pub(super) clause: Vec<Literal>,
-    /// The constraint that it comes from.
+    /// The constraint that it is derived from.
     pub(super) constraint: String,
     pub(super) consequence: Consequence,
-    /// The open interval of times outside of which nothing comes of it.
+    /// Open interval of times. Outside of it, there is no consequence.
     pub(super) during: (Rational, Option<Rational>),
 }
 
-/// What comes of a clause that is false.
+/// Consequence of making a clause false.
 #[derive(Clone, Debug)]
 pub(super) enum Consequence {
-    /// No happening makes it false.
+    /// No happening may make it false.
     Never,
-    /// What makes it false, while this holds, has this effect, too.
+    /// A happening that makes it false, while the condition holds, also has this effect.
     Effect(Condition, Change),
-    /// As above; and what timed initials make of it is settled when this condition is seen later.
+    /// As [`Effect`](Self::Effect). A violation by a timed initial is settled when the condition is
+    /// observed later.
     Owes(Change, Condition),
 }
 
 /// The constraints that a problem without constraints accounts for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Coverage {
-    /// All of them, or there is no such problem.
+    /// All of them; otherwise there is no such problem.
     All,
     /// Those that have such a form. The validator rejects the plans that break the others.
     Expressible,
@@ -63,12 +64,12 @@ pub(super) struct Rewriting<'a> {
     pub(super) numbers: Numbers,
     pub(super) goals: Vec<Condition>,
     pub(super) watched: Vec<Watched>,
-    /// How many predicates are the task's own.
+    /// Number of predicates of the task itself.
     own: usize,
 }
 
-/// The problem without constraints, with these preferences (by position among the task's soft
-/// constraints) among those that are kept.
+/// Returns the problem without constraints. `demanded` are the preferences that it also enforces,
+/// by position among the task's soft constraints.
 pub(super) fn without_constraints(
     task: &Task,
     demanded: &[usize],
@@ -86,7 +87,8 @@ pub(super) fn without_constraints(
     rewriting.finish()
 }
 
-/// A problem of which every plan of the task is one: of the constraints, what holds in the end.
+/// Returns a relaxed problem that every plan of the task solves. Of the constraints, it keeps only
+/// the conditions on the end.
 pub(super) fn loosened(task: &Task) -> Problem {
     let mut rewriting = Rewriting::new(task, Coverage::Expressible);
     for modal in &task.constraints().hard {
@@ -101,7 +103,7 @@ pub(super) fn loosened(task: &Task) -> Problem {
 impl<'a> Rewriting<'a> {
     fn new(task: &'a Task, coverage: Coverage) -> Self {
         let mut problem = task.problem().clone();
-        // What is violated of the preferences, the judge counts in the task itself.
+        // The validator counts violated preferences in the task itself.
         problem.constraints.clear();
         problem.action_preferences.clear();
         problem.domain_constraints = 0;
@@ -119,7 +121,7 @@ impl<'a> Rewriting<'a> {
         }
     }
 
-    /// Passes on an obstacle unless it may be left out: `None`, then.
+    /// Returns an obstacle as an error, or `None` if the coverage permits omitting the constraint.
     pub(super) fn covered<T>(&self, found: Result<T, Obstacle>) -> Result<Option<T>, Obstacle> {
         match found {
             Ok(found) => Ok(Some(found)),
@@ -169,7 +171,7 @@ impl<'a> Rewriting<'a> {
         clauses(self.task, condition, truth, &mut self.numbers).ok_or(LONG)
     }
 
-    /// The clauses that say that `d` holds if `c` does.
+    /// Returns the clauses which state that `c` implies `d`.
     fn implications(
         &mut self,
         c: &ground::Condition,
@@ -194,7 +196,8 @@ impl<'a> Rewriting<'a> {
         });
     }
 
-    /// What ends the condition says that it is over, and then nothing makes it true.
+    /// Compiles `at-most-once`: a happening that ends the condition records this, and then no
+    /// happening may make the condition true.
     fn at_most_once(
         &mut self,
         modal: &Modal<ground::Condition>,
@@ -205,7 +208,7 @@ impl<'a> Rewriting<'a> {
             let ends = Consequence::Effect(lifted(self.task, c), add(over));
             for literal in &clause {
                 for time in self.timed_against(literal) {
-                    // It may end then; whether it does, a timed initial cannot ask.
+                    // The condition may end then. A timed initial cannot check whether it does.
                     self.timed(time, TimedChange::Add(over, Vec::new()));
                 }
             }
@@ -218,7 +221,8 @@ impl<'a> Rewriting<'a> {
         Ok(())
     }
 
-    /// What makes `c` true without `d` is owed until an observer sees `d`.
+    /// Compiles `sometime-after`: making `c` true without `d` creates an obligation until an
+    /// observer observes `d`.
     fn sometime_after(
         &mut self,
         modal: &Modal<ground::Condition>,
@@ -240,7 +244,8 @@ impl<'a> Rewriting<'a> {
         Ok(())
     }
 
-    /// `c` without `d` needs an action that waits, which ends in time, when `d` holds.
+    /// Compiles `always-within`: `c` without `d` needs a waiting action, which ends in time, when
+    /// `d` holds.
     fn always_within(
         &mut self,
         modal: &Modal<ground::Condition>,
@@ -253,7 +258,7 @@ impl<'a> Rewriting<'a> {
         let waits = self.wait(time, answer.clone());
         let mut more = vec![Literal::plain(waits, true)];
         if !found.iter().all(|clause| self.holds_initially(clause)) {
-            // From the beginning on, nothing needs to wait until `d` has been seen.
+            // From the beginning, no waiting action is needed until `d` has been observed.
             let grace = self.predicate("grace");
             self.problem.initial_facts.push((grace, Vec::new()));
             let open = self.open_until(time);
@@ -269,7 +274,8 @@ impl<'a> Rewriting<'a> {
         Ok(())
     }
 
-    /// An observer sees the condition by the time from which it has to hold, and locks it.
+    /// Compiles `hold-during` and `hold-after`: an observer observes the condition by the time from
+    /// which it must hold, and locks it.
     fn hold(
         &mut self,
         modal: &Modal<ground::Condition>,
@@ -334,7 +340,7 @@ impl<'a> Rewriting<'a> {
         }
     }
 
-    /// Whether a clause holds in the initial state.
+    /// Returns `true` if a clause holds in the initial state.
     pub(super) fn holds_initially(&self, clause: &[Literal]) -> bool {
         let facts = &self.problem.initial_facts;
         let values = &self.problem.initial_values;
@@ -367,7 +373,8 @@ impl<'a> Rewriting<'a> {
         })
     }
 
-    /// Returns `true` if the literal reads a number that does not only change at happenings of actions.
+    /// Returns `true` if the literal reads a number that also changes outside of happenings of
+    /// actions.
     fn moves(&self, literal: &Literal, changing: &Changing) -> bool {
         let Matter::Number(position) = &literal.matter else {
             return false;
@@ -408,7 +415,8 @@ impl<'a> Rewriting<'a> {
         Ok(self.problem)
     }
 
-    /// Leaves out clauses and literals on what never changes, and says what is broken already.
+    /// Removes clauses and literals on facts and fluents that never change, and reports a
+    /// constraint that is already violated.
     fn leave_out_what_stays(&mut self) -> Result<(), Obstacle> {
         let changing = Changing::of(&self.problem);
         let mut known: BTreeSet<Vec<Literal>> = BTreeSet::new();

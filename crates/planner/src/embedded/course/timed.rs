@@ -1,7 +1,7 @@
 //! Clauses that timed initials make false.
 //!
-//! A timed initial asks for nothing, and does the same whatever holds. So an observer sees before it
-//! that another literal of the clause holds, and locks that until then.
+//! A timed initial has no condition and always has the same effect. So an observer observes before
+//! it that another literal of the clause holds, and locks the literal until then.
 
 use std::collections::BTreeSet;
 
@@ -20,14 +20,14 @@ const ENDED: Obstacle = Obstacle::Feature(
 );
 
 impl Rewriting<'_> {
-    /// Returns `true` if a clause may be stricter than its constraint: a condition that may hold once counts
-    /// as over where timed initials may have ended it.
+    /// Returns `true` if a clause may be stricter than its constraint: a condition that may hold
+    /// once counts as over if timed initials may have ended it.
     fn has_rough_clauses(&self) -> bool {
         let mut constraints = self.task.constraints().hard.iter();
         constraints.any(|modal| matches!(modal, Modal::AtMostOnce(_)))
     }
 
-    /// The times at which timed initials make a literal false.
+    /// Returns the times at which timed initials make a literal false.
     pub(super) fn timed_against(&self, literal: &Literal) -> BTreeSet<Rational> {
         self.timed_to(literal, !literal.truth)
     }
@@ -45,7 +45,7 @@ impl Rewriting<'_> {
         own.map(|timed| timed.time.clone()).collect()
     }
 
-    /// Sees to what timed initials make of the clauses.
+    /// Compiles the effects of timed initials on the clauses.
     pub(super) fn settle_timed(&mut self) -> Result<(), Obstacle> {
         let mut more = Vec::new();
         for one in self.watched.clone() {
@@ -73,7 +73,7 @@ impl Rewriting<'_> {
         Ok(())
     }
 
-    /// Sees to it that one of the literals holds when timed initials make the others of a clause
+    /// Ensures that one of the literals holds when timed initials make the others of a clause
     /// false.
     fn settle(
         &mut self,

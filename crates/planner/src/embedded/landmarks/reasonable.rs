@@ -1,20 +1,23 @@
-//! Reasonable orders: who makes one landmark true before the other has to make it true again.
+//! Reasonable orders: one landmark is made true before another if the other would otherwise have to
+//! be made true again.
 //!
-//! A landmark B *interferes* with A if A cannot be made true while B stays true: they exclude each other, or
-//! B and something that comes with A, or that A needs, do. Then A comes reasonably before B if B is a goal,
-//! or if B must be true just before some landmark that comes after A anyway (Hoffmann, Porteous & Sebastia,
-//! JAIR 22, 2004; Richter & Westphal, JAIR 39, 2010). Such an order is no law: a plan may break it.
+//! A landmark B *interferes* with A if A cannot be made true while B stays true: they are mutex, or
+//! B is mutex with something that comes with A, or that A needs. Then A comes reasonably before B
+//! if B is a goal, or if B must be true just before some landmark that comes after A anyway
+//! (Hoffmann, Porteous & Sebastia, JAIR 22, 2004; Richter & Westphal, JAIR 39, 2010). A plan may
+//! violate such an order.
 
 use super::super::formula::{Literal, is_set, set};
 use super::super::mutex::Mutexes;
 use super::super::relaxed::{Graph, Labels};
 use super::Landmarks;
 
-/// Beyond so many landmarks, none are ordered reasonably: that takes the square of it.
+/// Maximum number of landmarks for reasonable orders, whose computation takes quadratic time.
 const MOST_ORDERED: usize = 1_000;
 
 impl Landmarks {
-    /// Orders landmarks reasonably, as far as that makes no circles; what comes first stands first then.
+    /// Adds reasonable orders between landmarks unless they form cycles, and sorts the landmarks
+    /// accordingly.
     pub(crate) fn order_reasonably(&mut self, graph: &Graph, labels: &Labels, mutexes: &Mutexes) {
         if self.list.len() > MOST_ORDERED {
             return;
@@ -54,7 +57,7 @@ impl Landmarks {
         self.sort();
     }
 
-    /// What comes before something that comes before a landmark comes before it.
+    /// Computes the transitive closure of the orders.
     fn close(&mut self) {
         for number in 0..self.list.len() {
             let (before, rest) = self.list.split_at_mut(number);
@@ -74,8 +77,8 @@ impl Landmarks {
         (proposition < self.first_test).then_some(Literal(proposition))
     }
 
-    /// For each landmark the literals that are true when it becomes true, or just before: itself, what it
-    /// needs, and what comes with it.
+    /// Returns for each landmark the literals that are true when it becomes true, or just before:
+    /// the landmark, its preconditions, and the literals that become true together with it.
     fn around(&self, graph: &Graph, labels: &Labels) -> Vec<Vec<Literal>> {
         let mut place = vec![None; graph.proposition_count];
         for (number, landmark) in self.list.iter().enumerate() {
@@ -100,7 +103,7 @@ impl Landmarks {
             .map(Option::unwrap_or_default)
             .zip(&self.list)
             .map(|(mut with, landmark)| {
-                // What becomes false and true again in one step is true in the end.
+                // A fact that becomes false and true again in one step is true afterwards.
                 let both = |one: &Literal, with: &[Literal]| {
                     with.contains(&Literal::new(one.fact(), !one.truth()))
                 };
@@ -118,7 +121,7 @@ impl Landmarks {
         around
     }
 
-    /// The one comes before the other, and so does all that comes before it.
+    /// Orders one landmark, and all that precede it, before the other.
     fn order(&mut self, earlier: u32, later: u32) {
         let mut before = self.list[earlier as usize].after.clone();
         set(&mut before, earlier, true);
@@ -134,7 +137,7 @@ impl Landmarks {
         }
     }
 
-    /// Sorts by how much comes before.
+    /// Sorts by the number of preceding landmarks.
     fn sort(&mut self) {
         let mut order: Vec<usize> = (0..self.list.len()).collect();
         let before = |number: &usize| -> u32 {

@@ -1,5 +1,5 @@
-//! Landmarks beside their definition: without what makes them true, even the delete relaxation does not
-//! reach the goal.
+//! Compares landmarks with their definition: without the operators that make a landmark true, even
+//! the delete relaxation does not reach the goal.
 
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_problem};
@@ -19,13 +19,13 @@ use crate::embedded::testing::{choices, compiled};
 
 fn labels(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Labels> {
     let mut labels = relaxed.labels(state)?;
-    // In small steps, as a search does it.
+    // In small increments, as a search does.
     while !relaxed.propagate(&mut labels, 1).1 {}
     Some(labels)
 }
 
-/// What is reached if one proposition never is, by going over all operators until nothing changes; and
-/// which operators can come then.
+/// Returns the propositions that are reachable without one of them, by iterating over all operators
+/// until nothing changes, and the operators that are then applicable.
 fn reached_without(graph: &Graph, labels: &Labels, without: Option<u32>) -> (Vec<bool>, Vec<bool>) {
     let achievements = achievements(graph, labels);
     let mut reached: Vec<bool> = (0..)
@@ -60,7 +60,8 @@ fn achievements(graph: &Graph, labels: &Labels) -> Vec<(u32, u32)> {
     achievements
 }
 
-/// Each label has what its proposition is not reached without, and nothing else.
+/// Checks that each label contains exactly the propositions without which its proposition is
+/// unreachable.
 fn check_labels(graph: &Graph, labels: &Labels) {
     let (reached, _) = reached_without(graph, labels, None);
     for (proposition, &is_reached) in (0..).zip(&reached) {
@@ -86,7 +87,8 @@ fn check_labels(graph: &Graph, labels: &Labels) {
     }
 }
 
-/// Who needs a landmark just before it becomes true: all that can make it true for the first time.
+/// Checks that a landmark is needed just before another one exactly if every operator that can make
+/// the other true for the first time needs it.
 fn check_needs(graph: &Graph, labels: &Labels, landmarks: &Landmarks) {
     let achievements = achievements(graph, labels);
     for (number, landmark) in (0..).zip(&landmarks.list) {
@@ -112,7 +114,7 @@ fn check_needs(graph: &Graph, labels: &Labels, landmarks: &Landmarks) {
     }
 }
 
-/// No order is lost by others that come in, none is a circle, and each is followed to the end.
+/// Checks that new orders preserve the old ones, form no cycle, and are transitively closed.
 fn check_orders(before: &Landmarks, landmarks: &Landmarks) {
     let orders = |landmarks: &Landmarks| {
         let name = |number: u32| landmarks.list[number as usize].proposition;
@@ -135,7 +137,7 @@ fn check_orders(before: &Landmarks, landmarks: &Landmarks) {
     }
 }
 
-/// Follows all choices, so many at most: where a plan ends, nothing is left.
+/// Follows all choices within the budget, and checks that no landmark remains where a plan ends.
 fn check_progress(
     compiled: &Compiled,
     landmarks: &Landmarks,
@@ -214,7 +216,8 @@ const BLOCKS: &str = "(define (domain blocks) (:requirements :typing :durative-a
       :effect (and (at start (not (held ?x))) (at start (not (clear ?y)))
                    (at end (clear ?x)) (at end (free)) (at end (on ?x ?y)))))";
 
-/// A block is taken only when it is clear, so what stands on it would have to be taken off again.
+/// A block can be taken only when it is clear, so a block placed on it too early would have to be
+/// removed again.
 #[test]
 fn a_tower_is_built_from_below() {
     let problem = "(define (problem p) (:domain blocks) (:objects a b c - block)

@@ -28,7 +28,7 @@ pub(super) struct Operator {
 const FEWEST_ROUNDS: u64 = 8;
 
 impl Operator {
-    /// Number of table rows that one evaluation reads and writes.
+    /// Returns the number of table rows that one evaluation reads and writes.
     fn size(&self) -> usize {
         2 + self.needs.len() + self.adds.len()
     }

@@ -52,7 +52,7 @@ impl Table {
         has_changed
     }
 
-    /// The same without the pair of the atom and its negation.
+    /// As [`add`](Self::add), without the pair of the atom and its negation.
     pub(super) fn add_consistent(
         &mut self,
         atom: usize,
@@ -70,7 +70,7 @@ impl Table {
         }
     }
 
-    /// Returns `true` if each two of these atoms are a pair, and each atom with itself.
+    /// Returns `true` if every two of these atoms are a pair, and each atom with itself.
     pub(super) fn has_all_pairs(&self, atoms: &[usize]) -> bool {
         atoms.iter().all(|&atom| is_subset(atoms, self.row(atom)))
     }
@@ -122,7 +122,7 @@ pub(super) fn is_subset(atoms: &[usize], set: &[u64]) -> bool {
     atoms.iter().all(|&atom| contains(set, atom))
 }
 
-/// The atoms of a set, ascending.
+/// Returns the atoms of a set, in ascending order.
 pub(super) fn bits(set: &[u64]) -> impl Iterator<Item = usize> + '_ {
     let words = set.iter().enumerate();
     words.flat_map(|(place, &word)| ones(word, 64 * place))

@@ -46,7 +46,7 @@ impl<'a> Twin<'a> {
         self.reached.contains(&(one, other))
     }
 
-    /// Atoms that may hold together with the preconditions of an applicable operator.
+    /// Returns the atoms that may hold together with the preconditions of an applicable operator.
     fn context(&self, operator: &Operator) -> Vec<usize> {
         let needs = &operator.needs;
         if !needs
@@ -81,7 +81,7 @@ impl<'a> Twin<'a> {
         operator.deletes.contains(&atom) || operator.ends == Some(atom) && !runs_twice()
     }
 
-    /// Pairs after the operator with at least one atom that it made true.
+    /// Returns the pairs after the operator with at least one atom that it made true.
     fn after(&self, operator: &Operator) -> PairSet {
         if !self.happens(operator) {
             return PairSet::new();
@@ -97,7 +97,7 @@ impl<'a> Twin<'a> {
         pairs
     }
 
-    /// Live pairs.
+    /// Returns the live pairs.
     fn live(&self) -> PairSet {
         let goal = &self.model.goal;
         let mut held = vec![u64::MAX; self.model.atom_count.div_ceil(64)];
@@ -137,7 +137,7 @@ impl<'a> Twin<'a> {
         after
     }
 
-    /// Pairs whose successors by the operator are live.
+    /// Returns the pairs whose successors by the operator are live.
     fn before(&self, operator: &Operator, live: &PairSet) -> PairSet {
         if !self.is_live(operator, live) {
             return PairSet::new();
@@ -244,7 +244,8 @@ proptest! {
     }
 }
 
-/// Corridor of tiles. A robot paints the next tile in either direction and cannot enter painted tiles.
+/// Returns a task with a corridor of tiles. A robot paints the next tile in either direction and
+/// cannot enter painted tiles.
 fn corridor() -> Task {
     let domain = "(define (domain corridor) (:requirements :typing :durative-actions)
         (:types tile)

@@ -1,4 +1,4 @@
-//! Small networks, and what is kept of random ones.
+//! Small networks, and projections of random ones.
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ fn a_cycle_that_pushes_itself_is_found() {
     assert_eq!(network.add_edge(end, start, -10), Err(Inconsistent));
 }
 
-/// A happening after some of the last ones, and perhaps no later than so long after one of them.
+/// A happening after some of the last ones, and optionally at most some time after one of them.
 type Draft = (Vec<(usize, i64)>, Option<(usize, i64)>);
 
 proptest! {
@@ -45,7 +45,7 @@ proptest! {
     ) {
         let drafts: Vec<Draft> = drafts;
         let (mut whole, mut projected) = (Network::default(), Network::default());
-        // The nodes that are kept, by their names in both networks; the latest comes last.
+        // The kept nodes by their names in both networks; the latest comes last.
         let mut kept: Vec<(NodeId, NodeId)> = Vec::new();
         for (after, before) in drafts {
             let place = |back: usize| kept.len().checked_sub(1 + back);
@@ -108,8 +108,8 @@ fn what_nothing_can_push_any_more_is_settled() {
     assert_eq!(network.marks, [(4, 0)]);
 }
 
-/// A node: what it comes after, what it comes no later than, and a list of intervals for it, or for
-/// an earlier node and it.
+/// A node: its predecessors, an optional upper bound, and an optional list of intervals for it, or
+/// for an earlier node and it.
 type WindowedDraft = (
     Vec<(usize, i64)>,
     Option<(usize, i64)>,
@@ -126,7 +126,7 @@ fn windowed_drafts() -> impl Strategy<Value = Vec<WindowedDraft>> {
     prop::collection::vec(draft, 1..6)
 }
 
-/// The intervals with these gaps and lengths, one after the other.
+/// Returns consecutive intervals with these gaps and lengths.
 fn intervals(gaps: &[(i64, i64)]) -> Vec<Interval> {
     let mut time = 0;
     let intervals = gaps.iter().map(|&(gap, length)| {
@@ -137,7 +137,7 @@ fn intervals(gaps: &[(i64, i64)]) -> Vec<Interval> {
     intervals.collect()
 }
 
-/// The least times under all edges `(from, to, distance)`, each node in its bounds.
+/// Returns the least times under all edges `(from, to, distance)`, with each node in its bounds.
 fn least_times(edges: &[(usize, usize, i64)], bounds: &[(i64, i64)]) -> Option<Vec<i64>> {
     let mut times: Vec<i64> = bounds.iter().map(|bound| bound.0).collect();
     for _ in 0..=times.len() {

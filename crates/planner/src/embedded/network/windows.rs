@@ -1,9 +1,10 @@
-//! Windows that nodes of the network must lie in.
+//! Windows for nodes of the network.
 
 use super::super::windows::Interval;
 use super::{Inconsistent, NEVER, Network, NodeId, SETTLED, Ticks};
 
-/// The nodes `first` and `last` lie in the same interval of a list, with `tail` left after `last`.
+/// Constraint that `first` and `last` are in the same interval of a list, with `tail` remaining
+/// after `last`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Within {
     /// The list of intervals.
@@ -14,8 +15,8 @@ pub(crate) struct Within {
 }
 
 impl Network {
-    /// Moves nodes to their next windows until all lie in one. Each move is to a later interval, so
-    /// this ends.
+    /// Moves nodes to their next windows until each is in one. Each move is to a later interval, so
+    /// the loop terminates.
     pub(super) fn enter_windows(&mut self) -> Result<(), Inconsistent> {
         let mut place = 0;
         while place < self.within.len() {
@@ -24,14 +25,14 @@ impl Network {
             place += 1;
             if self.earliest(within.first) < interval.0 {
                 self.follow_edges(within.first, interval.0, SETTLED)?;
-                // That may have moved others out of their windows.
+                // The move may have pushed other nodes out of their windows.
                 place = 0;
             }
         }
         Ok(())
     }
 
-    /// Returns the interval in which the nodes lie at the earliest, and whether there is no later one.
+    /// Returns the earliest interval that contains the nodes, and whether it is the last one.
     pub(super) fn interval_of(&self, within: Within) -> Option<(Interval, bool)> {
         let last = self.earliest(within.first).max(self.earliest(within.last));
         self.windows
@@ -45,10 +46,10 @@ impl Network {
         Some(time.max(interval.0))
     }
 
-    /// Demands that the nodes lie in the same interval of the list, with `tail` left after the
-    /// second one. For a start by itself, both are the same node.
+    /// Requires that the nodes are in the same interval of the list, with `tail` remaining after
+    /// the second one. For a start by itself, both are the same node.
     pub(crate) fn keep_within(&mut self, within: Within) -> Result<(), Inconsistent> {
-        // The constraint on both includes what was demanded of the start by itself.
+        // The constraint on both nodes implies the one on the start alone.
         if within.first != within.last {
             self.within.retain(|known| {
                 (known.windows, known.first, known.last)
@@ -59,7 +60,7 @@ impl Network {
         self.enter_windows()
     }
 
-    /// The constraints by windows.
+    /// Returns the constraints by windows.
     pub(crate) fn within(&self) -> &[Within] {
         &self.within
     }
@@ -78,7 +79,7 @@ impl Network {
         }
     }
 
-    /// Keeps the windows of nodes that have a new name.
+    /// Keeps the windows of nodes that have a new name, and renames the nodes.
     pub(super) fn rename_within(&mut self, names: &[NodeId]) {
         self.within.retain_mut(|within| {
             within.first = names[within.first as usize];
@@ -87,7 +88,7 @@ impl Network {
         });
     }
 
-    /// The beginnings of the windows in which nodes lie at the earliest.
+    /// Returns for each node with windows the beginning of its earliest window.
     pub(crate) fn window_begins(&self) -> impl Iterator<Item = (NodeId, Ticks)> + '_ {
         let within = self.within.iter();
         within.filter_map(|&within| Some((within.first, self.interval_of(within)?.0.0)))

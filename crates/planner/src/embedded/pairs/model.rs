@@ -1,14 +1,14 @@
-//! What pairs are made of: atoms, and the operators that bring them about.
+//! Atoms of the pairs, and the operators that make them true.
 
 use super::super::compile::{Action, Change, Compiled, NONE, Snap};
 use super::super::formula::{Formula, Literal};
 use super::super::relaxed::Graph;
 use super::super::time::Ticks;
 
-/// The happening that an operator stands for.
+/// The happening that an operator represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// An action starts, or happens if it takes no time.
+    /// The start of an action, or the instantaneous action.
     Start(u32),
     End(u32),
     Timed(u32),
@@ -18,37 +18,39 @@ pub(super) enum Kind {
 #[derive(Clone, Debug)]
 pub(super) struct Operator {
     pub(super) kind: Kind,
-    /// Propositions that hold just before, and were brought about by then.
+    /// Propositions that hold just before, and were made true by then.
     pub(super) needs: Vec<usize>,
-    /// Further propositions that hold just before, but may have been brought about again at any
-    /// time.
+    /// Further propositions that hold just before, but may have been made true again at any time.
     pub(super) keeps: Vec<usize>,
-    /// Propositions that may hold afterwards because of it.
+    /// Propositions that may hold afterwards because of the operator.
     pub(super) adds: Vec<usize>,
-    /// Whether an atom, by number, surely does not hold both before and afterwards.
+    /// For each atom, `true` if it certainly does not hold both before and afterwards.
     pub(super) ends: Vec<bool>,
-    /// The atoms, by number, of which it is sure that whatever brings them about comes earlier in
-    /// time, if it comes earlier in the order of choices.
+    /// For each atom, `true` if a happening that makes it true comes earlier in time whenever it
+    /// comes earlier in the order of choices.
     pub(super) comes_after: Vec<bool>,
-    /// The operator of the relaxed problem that knows the windows; [`NONE`] for timed initials.
+    /// The corresponding operator of the relaxed problem, which has the windows; [`NONE`] for timed
+    /// initials.
     pub(super) relaxed: u32,
 }
 
 /// The atoms and operators of a problem.
 ///
-/// An atom is a literal that something needs, or that an action is under way. Literals that only
-/// timed initials change are no atoms: the windows of operators see to them. Nor are derived
-/// facts, numbers, and choices: they are taken to hold whenever they are needed.
+/// An atom is a literal that some condition needs, or the statement that an action is running.
+/// Literals that only timed initials change are not atoms, since the windows of operators represent
+/// them. Derived facts, numbers, and choices are not atoms either: they are assumed to hold
+/// whenever they are needed.
 #[derive(Debug)]
 pub(super) struct Model {
-    /// The atom of each literal; [`usize::MAX`] if it is none.
+    /// The atom of each literal; [`usize::MAX`] if there is none.
     pub(super) of_literal: Vec<usize>,
-    /// The atom that an action is under way, by action; [`usize::MAX`] for instantaneous ones.
+    /// For each action, the atom which states that it is running; [`usize::MAX`] for instantaneous
+    /// actions.
     pub(super) running: Vec<usize>,
     pub(super) atom_count: usize,
     /// The literals that are atoms.
     pub(super) literals: Vec<Literal>,
-    /// The actions whose being under way is an atom, in the order of the atoms.
+    /// The actions of the atoms for running actions, in the order of the atoms.
     actions: Vec<u32>,
     pub(super) operators: Vec<Operator>,
     /// By action; [`NONE`] if there is none.
@@ -56,9 +58,9 @@ pub(super) struct Model {
     pub(super) end_of: Vec<u32>,
     /// The operators that would break the action's over-all condition, by action.
     pub(super) breakers: Vec<Vec<u32>>,
-    /// Whether timed initials bring the atom about.
+    /// For each atom, `true` if timed initials make it true.
     pub(super) is_timed: Vec<bool>,
-    /// Pairs of atoms that no state has; by row.
+    /// Pairs of atoms that are true together in no state; by row.
     pub(super) excludes: Vec<bool>,
     /// The literals of the goal that are atoms.
     pub(super) goal: Vec<usize>,
@@ -69,7 +71,7 @@ pub(super) struct Model {
 const NO_ATOM: usize = usize::MAX;
 
 impl Model {
-    /// `None` if there is too much of it.
+    /// Returns `None` if the model is too large.
     pub(super) fn of(compiled: &Compiled, graph: &Graph) -> Option<Self> {
         let mut model = Self {
             of_literal: vec![NO_ATOM; 2 * compiled.facts.len()],
@@ -130,7 +132,7 @@ impl Model {
         (work * model.atom_count <= compiled.tuning.most_pair_lookups).then_some(model)
     }
 
-    /// The action of the atom that it is under way.
+    /// Returns the action of an atom which states that an action is running.
     pub(super) fn action_of(&self, atom: usize) -> u32 {
         self.actions[atom - self.literals.len()]
     }
@@ -196,7 +198,7 @@ impl Model {
             let mut needs = self.atoms(&snap.condition);
             let mut adds = self.made_by(snap);
             let ends = self.ended_by(snap);
-            // What must hold from the start on, and is not the start's own doing.
+            // Literals that must hold from the start on, and that the start does not add.
             needs.extend(
                 self.atoms(&action.over_all)
                     .into_iter()
@@ -226,7 +228,7 @@ impl Model {
             needs.dedup();
             let mut ends = self.ended_by(snap);
             if action.start == NONE {
-                // There is no second instance of it.
+                // No second instance of it is running.
                 ends[self.running[place]] = true;
             }
             self.end_of[place] = narrow(self.operators.len());
@@ -242,8 +244,8 @@ impl Model {
         }
     }
 
-    /// Propositions that may hold because of the snap action. A conditional effect may always
-    /// happen.
+    /// Returns the propositions that may hold because of the snap action. Conditional effects count
+    /// as possible.
     fn made_by(&self, snap: &Snap) -> Vec<usize> {
         let adds = snap.adds.iter().map(|&fact| Literal::new(fact, true));
         let deletes = snap.deletes.iter().map(|&fact| Literal::new(fact, false));
@@ -258,7 +260,8 @@ impl Model {
         self.known(adds.chain(deletes).chain(conditional))
     }
 
-    /// Propositions that surely do not persist. An addition wins over a deletion.
+    /// Returns for each proposition whether it certainly does not persist. An addition wins over a
+    /// deletion.
     fn ended_by(&self, snap: &Snap) -> Vec<bool> {
         let mut ends = vec![false; self.atom_count];
         for &fact in &snap.deletes {
@@ -270,8 +273,8 @@ impl Model {
         ends
     }
 
-    /// Finds the atoms that no state has together: opposites, and what an action under way does
-    /// not allow. Nothing that breaks an over-all condition happens meanwhile.
+    /// Finds the pairs of atoms that no state contains: opposite literals, and literals that a
+    /// running action excludes. No happening breaks the over-all condition of a running action.
     fn find_exclusions(&mut self, compiled: &Compiled) {
         let count = self.atom_count;
         self.excludes = vec![false; count * count];
@@ -333,8 +336,9 @@ impl Model {
         }
     }
 
-    /// Finds what keeps its order in time: an operator comes after an atom if each happening that
-    /// brings it about sets an annotation that the operator keeps away from.
+    /// Finds the atoms and operators whose order is kept in time: an operator comes after an atom
+    /// if each happening that makes the atom true sets an annotation from which the operator must
+    /// be separated.
     fn find_orders(&mut self, compiled: &Compiled) {
         let marks: Vec<&[u32]> = self
             .operators

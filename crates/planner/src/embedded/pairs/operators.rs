@@ -1,4 +1,4 @@
-//! When an operator can happen, and what can hold with it: the rules of the bound.
+//! Rules of the bound: the earliest times of operators, and the atoms that can hold with them.
 
 use super::super::compile::NONE;
 use super::super::network::SETTLED;
@@ -9,7 +9,7 @@ use super::model::Kind;
 use super::{MOST_ENDED, Pairs};
 
 impl Pairs<'_> {
-    /// The earliest time of an operator; `None` if it cannot happen.
+    /// Returns the earliest time of an operator, or `None` if it cannot happen.
     pub(super) fn earliest(&self, state: &State, number: usize) -> Option<Ticks> {
         let operator = &self.model.operators[number];
         let mut begin = self.together(&self.needs[number]);
@@ -18,7 +18,7 @@ impl Pairs<'_> {
         }
         match operator.kind {
             Kind::Timed(timed) => {
-                // What it would break must have ended by then.
+                // The actions whose over-all conditions it would break must have ended by then.
                 let time = self.compiled.timed[timed as usize].time;
                 return (timed >= state.timed && begin <= time).then_some(time);
             }
@@ -45,7 +45,8 @@ impl Pairs<'_> {
         (begin < NEVER).then_some(begin)
     }
 
-    /// Whether what an operator keeps can hold together with these, and what it needs.
+    /// Returns `true` if the atoms that an operator keeps can hold together with these atoms and
+    /// with its needs.
     fn allows(&self, number: usize, atoms: &[usize]) -> bool {
         let keeps = &self.model.operators[number].keeps;
         keeps.iter().all(|&kept| {
@@ -64,7 +65,8 @@ impl Pairs<'_> {
         in_windows(&self.graph, &self.graph.operators[relaxed as usize], begin)
     }
 
-    /// The earliest time at which some instance of the action can end, as far as durations go.
+    /// Returns the earliest time at which some instance of the action can end, according to
+    /// durations only.
     fn earliest_end(&self, state: &State, action: u32) -> Ticks {
         let start = self.model.start_of[action as usize];
         let mut end = NEVER;
@@ -77,8 +79,8 @@ impl Pairs<'_> {
         end
     }
 
-    /// For each atom, the earliest time at which an operator has happened and the atom holds that
-    /// held before; [`NEVER`] if that cannot be.
+    /// Computes for each atom the earliest time at which an operator has happened and the atom
+    /// persists; [`NEVER`] if that is impossible.
     pub(super) fn find_companions(
         &mut self,
         state: &State,
@@ -140,7 +142,7 @@ impl Pairs<'_> {
         }
     }
 
-    /// The latest time that counts for an atom. Timed initials need not come before the end of the
+    /// Returns the latest relevant time of an atom. Timed initials may come after the end of the
     /// plan.
     pub(super) fn latest(&self, atom: usize) -> Ticks {
         let is_timed = self.model.is_timed.get(atom).copied().unwrap_or(false);
@@ -151,8 +153,8 @@ impl Pairs<'_> {
         }
     }
 
-    /// Whether an atom that was brought about before an operator, in the order of choices, was
-    /// so in time too.
+    /// Returns `true` if an atom that became true before an operator, in the order of choices, also
+    /// became true earlier in time.
     fn is_before(&self, number: usize, atom: usize) -> bool {
         let since = self.since[atom];
         let comes_after = &self.model.operators[number].comes_after;
@@ -160,8 +162,8 @@ impl Pairs<'_> {
             && comes_after.get(atom).copied().unwrap_or(false)
     }
 
-    /// The earliest time of the end of an action and of an atom that holds when it ends: the atom
-    /// has held since before the start, or was brought about meanwhile.
+    /// Returns the earliest time of the end of an action together with an atom that holds when it
+    /// ends. The atom has held since before the start, or became true while the action was running.
     fn end_with(&self, state: &State, action: u32, atom: usize) -> Ticks {
         let most = self.model.atom_count + MOST_ENDED;
         let place = action as usize * most + atom;
@@ -176,7 +178,7 @@ impl Pairs<'_> {
             };
         }
         let under_way = || state.open.iter().filter(|open| open.action == action);
-        // If the atom is that the action is under way, another instance must be.
+        // If the atom states that the action is running, another instance must be running.
         let is_other = atom != self.model.running[action as usize] || under_way().count() > 1;
         if self.since[atom] < NEVER && is_other {
             for open in under_way() {
@@ -190,7 +192,7 @@ impl Pairs<'_> {
     }
 }
 
-/// The time at which an action under way has started, at the earliest.
+/// Returns the earliest start time of a running action.
 pub(super) fn start_of(state: &State, open: &Open) -> Ticks {
     if open.node == SETTLED {
         open.start

@@ -1,5 +1,4 @@
-//! No state that a plan goes through is a dead end, not even if the plan must end as early as it
-//! can.
+//! Checks that no state of a plan is a dead end, even if the plan must end as early as possible.
 
 mod numbers;
 
@@ -18,7 +17,7 @@ use crate::embedded::testing::{choices, compiled};
 use crate::embedded::time::{NEVER, Ticks};
 use numbers::{Demand, Numbers};
 
-/// How many choices the slow search makes at most.
+/// Maximum number of choices of the exhaustive search.
 const MOST: usize = 6;
 
 /// Conditions at start, over all and at end, effects at start and at end: a fact and its truth.
@@ -41,12 +40,12 @@ pub(crate) struct Draft {
     timed: Vec<(u8, u8, bool)>,
     /// For each action, if there are numbers.
     numbers: Vec<Numbers>,
-    /// What the two numbers are in the beginning.
+    /// Initial values of the two numbers.
     values: (i8, i8),
     demands: Vec<Demand>,
 }
 
-/// Drafts in which two numbers are compared and changed, too.
+/// Generates drafts in which two numbers are also compared and changed.
 pub(crate) fn numeric_drafts() -> impl Strategy<Value = Draft> {
     (
         drafts(),
@@ -161,7 +160,7 @@ impl Draft {
             self.values.0, self.values.1
         )
         .expect("strings take all");
-        // What happens at one time has no order, so nothing may become true and false then.
+        // Happenings of one time have no order, so no fact may become both true and false.
         let mut said = std::collections::BTreeSet::new();
         for &(time, fact, truth) in &self.timed {
             if !said.insert((time, fact)) {
@@ -183,8 +182,8 @@ impl Draft {
     }
 }
 
-/// The earliest end of all plans that go on from a state, by trying all choices; on the way back,
-/// no state on the way to a plan may be one. Returns [`NEVER`] if there is no plan so short.
+/// Returns the earliest end of all plans from a state, by trying all choices, or [`NEVER`] if there
+/// is no plan with so few choices. Also checks that no state of a plan is a dead end.
 fn earliest_end(
     compiled: &Compiled,
     pairs: &mut Pairs<'_>,
@@ -200,7 +199,7 @@ fn earliest_end(
     }
     *budget = budget.saturating_sub(1);
     if left > 0 && *budget > 0 {
-        // What is begun has to end.
+        // Each running action needs one choice for its end.
         let is_too_late = |step: &Step| matches!(step, Step::Start(_)) && state.open.len() >= left;
         for step in choices(compiled, state).filter(|step| !is_too_late(step)) {
             let mut stepper = Stepper::new(compiled);

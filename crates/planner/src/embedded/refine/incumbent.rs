@@ -1,4 +1,4 @@
-//! The plan that is being improved, and what there is to know of it.
+//! The current plan of the improvement, and data derived from it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,20 +10,20 @@ use super::super::formula::{Formula, Literal};
 use super::super::time::Ticks;
 use super::sequence::{Course, Item, Kind, split};
 
-/// What a plan is worth; less is better.
+/// Worth of a plan; smaller is better.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Worth {
-    /// The metric, if it is one other than the makespan; else zero.
+    /// The value of the metric, if it is not the makespan; otherwise zero.
     pub(super) metric: Rational,
     pub(super) end: Ticks,
-    /// The sum of the times at which its actions are over: among plans that are equally good, those
-    /// that leave more room can be improved more easily.
+    /// The sum of the ends of its actions. Among equally good plans, those with more slack are
+    /// easier to improve.
     pub(super) ends: Ticks,
 }
 
 impl Worth {
-    /// What is worse by one part in so many, in its metric and in its end, where time is counted
-    /// from `now`.
+    /// Returns a worth that is worse by one part in `parts`, in its metric and in its end. Time is
+    /// counted from `now`.
     pub(super) fn worse_by(&self, parts: u32, now: Ticks) -> Self {
         let parts = i64::from(parts.max(1));
         let part = self.metric.abs() / Rational::from(parts);
@@ -35,16 +35,15 @@ impl Worth {
     }
 }
 
-/// See the module.
+/// A plan with its worth, blocks and critical path.
 #[derive(Debug)]
 pub(super) struct Incumbent {
     pub(super) items: Vec<Item>,
     pub(super) steps: Vec<Step>,
     pub(super) worth: Worth,
-    /// The instances, by the number of their block.
+    /// The action instances, by block number.
     pub(super) blocks: BTreeMap<u32, Block>,
-    /// The items whose times the end of the plan depends on, one pushing the next one; the latest
-    /// first.
+    /// The items of the critical path, which determine the end of the plan; the latest first.
     pub(super) critical: Vec<Item>,
 }
 
@@ -52,15 +51,15 @@ pub(super) struct Incumbent {
 #[derive(Clone, Debug)]
 pub(super) struct Block {
     pub(super) action: u32,
-    /// Where its first item is; `None` if it was under way before.
+    /// Index of its first item; `None` if the action was already running in the situation.
     pub(super) first: Option<usize>,
     pub(super) last: usize,
-    /// A bit for each literal of the goal that it has a part in.
+    /// The literals of the goal that it contributes to, as a bit set.
     pub(super) serves: Vec<u64>,
 }
 
 impl Incumbent {
-    /// The plan of these items; `None` if they are none, or its worth is not known.
+    /// Returns the plan of these items, or `None` if they are not a plan or its worth is unknown.
     pub(super) fn of(compiled: &Compiled, items: &[Item]) -> Option<Self> {
         let items = split(compiled, items);
         let course = Course::of(compiled, &items)?;
@@ -74,7 +73,7 @@ impl Incumbent {
             critical,
         };
         let sorted: Vec<Item> = order.iter().map(|&n| incumbent.items[n]).collect();
-        // Only the order of what does not interfere has changed.
+        // Only non-interfering items have changed their order.
         if let Some(course) = Course::of(compiled, &sorted) {
             incumbent.items = sorted;
             incumbent.steps = course.steps;
@@ -101,7 +100,7 @@ impl Incumbent {
         self.find_goals_served(compiled);
     }
 
-    /// Follows the links from the goal back: who makes true last what is read.
+    /// Determines the goals that each block serves, by following the links back from the goal.
     fn find_goals_served(&mut self, compiled: &Compiled) {
         let links = links(compiled, &self.items);
         for (number, literal) in compiled.goal.literals.iter().enumerate() {
@@ -121,12 +120,12 @@ impl Incumbent {
     }
 }
 
-/// Who supplies whom.
+/// Causal links between blocks.
 #[derive(Debug, Default)]
 struct Links {
-    /// For each block those that it needs something of.
+    /// For each block, the blocks that supply its conditions.
     suppliers: BTreeMap<u32, BTreeSet<u32>>,
-    /// Who last made a literal true.
+    /// The block that last made a literal true.
     last: BTreeMap<Literal, u32>,
 }
 
@@ -174,7 +173,7 @@ fn links(compiled: &Compiled, items: &[Item]) -> Links {
     links
 }
 
-/// The worth of a plan whose items have been carried out, the goal being reached.
+/// Returns the worth of a plan after the application of all its items, with the goal reached.
 fn worth(compiled: &Compiled, items: &[Item], course: &Course) -> Option<Worth> {
     let (state, network) = (&course.state, course.network());
     let end = state.earliest_end();
@@ -195,8 +194,8 @@ fn worth(compiled: &Compiled, items: &[Item], course: &Course) -> Option<Worth> 
     })
 }
 
-/// The items in the order of time, as far as the network leaves that open; and those on the
-/// critical path.
+/// Returns the items in chronological order, where the network leaves the order open, and those on
+/// the critical path.
 fn order_of_time(items: &[Item], course: &Course) -> (Vec<usize>, Vec<Item>) {
     let network = course.network();
     let count = network.node_count();
@@ -209,7 +208,7 @@ fn order_of_time(items: &[Item], course: &Course) -> (Vec<usize>, Vec<Item>) {
     }
     let mut before = vec![0_usize; items.len()];
     let mut followers = vec![Vec::new(); items.len()];
-    // For each node the one that pushes it.
+    // For each node, the node that delays it.
     let mut pushed_by: Vec<Option<usize>> = vec![None; count];
     let mut link = |from: usize, to: usize| {
         if from != to {
@@ -227,7 +226,7 @@ fn order_of_time(items: &[Item], course: &Course) -> (Vec<usize>, Vec<Item>) {
             }
         }
     }
-    // Timed initials keep their place.
+    // Timed initials keep their position.
     let mut segment = 0;
     let segments: Vec<usize> = items
         .iter()

@@ -1,7 +1,7 @@
-//! Numbers that look random and are the same in each run (`SplitMix64`; Steele, Lea & Flood, OOPSLA
+//! Pseudo-random numbers that are the same in each run (`SplitMix64`; Steele, Lea & Flood, OOPSLA
 //! 2014).
 
-/// See the module.
+/// Pseudo-random number generator.
 #[derive(Clone, Debug)]
 pub(super) struct Random(u64);
 
@@ -18,19 +18,19 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    /// A number below `bound`, which is not zero.
+    /// Returns a number below `bound`, which must not be zero.
     pub(super) fn below(&mut self, bound: usize) -> usize {
         #[allow(clippy::cast_possible_truncation, reason = "below a usize")]
         let number = (self.next() % bound as u64) as usize;
         number
     }
 
-    /// One of them, if there is any.
+    /// Returns a random element, or `None` if the list is empty.
     pub(super) fn of<'a, T>(&mut self, list: &'a [T]) -> Option<&'a T> {
         (!list.is_empty()).then(|| &list[self.below(list.len())])
     }
 
-    /// True once in so many times.
+    /// Returns `true` once in `times` calls on average.
     pub(super) fn once_in(&mut self, times: usize) -> bool {
         self.below(times) == 0
     }

@@ -1,4 +1,4 @@
-//! What is taken out of a plan, to be done otherwise.
+//! Selection of the plan steps that are removed and replaced.
 
 use std::collections::BTreeSet;
 
@@ -6,9 +6,8 @@ use super::super::compile::Compiled;
 use super::incumbent::{Block, Incumbent};
 use super::random::Random;
 
-/// The blocks to be taken out, around one that is drawn, most of the time from the critical path:
-/// what serves the same goals, what has to do with the same object, or what happens at about the
-/// same time.
+/// Selects the blocks to remove around a random one, which is usually on the critical path: blocks
+/// that serve the same goals, that have a common object, or that happen at about the same time.
 pub(super) fn removed(
     compiled: &Compiled,
     incumbent: &Incumbent,
@@ -46,7 +45,7 @@ pub(super) fn removed(
     removed
 }
 
-/// What happens at about the time of the block, in the sequence.
+/// Returns the blocks near the given one in the sequence.
 fn of_one_time(incumbent: &Incumbent, block: &Block, size: usize) -> BTreeSet<u32> {
     let Some(place) = block.first else {
         return BTreeSet::new();
@@ -54,7 +53,7 @@ fn of_one_time(incumbent: &Incumbent, block: &Block, size: usize) -> BTreeSet<u3
     nearest(incumbent, place, size, |_| true)
 }
 
-/// What has to do with one of the block's objects.
+/// Returns the blocks that share one of the block's objects.
 fn of_one_object(
     compiled: &Compiled,
     incumbent: &Incumbent,
@@ -71,7 +70,7 @@ fn of_one_object(
     })
 }
 
-/// What is done for some goals, and for no others: one that the block serves, and perhaps others.
+/// Returns the blocks that serve only goals of a set: one goal of the block, and perhaps others.
 fn of_goals(
     incumbent: &Incumbent,
     block: &Block,
@@ -113,7 +112,7 @@ fn of_goals(
     removed
 }
 
-/// The blocks that are nearest to a place of the sequence, of those that are wanted.
+/// Returns the wanted blocks that are nearest to a position of the sequence.
 fn nearest(
     incumbent: &Incumbent,
     place: usize,

@@ -1,12 +1,13 @@
-//! What was taken out of a plan is done otherwise: a search among what is left of the plan.
+//! Repair of a plan after the removal of actions, by a search that inserts actions into the
+//! remaining plan.
 //!
-//! A node is a state and how much of the rest of the plan has been carried out. What follows is the
-//! next of the rest, or a step of a relaxed plan in which what is left costs nothing; what has
-//! become impossible, or is no longer wanted, can be passed over.
+//! A node is a state and the position in the remaining plan. Its successors apply the next item of
+//! the remaining plan, or a step of a relaxed plan in which the actions of the remaining plan cost
+//! nothing. Items that are inapplicable or no longer needed can be skipped.
 //!
-//! To estimate a state takes much longer than to make it. So the actions of a relaxed plan are put in
-//! one after the other as soon as each is possible, while the rest goes on as it was; only where
-//! something was passed over, or nothing goes on, is there another estimate.
+//! Estimating a state takes much longer than generating it. So the actions of a relaxed plan are
+//! inserted one after the other as soon as each is applicable, while the remaining plan continues.
+//! A new estimate is made only after an item was skipped, or if no successor is applicable.
 
 #[cfg(test)]
 mod tests;
@@ -25,10 +26,11 @@ use super::Ticker;
 use super::random::Random;
 use super::sequence::{Item, Kind, Scene};
 
-/// How many nodes are looked at for each state that may be estimated.
+/// Maximum number of expanded nodes for each state that may be estimated.
 const NODES_PER_STATE: u64 = 8;
 
-/// The bytes that a node takes in the queue and among those known, beside its own.
+/// Memory of a node in the queue and in the set of known nodes, in addition to its own size, in
+/// bytes.
 const PLACE_SIZE: usize = 96;
 
 /// A search for a repair.
@@ -37,16 +39,16 @@ pub(super) struct Repair<'a, 'b> {
     pub(super) stepper: &'b mut Stepper<'a>,
     pub(super) relaxed: &'b mut Relaxed<'a>,
     pub(super) random: &'b mut Random,
-    /// What is left of the plan.
+    /// The remaining plan.
     pub(super) rest: &'b [Item],
-    /// What an action costs that is not left of the plan.
+    /// Costs of the actions outside of the remaining plan.
     pub(super) costs: &'b [u32],
-    /// The number of the next instance.
+    /// The block number of the next instance.
     pub(super) next_block: u32,
     pub(super) compresses: Option<Compressibility>,
-    /// How many states are looked at.
+    /// Maximum number of states.
     pub(super) most_states: u64,
-    /// How much memory the nodes may take, in bytes.
+    /// Memory limit for the nodes, in bytes.
     pub(super) most_memory: usize,
     pub(super) latest_end: &'b dyn Fn(&State) -> Option<Ticks>,
 }
@@ -54,17 +56,17 @@ pub(super) struct Repair<'a, 'b> {
 #[derive(Clone)]
 struct Node {
     scene: Scene,
-    /// How much of the rest is behind it.
+    /// Number of items of the remaining plan that were applied or skipped.
     place: usize,
     parent: usize,
-    /// The item that led here, unless one was passed over.
+    /// The item that led here, unless one was skipped.
     item: Option<Item>,
-    /// What is still to be put in, as far as that is known from the nodes before.
+    /// The actions still to be inserted, if they are known from the previous nodes.
     intent: Option<Intent>,
 }
 
 impl Node {
-    /// An estimate of the memory it takes, in bytes.
+    /// Returns an estimate of the memory, in bytes.
     fn size(&self) -> usize {
         let intent = self.intent.as_ref();
         size_of::<Self>()
@@ -75,7 +77,7 @@ impl Node {
     }
 }
 
-/// What a relaxed plan puts in, without what is left of the plan.
+/// The actions that a relaxed plan inserts, without those of the remaining plan.
 #[derive(Clone)]
 struct Intent {
     needs: u32,
@@ -83,7 +85,7 @@ struct Intent {
 }
 
 impl Intent {
-    /// What remains of it after one of its actions.
+    /// Returns the intent without one of its actions.
     fn without(&self, action: u32, cost: u32) -> Self {
         let others = self.actions.iter().copied();
         Self {
@@ -93,22 +95,23 @@ impl Intent {
     }
 }
 
-/// What a search knows.
+/// State of a search.
 #[derive(Default)]
 struct Tree {
-    /// Of the nodes whose turn it was, each one's parent, and the item that led there.
+    /// For each expanded node, its parent and the item that led to it.
     nodes: Vec<(usize, Option<Item>)>,
     queue: BTreeMap<(u32, u64), Node>,
     known: Map<(u64, usize), Vec<Ticks>>,
-    /// What the nodes take that wait, in bytes, and what is known of the others.
+    /// Memory of the queued nodes and of the data kept for expanded ones, in bytes.
     memory: usize,
-    /// How often each action is among what is left, from where the estimates stand on.
+    /// Number of occurrences of each action in the remaining plan, from the position `standing` of
+    /// the estimates.
     left: BTreeMap<u32, u32>,
     standing: usize,
 }
 
 impl Tree {
-    /// Lets a node wait for its turn.
+    /// Adds a node to the queue.
     fn wait(&mut self, key: (u32, u64), node: Node) {
         self.memory += node.size();
         if let Some(other) = self.queue.insert(key, node) {
@@ -116,20 +119,21 @@ impl Tree {
         }
     }
 
-    /// The node whose turn it is.
+    /// Removes the best node from the queue.
     fn next(&mut self) -> Option<Node> {
         let (_, node) = self.queue.pop_first()?;
         self.memory -= node.size();
         Some(node)
     }
 
-    /// Keeps of a node what is needed when one that follows from it leads to a plan.
+    /// Keeps the data of a node that is needed to reconstruct a plan.
     fn keep(&mut self, node: &Node) {
         self.memory += PLACE_SIZE;
         self.nodes.push((node.parent, node.item));
     }
 
-    /// Whether a node differs from all before it, as far as that is looked at.
+    /// Returns `true` if a node differs from all earlier ones in its state, position or earliest
+    /// end.
     fn is_new(&mut self, node: &Node) -> bool {
         let state = &node.scene.state;
         let times = self.known.entry((state.discrete_hash(), node.place));
@@ -142,14 +146,14 @@ impl Tree {
         is_new
     }
 
-    /// The items that lead to a node, and those that follow.
+    /// Returns the items that lead to a node, followed by `tail`.
     fn plan_to(&self, number: usize, tail: Vec<Item>) -> Vec<Item> {
         let mut items = self.items_to(number);
         items.extend(tail);
         items
     }
 
-    /// The items that lead to a node.
+    /// Returns the items that lead to a node.
     fn items_to(&self, mut number: usize) -> Vec<Item> {
         let mut items = Vec::new();
         while let Some(&(parent, item)) = self.nodes.get(number) {
@@ -162,7 +166,8 @@ impl Tree {
 }
 
 impl Repair<'_, '_> {
-    /// The items from `begin` on, of a plan that reaches the goal in time.
+    /// Searches for a repair. Returns the items from `begin` of a plan that reaches the goal in
+    /// time.
     pub(super) fn run(&mut self, begin: &Scene, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
         self.search(begin, &mut Tree::default(), ticker)
     }
@@ -244,8 +249,8 @@ impl Repair<'_, '_> {
         None
     }
 
-    /// Lets what may be put in after the node wait for its turn: it is estimated to save what it
-    /// costs.
+    /// Queues the successors that insert an action of the intent. Each is estimated to reduce the
+    /// remaining cost by the cost of its action.
     fn put_in(&mut self, node: &Node, intent: &Intent, preferred: &[Step], tree: &mut Tree) {
         let starts = intent.actions.iter().map(|&action| Step::Start(action));
         let ends = preferred
@@ -253,7 +258,7 @@ impl Repair<'_, '_> {
             .copied()
             .filter(|step| matches!(step, Step::End(_)));
         for step in starts.chain(ends) {
-            // Each step makes a state, and a relaxed plan may have thousands of them.
+            // Each step creates a state, and a relaxed plan may have thousands of them.
             if tree.memory > self.most_memory {
                 return;
             }
@@ -278,7 +283,7 @@ impl Repair<'_, '_> {
                     scene,
                     place: node.place,
                     parent: tree.nodes.len(),
-                    // What has started must end; an estimate says when.
+                    // A started action must end; a new estimate determines when.
                     intent: (item.kind == Kind::Whole).then_some(next),
                     item: Some(item),
                 };
@@ -287,8 +292,8 @@ impl Repair<'_, '_> {
         }
     }
 
-    /// Lets the next of what is left wait for its turn, and what comes of passing it over. Whether
-    /// the next is possible.
+    /// Queues the successor that applies the next item of the remaining plan, and the one that
+    /// skips it. Returns `true` if the next item is applicable, or is the end of a skipped action.
     fn go_on(&mut self, node: &Node, intent: &Intent, tree: &mut Tree) -> bool {
         let Some(&next) = self.rest.get(node.place) else {
             return false;
@@ -327,19 +332,20 @@ impl Repair<'_, '_> {
             place: node.place + 1,
             parent: tree.nodes.len(),
             item: None,
-            // The end of what has been passed over is nothing new.
+            // Skipping the end of a skipped action changes nothing.
             intent: is_end.then(|| intent.clone()),
         };
         tree.wait(key, next);
         is_possible || is_end
     }
 
-    /// A place in the queue: by estimate, then by order, then by chance.
+    /// Returns a priority in the queue: by estimate, then by order, then at random.
     fn key(&mut self, estimate: u32, order: u64) -> (u32, u64) {
         (estimate, order << 32 | self.random.next() >> 32)
     }
 
-    /// Lets the estimates stand at a place of the rest: what is behind it costs what it costs.
+    /// Moves the position of the estimates to `place`. Actions before it have their own costs;
+    /// actions of the remaining plan cost nothing.
     fn move_to(&mut self, place: usize, tree: &mut Tree) {
         let Tree { standing, left, .. } = tree;
         while *standing < place {
@@ -364,7 +370,8 @@ impl Repair<'_, '_> {
         }
     }
 
-    /// Carries out what is left, without what is not possible; the items, if that is a plan.
+    /// Applies the remaining items without the inapplicable ones. Returns the items if they form a
+    /// plan.
     fn follow(&mut self, node: &Node, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
         let mut scene = node.scene.clone();
         let mut items = Vec::new();
@@ -388,7 +395,7 @@ impl Repair<'_, '_> {
         (is_in_time && is_goal(self.compiled, &scene.state)).then_some(items)
     }
 
-    /// A new step, compressed if that is possible and the actions of the plan are.
+    /// Creates a new step. It is compressed if possible and if the plan's actions are.
     fn make(&mut self, scene: &Scene, step: Step) -> Option<(Item, Scene)> {
         let block = self.next_block;
         self.next_block += 1;

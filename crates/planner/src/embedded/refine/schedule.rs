@@ -1,10 +1,11 @@
-//! The same actions in another order.
+//! Search for another order of the same actions.
 //!
 //! An order of priorities becomes a plan by a schedule generation scheme (Kolisch, EJOR 90, 1996).
-//! The *serial* one carries out choices in the given order, each as soon as it is possible. The
-//! *parallel* one goes through time: what has priority starts if nothing that is under way ends
-//! before, and otherwise that ends. Both are changed at the critical path, by exchanging what pushes
-//! and what is pushed (van Laarhoven, Aarts & Lenstra, Operations Research 40, 1992).
+//! The *serial* scheme applies choices in the given order, each as soon as it is applicable. The
+//! *parallel* scheme advances through time: the start with the highest priority is applied unless a
+//! running action ends before; then that end is applied. Both are changed at the critical path, by
+//! exchanging an item with the one that delays it (van Laarhoven, Aarts & Lenstra, Operations
+//! Research 40, 1992).
 
 use super::super::apply::Stepper;
 use super::super::compile::Compiled;
@@ -16,10 +17,10 @@ use super::incumbent::Incumbent;
 use super::random::Random;
 use super::sequence::{Item, Kind, Scene};
 
-/// How many items may wait at the same time for their conditions.
+/// Maximum number of items that wait for their conditions at the same time.
 const MOST_WAITING: usize = 24;
 
-/// See the module.
+/// Neighbourhood of reordered plans.
 pub(super) struct Schedule<'a, 'b> {
     pub(super) compiled: &'a Compiled,
     pub(super) stepper: &'b mut Stepper<'a>,
@@ -28,7 +29,7 @@ pub(super) struct Schedule<'a, 'b> {
 }
 
 impl Schedule<'_, '_> {
-    /// Another order, if it makes a plan.
+    /// Returns the items in another order, if they form a plan.
     pub(super) fn next(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
         if self.random.once_in(2) {
             let (items, first) = self.exchanged()?;
@@ -42,7 +43,7 @@ impl Schedule<'_, '_> {
         self.parallel(starts, window, ticker)
     }
 
-    /// An item of the critical path and the one that pushes it, of another instance.
+    /// Returns an item of the critical path and the item of another instance that delays it.
     fn critical_pair(&mut self) -> Option<(Item, Item)> {
         let critical = &self.incumbent.critical;
         let pairs = critical.windows(2);
@@ -52,8 +53,8 @@ impl Schedule<'_, '_> {
         Some((pair[0], pair[1]))
     }
 
-    /// The items with one of the critical path put before the one that pushes it, and where that
-    /// is.
+    /// Returns the items with one of the critical path moved before the one that delays it, and its
+    /// new position.
     fn exchanged(&mut self) -> Option<(Vec<Item>, usize)> {
         let (later, earlier) = self.critical_pair()?;
         let mut items = self.incumbent.items.clone();
@@ -98,9 +99,9 @@ impl Schedule<'_, '_> {
         }
     }
 
-    /// Carries out the items, the first ones first: what is not possible waits until it is. What
-    /// remains impossible is left out, if the goal is reached without it. Up to `first` they are as
-    /// in the plan.
+    /// Applies the items in order; inapplicable ones wait until they are applicable. Items that
+    /// stay inapplicable are dropped if the goal is reached without them. Items before `first` are
+    /// as in the plan.
     fn serial(
         &mut self,
         items: &[Item],
@@ -140,8 +141,8 @@ impl Schedule<'_, '_> {
         is_goal(self.compiled, &scene.state).then_some(order)
     }
 
-    /// Goes through time: of the first `window` starts that wait, the first starts that can before
-    /// something ends.
+    /// Advances through time. Of the first `window` waiting starts, it applies the first one that
+    /// can start before an action ends.
     fn parallel(
         &mut self,
         mut starts: Vec<Item>,
@@ -161,7 +162,7 @@ impl Schedule<'_, '_> {
                 let Some(next) = scene.after(self.stepper, starts[place]) else {
                     continue;
                 };
-                // What starts while another one ends would push that end.
+                // An action that starts while another one ends would delay that end.
                 if begin(&scene, &next) <= until - self.compiled.epsilon
                     && !keeps_from_ending(self.compiled, &scene, &next)
                 {
@@ -192,7 +193,7 @@ impl Schedule<'_, '_> {
     }
 }
 
-/// The ends of what is under way, the earliest first.
+/// Returns the ends of the running actions, the earliest first.
 fn ends(scene: &Scene) -> Vec<(Ticks, Item)> {
     let open = scene.state.open.iter().zip(&scene.open);
     let mut ends: Vec<(Ticks, Item)> = open
@@ -214,7 +215,8 @@ fn ends(scene: &Scene) -> Vec<(Ticks, Item)> {
     ends
 }
 
-/// Whether something under way could end before, as far as conditions go, and not after.
+/// Returns `true` if the conditions allow some running action to end before the step, but not after
+/// it.
 fn keeps_from_ending(compiled: &Compiled, before: &Scene, after: &Scene) -> bool {
     let can_end = |scene: &Scene, action: u32| {
         let condition = &compiled.snap(compiled.action(action).end).condition;
@@ -228,14 +230,14 @@ fn keeps_from_ending(compiled: &Compiled, before: &Scene, after: &Scene) -> bool
     open.any(|open| can_end(before, open.action) && !can_end(after, open.action))
 }
 
-/// When what has just started began, as far as that is known.
+/// Returns the start time of the newly started action, as far as it is known.
 fn begin(before: &Scene, after: &Scene) -> Ticks {
     let new = after.open.iter().zip(&after.state.open);
     let mut new = new.filter(|(block, _)| !before.open.contains(block));
     match new.next() {
         Some((_, open)) if open.node == SETTLED => open.start,
         Some((_, open)) => after.state.network.earliest(open.node),
-        // It takes no time.
+        // It is instantaneous.
         None => Ticks::MIN,
     }
 }

@@ -1,12 +1,13 @@
-//! The same actions in another order, by a search that proves when there is no better one
+//! Exact search for a better order of the same actions, which proves when there is none
 //! (constraint-based scheduling; Baptiste, Le Pape & Nuijten, 2001).
 //!
-//! - `model`: what the happenings of the plan need of each other, as clauses over orders of pairs.
-//! - `numbers`: the same for conditions on numbers, as far as it is told before the search.
+//! - `model`: the dependencies between the plan's happenings, as clauses over orders of pairs.
+//! - `numbers`: the same for conditions on numbers, as far as they are known before the search.
 //! - `clauses` and `times`: the search, by learning clauses from conflicts with the bound on the
 //!   makespan. It begins with the order of the plan (solution-guided search; Beck, JAIR 29, 2007).
 //!
-//! An order that it finds becomes a plan through the states of the search and the judge, as others do.
+//! An order that it finds becomes a plan in the same way as others: through the states of the
+//! search and the validator.
 
 mod clauses;
 mod links;
@@ -28,38 +29,41 @@ use clauses::Outcome;
 use model::Model;
 use times::Edge;
 
-/// How much work is done between two questions whether to go on.
+/// Work between two checks whether to continue.
 const SLICE: u64 = 20_000;
-/// What a unit of it counts for: a look at a clause or a pair takes longer than at an operator.
+/// Weight of a work unit: visiting a clause or a pair takes longer than visiting an operator.
 const UNIT_WORK: u64 = 4;
-/// After so many restarts for an order so much better than the best one, less is asked for.
+/// Number of restarts after which a smaller improvement is requested.
 const RESTARTS: u64 = 12;
-/// With more clauses than this from orders in which a condition on numbers fails, most of what stands in the way of a better
-/// order is learnt one order at a time, which is slow.
+/// If more clauses than this were learnt from orders in which a condition on numbers fails, the
+/// obstacles to a better order are mostly learnt one order at a time, which is slow.
 const FEW_FAILURES: usize = 100;
-/// The least part, one of two to this power, by which an order is to be better at first.
+/// Binary exponent of the smallest relative improvement that is requested at first.
 const MOST_EASE: u32 = 8;
 
-/// See the module.
+/// Search for better orders of a plan's actions.
 pub(super) struct Scheduling<'a> {
     model: Model<'a>,
-    /// The pairs of happenings that interfere, by the literal that they keep their order, and both edges.
+    /// The pairs of happenings that interfere: the literal which states that they keep their order,
+    /// and both edges.
     pairs: Vec<(u32, [Edge; 2])>,
-    /// Where to look first for a pair that is not decided.
+    /// Start position of the search for an undecided pair.
     cursor: usize,
-    /// No order is over before `least`; the best one known is over at `end`.
+    /// Lower bound on the end of every order, and the end of the best known one.
     least: Ticks,
     end: Ticks,
-    /// An order is looked for that is better by a part of what is between them: one of two to this power.
+    /// Binary exponent of the requested improvement, as a part of the gap between `least` and
+    /// `end`.
     ease: u32,
-    /// How many clauses were learnt from orders in which a condition on numbers fails.
+    /// Number of clauses learnt from orders in which a condition on numbers fails.
     failures: usize,
-    /// Whether there is nothing left to find.
+    /// `true` if no better order exists.
     pub(super) is_over: bool,
 }
 
 impl<'a> Scheduling<'a> {
-    /// Orders of these items that are over earlier than `end`; `None` if the plan is beyond it.
+    /// Returns a search for orders of these items that end before `end`, or `None` if the model
+    /// cannot express the plan.
     pub(super) fn of(
         compiled: &'a Compiled,
         items: &[Item],
@@ -82,7 +86,7 @@ impl<'a> Scheduling<'a> {
         Some(scheduling)
     }
 
-    /// Whether these are the same actions.
+    /// Returns `true` if the items are the same actions.
     pub(super) fn is_of(&self, items: &[Item]) -> bool {
         let what = |items: &[Item]| {
             let sorted = sorted(items).into_iter();
@@ -91,7 +95,7 @@ impl<'a> Scheduling<'a> {
         what(&self.model.items) == what(items)
     }
 
-    /// From now on only orders count that are over earlier than this one, which is over at `end`.
+    /// Requires that orders end before this one, which ends at `end`.
     pub(super) fn demand(&mut self, items: &[Item], end: Ticks) {
         self.end = self.end.min(end);
         let model = &mut self.model;
@@ -107,7 +111,7 @@ impl<'a> Scheduling<'a> {
         self.aim();
     }
 
-    /// Asks for an order that is a good deal better, or a little.
+    /// Sets the target for the next order, a large or a small improvement.
     fn aim(&mut self) {
         let gap = self.end - self.least;
         if gap <= 0 {
@@ -122,7 +126,7 @@ impl<'a> Scheduling<'a> {
         self.model.solver.aim(self.end - step.max(1));
     }
 
-    /// Goes on for so much work, or until there is a better order.
+    /// Continues for at most `most` work. Returns a better order if one is found.
     pub(super) fn next(&mut self, most: u64, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
         let last = ticker.work.saturating_add(most);
         while ticker.work < last && ticker.ask() {
@@ -160,8 +164,8 @@ impl<'a> Scheduling<'a> {
         None
     }
 
-    /// Decides on a pair that is not kept apart by other things, or learns what is wrong with the
-    /// order; or that is the order.
+    /// Decides an undecided pair whose distance the other constraints do not ensure. If there is
+    /// none, returns the order, or learns from its failure.
     fn conclude(&mut self) -> Option<Vec<usize>> {
         if let Some(literal) = self.too_close() {
             self.model.solver.decide(literal);
@@ -189,12 +193,14 @@ impl<'a> Scheduling<'a> {
         None
     }
 
-    /// Whether it is likely to take long, because it learns from one order after the other.
+    /// Returns `true` if the search is likely to take long, because it learns from one order after
+    /// the other.
     fn is_slow(&self) -> bool {
         self.failures > FEW_FAILURES
     }
 
-    /// Two happenings that are too close to each other and not ordered: the order they have in time.
+    /// Returns the literal of two unordered happenings that are too close to each other. The
+    /// literal states the order that they have in time.
     fn too_close(&mut self) -> Option<u32> {
         let Self { model, pairs, .. } = self;
         let solver = &mut model.solver;
@@ -224,15 +230,15 @@ impl<'a> Scheduling<'a> {
         None
     }
 
-    /// The happenings in the order of time and of what was decided; or a clause that breaks a circle
-    /// of happenings of one time.
+    /// Returns the happenings in the order of time and of the decisions, or a clause that breaks a
+    /// cycle of happenings of one time.
     fn sequence(&self) -> Result<Vec<usize>, Vec<u32>> {
         let model = &self.model;
         let solver = &model.solver;
         let count = model.items.len();
         let mut before: Vec<Vec<(usize, Option<u32>)>> = vec![Vec::new(); count];
         for (literal, edge) in solver.all_edges() {
-            // Windows are no order of happenings.
+            // Windows are not orders of happenings.
             let is_pair = (edge.from.max(edge.to) as usize) < count;
             if is_pair && solver.is_true(literal) {
                 before[edge.to as usize].push((edge.from as usize, Some(literal)));
@@ -276,7 +282,8 @@ impl<'a> Scheduling<'a> {
     }
 }
 
-/// What happens, and where, so that instances of the same action stand together.
+/// Returns the items as (action, is end, position), sorted so that instances of the same action are
+/// adjacent.
 fn sorted(items: &[Item]) -> Vec<(u32, bool, usize)> {
     let items = items.iter().enumerate();
     let mut sorted: Vec<_> = items
@@ -286,7 +293,7 @@ fn sorted(items: &[Item]) -> Vec<(u32, bool, usize)> {
     sorted
 }
 
-/// A clause that breaks a circle among those that something is missing for.
+/// Returns a clause that breaks a cycle among the nodes with missing predecessors.
 fn circle(before: &[Vec<(usize, Option<u32>)>], missing: &[usize]) -> Vec<u32> {
     let is_left = |node: usize| missing[node] > 0;
     let Some(mut node) = (0..missing.len()).find(|&node| is_left(node)) else {

@@ -1,4 +1,4 @@
-//! A plan as a sequence of choices that can be cut up and put together again.
+//! A plan as a sequence of choices that can be split and recombined.
 
 use super::super::apply::{Log, Step, Stepper};
 use super::super::compile::{Compiled, NONE};
@@ -6,14 +6,13 @@ use super::super::network::Network;
 use super::super::root::root;
 use super::super::state::State;
 
-/// A choice, told without reference to what else is under way.
+/// A choice that does not depend on the other running actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Item {
     pub(super) kind: Kind,
-    /// [`NONE`] of timed initials.
+    /// [`NONE`] for timed initials.
     pub(super) action: u32,
-    /// The instance of the action: its start and its end are of one block. [`NONE`] of timed
-    /// initials.
+    /// The instance of the action, which its start and its end share. [`NONE`] for timed initials.
     pub(super) block: u32,
 }
 
@@ -22,7 +21,7 @@ pub(super) struct Item {
 pub(super) enum Kind {
     Start,
     End,
-    /// Start and end at once, or an action that takes no time.
+    /// Start and end at once, or an instantaneous action.
     Whole,
     Timed,
 }
@@ -35,7 +34,7 @@ impl Item {
     };
 }
 
-/// A state, and which instances are under way in it.
+/// A state, and the instances that are running in it.
 #[derive(Clone, Debug)]
 pub(super) struct Scene {
     pub(super) state: State,
@@ -44,14 +43,14 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// The beginning: what is under way are the first blocks.
+    /// Returns the initial scene; the running actions are the first blocks.
     pub(super) fn beginning(compiled: &Compiled) -> Self {
         let state = root(compiled);
         let open = (0..).zip(&state.open).map(|(block, _)| block).collect();
         Self { state, open }
     }
 
-    /// The step that an item stands for here; `None` if what should end is not under way.
+    /// Returns the step of an item in this scene, or `None` if the action to end is not running.
     pub(super) fn step(&self, compiled: &Compiled, item: Item) -> Option<Step> {
         Some(match item.kind {
             Kind::Start => Step::Start(item.action),
@@ -65,7 +64,7 @@ impl Scene {
         })
     }
 
-    /// The item that a step stands for here; a new instance is `block`.
+    /// Returns the item of a step in this scene; `block` is the number of a new instance.
     pub(super) fn item(&self, compiled: &Compiled, step: Step, block: u32) -> Option<Item> {
         Some(match step {
             Step::Start(action) if compiled.action(action).end != NONE => Item {
@@ -88,7 +87,7 @@ impl Scene {
         })
     }
 
-    /// The scene after the item, if it is possible.
+    /// Returns the scene after the item, if it is applicable.
     pub(super) fn after(&self, stepper: &mut Stepper<'_>, item: Item) -> Option<Self> {
         let step = self.step(stepper.compiled, item)?;
         let state = stepper.apply(&self.state, step)?;
@@ -97,7 +96,7 @@ impl Scene {
         Some(Self { state, open })
     }
 
-    /// Keeps the list of what is under way.
+    /// Updates the list of running instances.
     fn note(&self, open: &mut Vec<u32>, item: Item) {
         match item.kind {
             Kind::Start => {
@@ -111,7 +110,7 @@ impl Scene {
     }
 }
 
-/// The choices of a search as items.
+/// Returns the choices of a search as items.
 pub(super) fn items_of(compiled: &Compiled, steps: &[Step]) -> Option<Vec<Item>> {
     let mut scene = Scene::beginning(compiled);
     let mut stepper = Stepper::new(compiled);
@@ -125,7 +124,8 @@ pub(super) fn items_of(compiled: &Compiled, steps: &[Step]) -> Option<Vec<Item>>
     Some(items)
 }
 
-/// The items with starts and ends by themselves, so that something can come between them.
+/// Returns the items with separate starts and ends, so that other items can be inserted between
+/// them.
 pub(super) fn split(compiled: &Compiled, items: &[Item]) -> Vec<Item> {
     let parts = items.iter().flat_map(|&item| {
         let has_end = item.kind == Kind::Whole && compiled.action(item.action).end != NONE;
@@ -136,17 +136,17 @@ pub(super) fn split(compiled: &Compiled, items: &[Item]) -> Vec<Item> {
     parts.flatten().collect()
 }
 
-/// A sequence that was carried out with all happenings kept.
+/// A sequence that was applied with all happenings kept in the network.
 #[derive(Debug)]
 pub(super) struct Course {
     pub(super) steps: Vec<Step>,
     pub(super) state: State,
-    /// For each item the nodes of what it lets happen: the first and the last.
+    /// For each item, the nodes of its first and its last happening.
     pub(super) nodes: Vec<(u16, u16)>,
 }
 
 impl Course {
-    /// Carries out the items; `None` if that is not possible.
+    /// Applies the items. Returns `None` if one of them is inapplicable.
     pub(super) fn of(compiled: &Compiled, items: &[Item]) -> Option<Self> {
         let mut stepper = Stepper::new(compiled);
         stepper.log = Some(Log::default());

@@ -1,8 +1,8 @@
-//! Amounts that actions add to fluents, as far as the state does not decide them.
+//! Amounts that actions add to fluents, where they do not depend on the state.
 //!
-//! A continuous effect adds its rate times the duration, as an effect at the end with `?duration` does. Where
-//! the duration is open, the amount is the greatest one that its bounds allow: the least drain, the longest
-//! charge.
+//! A continuous effect adds its rate times the duration, as an effect at the end with `?duration`
+//! does. If the duration is open, the amount is the greatest one that its bounds allow: the least
+//! drain, or the longest charge.
 
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
@@ -21,7 +21,7 @@ pub(super) struct Change {
     pub(super) moment: Moment,
 }
 
-/// When a change takes place.
+/// Time of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Moment {
     Start,
@@ -31,7 +31,7 @@ pub(super) enum Moment {
 }
 
 impl Change {
-    /// The conditions that the action reads before the change, the latest first.
+    /// Returns the conditions that the action reads before the change, the latest first.
     pub(super) fn before<'c>(
         self,
         compiled: &'c Compiled,
@@ -46,7 +46,7 @@ impl Change {
     }
 }
 
-/// The changes of fluents by an action.
+/// Returns the changes of fluents by an action.
 pub(super) fn changes<'c>(
     compiled: &'c Compiled,
     action: &'c Action,
@@ -64,7 +64,7 @@ pub(super) fn changes<'c>(
     let flows = action.flows.iter().filter(move |_| is_on);
     let flows = flows.filter_map(|flow| {
         let amount = greatest(action, flow.rate.as_constant()?, &Rational::ZERO);
-        // A drain under a condition need not take place.
+        // A drain under a condition may not take place.
         let is_sure = flow.guard.is_none() || amount > 0.0;
         is_sure.then_some(Change {
             fluent: flow.fluent,
@@ -75,7 +75,7 @@ pub(super) fn changes<'c>(
     jumps.chain(flows)
 }
 
-/// The changes of fluents by an operator. Continuous changes belong to the start.
+/// Returns the changes of fluents by an operator. Continuous changes belong to the start.
 pub(super) fn changes_by(compiled: &Compiled, kind: Kind) -> Vec<(u32, f64)> {
     if let Kind::Macro(number) = kind {
         let Macro { envelope, content } = compiled.macros[number as usize];
@@ -94,7 +94,7 @@ pub(super) fn changes_by(compiled: &Compiled, kind: Kind) -> Vec<(u32, f64)> {
         .collect()
 }
 
-/// The constants that an operator assigns to fluents.
+/// Returns the constants that an operator assigns to fluents.
 pub(super) fn assignments(compiled: &Compiled, kind: Kind) -> Vec<(u32, f64)> {
     let snaps = match kind {
         Kind::Compressed(action) => {
@@ -113,7 +113,7 @@ pub(super) fn assignments(compiled: &Compiled, kind: Kind) -> Vec<(u32, f64)> {
         .collect()
 }
 
-/// The amounts that a happening of an action adds to fluents.
+/// Returns the amounts that a happening of an action adds to fluents.
 fn amounts<'c>(
     compiled: &'c Compiled,
     action: &'c Action,
@@ -136,7 +136,7 @@ fn amounts<'c>(
     })
 }
 
-/// The greatest value of `factor · ?duration + constant`.
+/// Returns the greatest value of `factor · ?duration + constant`.
 fn greatest(action: &Action, factor: &Rational, constant: &Rational) -> f64 {
     let duration = if factor.is_positive() {
         let most = action.duration.most.as_ref();

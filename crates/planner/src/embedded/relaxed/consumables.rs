@@ -1,11 +1,10 @@
-//! What is used up and never filled up.
+//! Consumables: numbers that are used up and never replenished.
 //!
-//! Nothing is ever lost in a relaxed plan, so one litre fills every bottle, and a battery that
-//! cannot be charged takes a robot everywhere. Here the steps of a relaxed plan draw on what there
-//! is: a step that is to be repeated until a number is reached is repeated as often as its
-//! consumable allows, and other steps that add to that number do the rest. What is missing then is
-//! no proof, since another relaxed plan might make do with less; but such a state has its turn
-//! last.
+//! In a relaxed plan nothing is ever lost, so one litre fills every bottle, and a battery that
+//! cannot be charged takes a robot everywhere. Here the steps of a relaxed plan draw on the
+//! available amounts. A step that must be repeated to reach a number is repeated as often as its
+//! consumable allows, and other steps that add to that number do the rest. A shortage proves
+//! nothing, since another relaxed plan might need less, but such states are expanded last.
 
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
@@ -16,13 +15,13 @@ use super::changes::changes_by;
 use super::graph::{Gain, Graph, Kind};
 use super::resources::note_floors;
 
-/// Something that steps use up and nothing fills up.
+/// A fluent that steps use up and that is never replenished.
 #[derive(Clone, Debug)]
 pub(crate) struct Consumable {
     fluent: u32,
     /// The amount that must remain.
     floor: f64,
-    /// The amount at the beginning, above the floor.
+    /// The initial amount above the floor.
     size: f64,
 }
 
@@ -32,13 +31,13 @@ impl Consumable {
         value.map_or(self.size, |value| value.to_f64() - self.floor)
     }
 
-    /// Which part of it a state has used up.
+    /// Returns the fraction that a state has used up.
     pub(crate) fn used(&self, state: &State) -> f64 {
         1.0 - self.left(state) / self.size
     }
 }
 
-/// Fluents that constants use up, that are tested, and that nothing fills up.
+/// Returns the fluents that constants use up, that are tested, and that are never replenished.
 pub(crate) fn consumables(compiled: &Compiled) -> Vec<Consumable> {
     let mut floors: Vec<Option<f64>> = vec![None; compiled.fluents.len()];
     for action in &compiled.actions {
@@ -88,11 +87,12 @@ pub(crate) fn consumables(compiled: &Compiled) -> Vec<Consumable> {
 #[derive(Debug, Default)]
 pub(super) struct Consumables {
     list: Vec<Consumable>,
-    /// For each operator what it takes; an end takes what its start takes, and the start nothing.
+    /// For each operator, its consumption. An end consumes the amount of its start as well, and the
+    /// start nothing.
     draws: Vec<Vec<(usize, f64)>>,
-    /// For each test the operators that add to its difference, and how much.
+    /// For each test, the operators that add to its difference, and the amounts.
     adders: Vec<Vec<(u32, f64)>>,
-    /// The amount of each that a relaxed plan leaves.
+    /// The remaining amount of each after a relaxed plan.
     left: Vec<f64>,
 }
 
@@ -144,14 +144,14 @@ impl Consumables {
         self.list.is_empty()
     }
 
-    /// A new relaxed plan begins.
+    /// Begins a new relaxed plan.
     pub(super) fn begin(&mut self, state: &State) {
         self.left.clear();
         self.left
             .extend(self.list.iter().map(|consumable| consumable.left(state)));
     }
 
-    /// How often an operator can take what it takes, at most so many times.
+    /// Returns the number of times the remaining amounts suffice for an operator, at most `most`.
     pub(super) fn times(&self, operator: u32, most: u32) -> u32 {
         if self.list.is_empty() {
             return most;
@@ -168,7 +168,7 @@ impl Consumables {
         })
     }
 
-    /// The operator takes what it takes, so many times.
+    /// Subtracts the consumption of an operator that is applied `times` times.
     pub(super) fn draw(&mut self, operator: u32, times: u32) {
         if self.list.is_empty() {
             return;
@@ -178,12 +178,12 @@ impl Consumables {
         }
     }
 
-    /// Whether something takes what is not there.
+    /// Returns `true` if some consumable is overdrawn.
     pub(super) fn are_overdrawn(&self) -> bool {
         self.left.iter().any(|&left| left < -1e-9)
     }
 
-    /// The operators that add to the difference of a test.
+    /// Returns the operators that add to the difference of a test.
     pub(super) fn adders(&self, test: u32) -> &[(u32, f64)] {
         &self.adders[test as usize]
     }

@@ -1,4 +1,5 @@
-//! When things can happen at the earliest, and what is too late for its deadline.
+//! Earliest times of propositions and operators, and the exclusion of operators that are too late
+//! for their deadlines.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -10,24 +11,24 @@ use super::super::state::State;
 use super::super::time::{NEVER, Ticks};
 use super::graph::{Graph, Kind, Operator};
 
-/// Tables kept from one state to the next.
+/// Tables that are reused from one state to the next.
 #[derive(Debug, Default)]
 pub(super) struct Deadlines {
     /// The earliest time of each proposition.
     time: Vec<Ticks>,
     missing: Vec<u32>,
-    /// The earliest beginning of each operator; [`NEVER`] while something is missing.
+    /// The earliest start of each operator; [`NEVER`] while a precondition is missing.
     begin: Vec<Ticks>,
     queue: BinaryHeap<Reverse<(Ticks, u32)>>,
 }
 
 impl Deadlines {
-    /// Makes operators that come too late wait for ever: those whose conditions cannot be true in
-    /// time, when nothing that was reached is ever lost and everything happens as early as it can
-    /// (`h_max`, Haslum & Geffner, ECP 2001, with the windows of timed initials).
+    /// Excludes the operators that are too late: those whose conditions cannot be true in time,
+    /// even if reached facts are never lost and everything happens as early as possible (`h_max`,
+    /// Haslum & Geffner, ECP 2001, with the windows of timed initials).
     ///
-    /// Where choices come in the order of time, `spans` says how long what is under way can wait.
-    /// Whether all of that may still end in time.
+    /// If choices come in chronological order, `spans` gives the latest ends of the running
+    /// actions. Returns `true` if all of them may still end in time.
     pub(super) fn exclude_late(
         &mut self,
         compiled: &Compiled,
@@ -70,7 +71,8 @@ impl Deadlines {
         spans.is_none_or(|spans| self.all_end_in_time(graph, state, spans))
     }
 
-    /// Whether each action under way may find the condition of its end true before it has to end.
+    /// Returns `true` if the end condition of each running action may become true before the action
+    /// has to end.
     fn all_end_in_time(&self, graph: &Graph, state: &State, spans: &Spans) -> bool {
         let mut ends = state.open.iter().zip(&spans.ends);
         ends.all(|(open, &(_, latest))| {
@@ -163,7 +165,7 @@ impl Deadlines {
             }
         }
         if let Kind::End(action) = operator.kind {
-            // An end that can come too late for all instances under way, and for no other.
+            // An end that is too late for all running instances, where no other instance can start.
             let is_running_only = compiled.action(action).start == NONE;
             let is_late = |open: &super::super::state::Open| {
                 open.action != action || open.most < NEVER && begin > open.start + open.most
@@ -187,8 +189,8 @@ impl Deadlines {
     }
 }
 
-/// The earliest time, not before `begin`, at which the operator can begin as far as the literals
-/// that change at fixed times go.
+/// Returns the earliest time, not before `begin`, at which the operator can begin according to the
+/// literals that change at fixed times.
 pub(crate) fn in_windows(graph: &Graph, operator: &Operator, mut begin: Ticks) -> Ticks {
     let windows = &graph.windows[operator.windows.clone()];
     loop {

@@ -17,7 +17,7 @@ pub(crate) use super::numbers::Gain;
 use envelopes::{Stay, Stays};
 pub(crate) use timetables::Window;
 
-/// The happening that an operator stands for.
+/// The happening that an operator represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Start(u32),
@@ -31,23 +31,23 @@ pub(crate) enum Kind {
     Axiom,
 }
 
-/// Once all its preconditions are reached, its effects are.
+/// An operator of the relaxed problem: once all its preconditions are reached, its effects are.
 #[derive(Clone, Debug)]
 pub(crate) struct Operator {
     pub(crate) kind: Kind,
     pub(crate) cost: u32,
-    /// Whether this stands for the step itself, not for one of its conditional effects.
+    /// `true` for the step itself, `false` for one of its conditional effects.
     pub(crate) is_step: bool,
     pub(crate) preconditions: Range<usize>,
     pub(crate) effects: Range<usize>,
     pub(crate) gains: Range<usize>,
     /// Positions in [`Graph::windows`].
     pub(crate) windows: Range<usize>,
-    /// The least time from when the preconditions hold to when it is over.
+    /// The minimum time from when the preconditions hold until the operator is over.
     pub(crate) span: Ticks,
 }
 
-/// See the module.
+/// Propositions and operators of the relaxed problem, with their indices.
 #[derive(Debug, Default)]
 pub(crate) struct Graph {
     pub(crate) proposition_count: usize,
@@ -55,28 +55,29 @@ pub(crate) struct Graph {
     pub(crate) preconditions: Vec<u32>,
     pub(crate) precondition_counts: Vec<u32>,
     pub(crate) effects: Vec<u32>,
-    /// For each effect, the least time after the beginning of its operator.
+    /// For each effect, the minimum time after the beginning of its operator.
     pub(crate) delays: Vec<Ticks>,
     /// See [`Window`].
     pub(crate) windows: Vec<Window>,
-    /// From when until when a literal holds that changes at fixed times only.
+    /// The intervals in which a literal holds that changes at fixed times only.
     pub(crate) timetable: Vec<Vec<(Ticks, Ticks)>>,
     /// The timetable of each literal; [`NONE`] if it has none.
     timetable_of: Vec<u32>,
-    /// Tests, and what an operator adds to their difference.
+    /// Tests, with the amounts that an operator adds to their difference.
     pub(crate) gains: Vec<(u32, Gain)>,
     /// Operators without preconditions.
     pub(crate) sources: Vec<u32>,
     pub(crate) goal: Vec<u32>,
     /// See [`Stay`].
     pub(crate) stays: Vec<Stay>,
-    /// For each action the operators that can come neither while it is under way, nor after it.
+    /// For each action, the operators that are applicable neither while it is running, nor after
+    /// it.
     pub(crate) kept_out: Vec<Vec<u32>>,
-    /// For each action its end's operator.
+    /// For each action, the operator of its end.
     pub(crate) end_of: Vec<u32>,
-    /// For each action the operator of its start, or of the whole.
+    /// For each action, the operator of its start, or of the whole action.
     start_of: Vec<u32>,
-    /// Tests that the relaxation takes for granted: they read `?duration`.
+    /// Tests that the relaxation assumes to hold because they read `?duration`.
     pub(crate) is_free_test: Vec<bool>,
     needing_ends: Vec<u32>,
     pub(crate) needing_list: Vec<u32>,
@@ -88,7 +89,8 @@ pub(crate) struct Graph {
 }
 
 impl Graph {
-    /// `macros`: the macro-operators that take the place of the starts of their envelopes.
+    /// Builds the graph. `macros` are the macro-operators that replace the starts of their
+    /// envelopes.
     pub(crate) fn of(
         compiled: &Compiled,
         compresses: Option<Compressibility>,
@@ -148,7 +150,7 @@ impl Graph {
         graph
     }
 
-    /// Lets each step count for what it costs.
+    /// Sets the cost of each step.
     pub(crate) fn weigh(&mut self, step_costs: &StepCosts) {
         for operator in &mut self.operators {
             operator.cost = match operator.kind {
@@ -172,14 +174,14 @@ impl Graph {
                 Kind::End(_) | Kind::Timed(_) | Kind::Axiom => false,
             };
             if is_out {
-                // A precondition that is never met.
+                // Add a precondition that never holds.
                 self.precondition_counts[number] += 1;
                 self.sources.retain(|&source| source != narrow(number));
             }
         }
     }
 
-    /// The cost of one more of an operator: an end needs another start.
+    /// Returns the cost of a repetition of an operator. An end needs another start.
     pub(crate) fn cost_of_repetition(&self, operator: u32) -> u32 {
         let data = &self.operators[operator as usize];
         let start = match data.kind {
@@ -190,34 +192,34 @@ impl Graph {
         data.cost + start.map_or(0, |start| start.cost)
     }
 
-    /// The proposition that a test is passed.
+    /// Returns the proposition that a test passes.
     pub(crate) fn test(&self, test: u32) -> u32 {
         self.first_test + test
     }
 
-    /// Whether it is a literal or a test.
+    /// Returns `true` if it is a literal or a test.
     pub(crate) fn is_listed(&self, proposition: u32) -> bool {
         proposition < self.first_running
     }
 
-    /// The test that the proposition is passed for, if it is one.
+    /// Returns the test of the proposition, if it is one.
     pub(crate) fn test_of(&self, proposition: u32) -> Option<u32> {
         let is_test = (self.first_test..self.first_running).contains(&proposition);
         is_test.then(|| proposition - self.first_test)
     }
 
-    /// The proposition that an instance of the action is under way.
+    /// Returns the proposition that an instance of the action is running.
     pub(crate) fn running(&self, action: u32) -> u32 {
         self.first_running + action
     }
 
-    /// The operators of an action's start and end; [`NONE`] if there is none.
+    /// Returns the operators of an action's start and end; [`NONE`] if there is none.
     pub(crate) fn operators_of(&self, action: u32) -> (u32, u32) {
         let end = self.end_of[action as usize];
         (self.start_of[action as usize], end)
     }
 
-    /// Where in `needing_list` the operators stand that need the proposition.
+    /// Returns the range in `needing_list` of the operators that need the proposition.
     pub(crate) fn needing(&self, proposition: u32) -> Range<usize> {
         let begin = match proposition {
             0 => 0,
@@ -226,7 +228,7 @@ impl Graph {
         begin as usize..self.needing_ends[proposition as usize] as usize
     }
 
-    /// The propositions that a formula asks for.
+    /// Returns the propositions that a formula requires.
     fn propositions(&mut self, formula: &Formula) -> Vec<u32> {
         let literals = formula.literals.iter().map(|literal| literal.0);
         let tests = formula.tests.iter().map(|&test| self.test(test));
@@ -281,7 +283,8 @@ impl Graph {
             let needs = self.propositions(&rule.body);
             self.add(Kind::Axiom, 0, needs, &[(2 * rule.head, 0)], Vec::new());
         }
-        // What makes a derived fact false is not followed up: it is taken to be possible.
+        // The causes of a derived fact's becoming false are not analysed: it is assumed to be
+        // possible.
         for &head in compiled.derived.iter().flatten() {
             self.add(Kind::Axiom, 1, Vec::new(), &[(2 * head + 1, 0)], Vec::new());
         }
@@ -301,9 +304,11 @@ impl Graph {
         }
     }
 
-    /// After an assignment that does not pass a test, others that add to the difference may.
+    /// Replaces [`Gain::Sets`] by [`Gain::Reaches`] where later changes of the difference can close
+    /// the remaining gap.
     fn follow_up_assignments(&mut self, test_count: usize) {
-        // For each test the greatest gains upwards and downwards; also what may do anything.
+        // For each test the greatest gains upwards and downwards; infinite for changes that may
+        // reach any value.
         let mut best = vec![[0.0_f64; 2]; test_count];
         for &(test, gain) in &self.gains {
             let best = &mut best[test as usize];
@@ -331,7 +336,7 @@ impl Graph {
         }
     }
 
-    /// Sorts the operators by what they need.
+    /// Indexes the operators by their preconditions.
     fn index(&mut self) {
         let mut counts = vec![0_u32; self.proposition_count];
         for &need in &self.preconditions {

@@ -1,13 +1,15 @@
-//! What must have been reached before each proposition: its fact landmarks in the delete relaxation.
+//! Fact landmarks of each proposition in the delete relaxation, as labels.
 //!
-//! The label of a proposition is the set of all propositions that each relaxed plan for it goes through,
-//! itself included. An operator's label is the union of those of what it needs, a proposition's the
-//! intersection of those of its achievers. Labels only shrink from the first ones found, down to the
-//! greatest fixpoint, which is exact (Zhu & Givan, "Landmark extraction via planning graph propagation",
-//! ICAPS 2003 doctoral consortium; Keyder, Richter & Helmert, ECAI 2010).
+//! The label of a proposition is the set of all propositions that each relaxed plan for it goes
+//! through, including itself. An operator's label is the union of the labels of its preconditions,
+//! a proposition's label the intersection of those of its achievers. Labels shrink from the first
+//! ones found, down to the greatest fixpoint, which is exact (Zhu & Givan, "Landmark extraction via
+//! planning graph propagation", ICAPS 2003 doctoral consortium; Keyder, Richter & Helmert, ECAI
+//! 2010).
 //!
-//! A label lists literals and numeric tests that do not hold yet. What holds has an empty label; that an
-//! action is under way, and one of several alternatives, is followed, but not listed.
+//! A label lists literals and numeric tests that do not hold yet. Propositions that hold have an
+//! empty label. Propositions for running actions and for alternatives are processed, but not
+//! listed.
 
 use std::collections::VecDeque;
 
@@ -15,12 +17,12 @@ use super::super::state::State;
 use super::graph::{Graph, Kind};
 use super::{Relaxed, UNREACHED};
 
-/// The labels of all propositions, in the making.
+/// The labels of all propositions during the propagation.
 #[derive(Debug)]
 pub(crate) struct Labels {
-    /// Ascending; `None` as long as the proposition is not reached.
+    /// In ascending order; `None` as long as the proposition is not reached.
     of: Vec<Option<Vec<u32>>>,
-    /// How many preconditions each operator waits for; more than it has, if it never comes.
+    /// Number of preconditions that each operator waits for; more than it has if it is excluded.
     missing: Vec<u32>,
     holds: Vec<bool>,
     gaps: Vec<f64>,
@@ -31,8 +33,8 @@ pub(crate) struct Labels {
 }
 
 impl Relaxed<'_> {
-    /// Labels for what can be reached from a state, before anything was propagated. `None` if what is
-    /// under way cannot end in time.
+    /// Returns initial labels for a state, before the propagation. Returns `None` if the running
+    /// actions cannot end in time.
     pub(crate) fn labels(&mut self, state: &State) -> Option<Labels> {
         let is_in_time = self.prepare(state);
         self.buckets.iter_mut().for_each(Vec::clear);
@@ -68,7 +70,8 @@ impl Relaxed<'_> {
         Some(labels)
     }
 
-    /// Propagates labels for about so much work. How much was done, and whether that is all.
+    /// Propagates labels for about `most` work. Returns the work done, and whether the propagation
+    /// is complete.
     pub(crate) fn propagate(&self, labels: &mut Labels, most: u64) -> (u64, bool) {
         let mut work = 0;
         while work < most {
@@ -81,24 +84,24 @@ impl Relaxed<'_> {
         (work, false)
     }
 
-    /// The operators' graph.
+    /// Returns the relaxed problem.
     pub(crate) fn graph(&self) -> &Graph {
         &self.graph
     }
 }
 
 impl Labels {
-    /// The label of a proposition; `None` if it cannot be reached.
+    /// Returns the label of a proposition, or `None` if it is unreachable.
     pub(crate) fn of(&self, proposition: u32) -> Option<&[u32]> {
         self.of[proposition as usize].as_deref()
     }
 
-    /// Whether the proposition held from the beginning on.
+    /// Returns `true` if the proposition held from the beginning.
     pub(crate) fn held(&self, proposition: u32) -> bool {
         self.holds[proposition as usize]
     }
 
-    /// The label of all of these together; `None` if one of them cannot be reached.
+    /// Returns the union of the labels, or `None` if one of the propositions is unreachable.
     pub(crate) fn of_all(&self, propositions: &[u32]) -> Option<Vec<u32>> {
         let mut all = Vec::new();
         for &proposition in propositions {
@@ -109,7 +112,7 @@ impl Labels {
         Some(all)
     }
 
-    /// Calls `visit` with each operator that can come and each proposition that it achieves.
+    /// Calls `visit` with each reachable operator and each proposition that it achieves.
     pub(crate) fn visit_achievers(&self, graph: &Graph, visit: &mut dyn FnMut(u32, u32)) {
         for (number, operator) in graph.operators.iter().enumerate() {
             if self.missing[number] > 0 {
@@ -126,7 +129,7 @@ impl Labels {
         }
     }
 
-    /// The proposition is reached for the first time.
+    /// Processes a proposition that is reached for the first time.
     fn reach(&mut self, graph: &Graph, proposition: u32) {
         for position in graph.needing(proposition) {
             let operator = graph.needing_list[position];
@@ -144,7 +147,8 @@ impl Labels {
         }
     }
 
-    /// Lets what an operator changes have no larger label than it. The work done.
+    /// Restricts the labels of an operator's effects to those that its own label allows. Returns
+    /// the work done.
     fn fire(&mut self, graph: &Graph, operator: u32) -> u64 {
         let data = &graph.operators[operator as usize];
         let mut union = std::mem::take(&mut self.union);
@@ -167,7 +171,7 @@ impl Labels {
         work
     }
 
-    /// The proposition has an achiever of that label. The work done.
+    /// Intersects the label of a proposition with that of an achiever. Returns the work done.
     fn lower(&mut self, graph: &Graph, proposition: u32, union: &[u32]) -> u64 {
         if self.holds[proposition as usize] {
             return 1;

@@ -1,4 +1,4 @@
-//! How far numbers are from passing a test. Signs are exact, magnitudes only guide the search.
+//! Distances of numbers from passing a test. Signs are exact; magnitudes only guide the search.
 
 use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_num::Rational;
@@ -7,8 +7,8 @@ use super::super::compile::{Compiled, Update};
 use super::super::formula::Numeric;
 use super::super::state::State;
 
-/// What is missing for a test that fails: positive if the difference must grow. Not a number if
-/// something it reads has no value.
+/// Returns the gap of a failing test: positive if the difference must grow, NaN if the test reads a
+/// fluent without a value.
 pub(super) fn gap(compiled: &Compiled, test: u32, state: &State) -> f64 {
     let test = &compiled.tests[test as usize];
     match test.difference.value(&state.values, None) {
@@ -17,8 +17,8 @@ pub(super) fn gap(compiled: &Compiled, test: u32, state: &State) -> f64 {
     }
 }
 
-/// The gap of a test that fails even where the only fluent that it reads has its highest level. `None` if it may
-/// pass.
+/// Returns the gap of a test that fails even if the only fluent that it reads has its highest
+/// level, or `None` if it may pass.
 pub(super) fn gap_of_levels(
     compiled: &Compiled,
     test: u32,
@@ -41,7 +41,7 @@ pub(super) fn gap_of_levels(
     fails.then(|| strictly(test.comparison) - difference.to_f64())
 }
 
-/// How often a change must happen to close a gap; `None` if it never will.
+/// Returns the number of repetitions of a change that close a gap, or `None` if it never closes.
 fn repetitions(gap: f64, gain: f64) -> Option<u32> {
     if gap.is_nan() || (gap > 0.0) != (gain > 0.0) {
         return None;
@@ -60,15 +60,17 @@ fn repetitions(gap: f64, gain: f64) -> Option<u32> {
 pub(crate) enum Gain {
     /// It adds a constant to the test's difference.
     Adds(f64),
-    /// It sets the difference to a constant, which does not pass: so much is missing then.
+    /// It sets the difference to a constant that does not pass the test. The value is the remaining
+    /// gap.
     Sets(f64),
-    /// It passes the test if so many more happenings follow, or may pass it if none must.
+    /// It passes the test if this number of further happenings follow. With 0, it may pass the test
+    /// alone.
     Reaches(u32),
 }
 
 impl Gain {
-    /// How often the happening, or something after it, must happen to close a gap; `None` if it
-    /// never will.
+    /// Returns the number of times the happening, or one after it, must happen to close a gap, or
+    /// `None` if it never closes.
     pub(super) fn repetitions(self, gap: f64) -> Option<u32> {
         match self {
             Self::Adds(gain) => repetitions(gap, gain),
@@ -78,7 +80,7 @@ impl Gain {
     }
 }
 
-/// The gain for a test by the updates of one happening.
+/// Returns the gain for a test from the updates of one happening.
 pub(super) fn gain(compiled: &Compiled, test: u32, updates: &[&Update]) -> Gain {
     if let Some(gap) = gap_after(compiled, test, updates) {
         return if gap == 0.0 {
@@ -93,8 +95,8 @@ pub(super) fn gain(compiled: &Compiled, test: u32, updates: &[&Update]) -> Gain 
     }
 }
 
-/// What is missing after a happening that assigns a constant to the only fluent that the test
-/// reads: 0 if nothing is.
+/// Returns the gap after a happening that assigns a constant to the only fluent that the test
+/// reads; 0 if the test passes.
 fn gap_after(compiled: &Compiled, test: u32, updates: &[&Update]) -> Option<f64> {
     let test = &compiled.tests[test as usize];
     let Numeric::Linear(linear) = &test.difference else {
@@ -117,7 +119,7 @@ fn gap_after(compiled: &Compiled, test: u32, updates: &[&Update]) -> Option<f64>
     Some(strictly(test.comparison) - difference.to_f64())
 }
 
-/// A strict test asks for a little more than the gap.
+/// Returns the margin by which a strict test must be passed.
 fn strictly(comparison: Comparison) -> f64 {
     match comparison {
         Comparison::Greater => 1e-9,
@@ -126,8 +128,8 @@ fn strictly(comparison: Comparison) -> f64 {
     }
 }
 
-/// The constant that the updates of one happening add to a test's difference, or infinity if they
-/// may do anything.
+/// Returns the constant that the updates of one happening add to a test's difference, or infinity
+/// if they may reach any value.
 fn added(compiled: &Compiled, test: u32, updates: &[&Update]) -> f64 {
     let test = &compiled.tests[test as usize];
     let Numeric::Linear(linear) = &test.difference else {

@@ -1,4 +1,4 @@
-//! The relaxed plan: what is read off the cheapest achievers.
+//! The relaxed plan, made of the cheapest achievers.
 
 use elbowroom_num::Rational;
 
@@ -9,11 +9,11 @@ use super::super::state::State;
 use super::graph::Kind;
 use super::{Estimate, Relaxed};
 
-/// The additional cost of a relaxed plan that uses more than there is.
+/// The additional cost of a relaxed plan that overdraws a consumable.
 pub(crate) const OVERDRAWN: u32 = 1 << 20;
 
 impl Relaxed<'_> {
-    /// Counts the steps of a relaxed plan, and notes its first steps.
+    /// Counts the steps of a relaxed plan, and records its first steps.
     pub(super) fn extract(&mut self, state: &State, estimate: &mut Estimate) {
         let mut wanted: Vec<u32> = self.graph.goal.clone();
         let mut used: Vec<u32> = Vec::new();
@@ -65,7 +65,7 @@ impl Relaxed<'_> {
         estimate.actions.dedup();
     }
 
-    /// Collects the operators of the relaxed plan for what is wanted.
+    /// Collects the operators of the relaxed plan for the wanted propositions.
     fn collect(
         &mut self,
         wanted: &mut Vec<u32>,
@@ -88,7 +88,8 @@ impl Relaxed<'_> {
         }
     }
 
-    /// Uses an operator, if it is not used yet, and wants what it needs. Whether it is new.
+    /// Adds an operator to the plan unless it is part of it, and its preconditions to the wanted
+    /// propositions. Returns `true` if it is new.
     fn use_with_needs(
         &mut self,
         operator: u32,
@@ -102,7 +103,7 @@ impl Relaxed<'_> {
         let data = &self.graph.operators[operator as usize];
         wanted.extend_from_slice(&self.graph.preconditions[data.preconditions.clone()]);
         if let Kind::Start(action) = data.kind {
-            // What starts must end.
+            // A started action must end.
             let end = self.graph.end_of[action as usize];
             if end != NONE && self.missing[end as usize] == 0 {
                 self.use_with_needs(end, wanted, used);
@@ -112,7 +113,7 @@ impl Relaxed<'_> {
     }
 
     /// Closes the gap of a test by steps that add to its difference, each as often as the
-    /// consumables allow, beginning with the cheapest. Whether it is such a test.
+    /// consumables allow, beginning with the cheapest. Returns `false` if it is not such a test.
     fn add_up(
         &mut self,
         proposition: u32,
@@ -150,7 +151,7 @@ impl Relaxed<'_> {
                 reason = "clamped to a small positive range"
             )]
             let needed = (gap / gain).ceil().clamp(1.0, 1000.0) as u32;
-            // One is in the plan already.
+            // One is already in the plan.
             let had = u32::from(self.is_used[step as usize]);
             let times = self.consumables.times(step, needed - had);
             if times > 0 {
@@ -167,8 +168,8 @@ impl Relaxed<'_> {
         true
     }
 
-    /// Adds what fills up the resources that the relaxed plan uses up. Returns the operators that are not worth
-    /// a step before something is used up.
+    /// Adds operators that replenish the resources used up by the relaxed plan. Returns the
+    /// operators that are not worth a step before a resource is used up.
     fn fill_up(
         &mut self,
         state: &State,
@@ -211,8 +212,8 @@ impl Relaxed<'_> {
         is_new
     }
 
-    /// Counts what the timed initials to come will take from the goal, and that they have to be
-    /// waited for. So the goal does not seem reached before they have happened.
+    /// Counts the parts of the goal that future timed initials will make false, and a step for
+    /// waiting. So the goal does not seem reached before they have happened.
     pub(super) fn await_timed(&self, state: &State, estimate: &mut Estimate) {
         let compiled = self.compiled;
         let due = &compiled.timed[state.timed as usize..compiled.timed_until_goal as usize];
@@ -235,8 +236,8 @@ impl Relaxed<'_> {
         }
     }
 
-    /// The number of tests of the goal that pass now, and fail with the values that timed initials will
-    /// assign.
+    /// Returns the number of tests of the goal that pass now, and fail with the values that timed
+    /// initials will assign.
     fn lost_tests(&self, state: &State, due: &[Timed]) -> usize {
         let compiled = self.compiled;
         if compiled.goal.tests.is_empty() || due.iter().all(|timed| timed.assigns.is_empty()) {
@@ -284,7 +285,7 @@ impl Relaxed<'_> {
     }
 }
 
-/// The steps that an operator stands for.
+/// Adds the steps that an operator represents.
 fn push_steps(kind: Kind, state: &State, steps: &mut Vec<Step>) {
     match kind {
         Kind::Start(action) => steps.push(Step::Start(action)),

@@ -1,10 +1,10 @@
-//! What a relaxed plan uses up.
+//! Resources that a relaxed plan uses up.
 //!
-//! Nothing is ever lost in a relaxed plan, not even what its steps consume: one charge of a battery
-//! takes a robot everywhere. So what the steps of a relaxed plan use up is counted, and where that
-//! is more than there is, steps that fill it up are added. (The balance of producers and consumers
-//! is LPRPG's idea; Coles, Fox, Long & Smith, ICAPS 2008. Here no linear program is solved, only
-//! the sum over one relaxed plan is looked at.)
+//! In a relaxed plan nothing is ever lost, not even the resources that its steps consume: one
+//! charge of a battery takes a robot everywhere. So the consumption of a relaxed plan is summed up,
+//! and if it exceeds the available amount, steps that replenish the resource are added. (The
+//! balance of producers and consumers is LPRPG's idea; Coles, Fox, Long & Smith, ICAPS 2008. No
+//! linear program is solved here; only the sum over one relaxed plan is considered.)
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
@@ -17,19 +17,19 @@ use super::super::tuning::Technique;
 use super::changes::{assignments, changes, changes_by};
 use super::graph::{Graph, Kind};
 
-/// The most that fits into a reservoir without a capacity.
+/// The capacity of a reservoir without a bound.
 const UNBOUNDED: f64 = 1e12;
 
-/// A fluent that some steps use up, and must not run out of.
+/// A fluent that some steps use up, and that has a lower bound.
 #[derive(Clone, Debug)]
 struct Resource {
     reservoir: Reservoir,
-    /// The operators that fill it up, and by how much.
+    /// The operators that replenish it, and the amounts.
     feeds: Vec<(u32, f64)>,
 }
 
 impl Resource {
-    /// The most that fits into it.
+    /// Returns the capacity.
     fn size(&self) -> f64 {
         (self.reservoir.ceiling - self.reservoir.floor).clamp(0.0, UNBOUNDED)
     }
@@ -38,11 +38,11 @@ impl Resource {
 /// A shortage of a resource in a relaxed plan.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shortage {
-    /// An operator that fills it up.
+    /// An operator that replenishes it.
     pub(super) operator: u32,
-    /// How often it is needed, besides what the plan has.
+    /// Number of times it is needed, in addition to those in the plan.
     pub(super) times: u32,
-    /// `true` if the state has no room for it, or little: it is for later.
+    /// `true` if the state has little or no capacity left for it, so that it is useful only later.
     pub(super) is_later: bool,
 }
 
@@ -50,11 +50,11 @@ pub(super) struct Shortage {
 #[derive(Debug, Default)]
 pub(super) struct Resources {
     list: Vec<Resource>,
-    /// For each operator what it adds to resources, or, negative, takes.
+    /// For each operator, the amounts that it adds to resources; negative for consumption.
     changes: Vec<Vec<(usize, f64)>>,
-    /// The amount of each in the state, less its floor.
+    /// The amount of each in the state, minus its floor.
     levels: Vec<f64>,
-    /// The amount of each that a relaxed plan leaves.
+    /// The remaining amount of each after a relaxed plan.
     left: Vec<f64>,
     is_settled: Vec<bool>,
 }
@@ -111,7 +111,7 @@ impl Resources {
         resources
     }
 
-    /// Whether nothing is used up.
+    /// Returns `true` if there are no resources.
     pub(super) fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
@@ -136,15 +136,15 @@ impl Resources {
         self.left.clone_from(&self.levels);
     }
 
-    /// The relaxed plan has an operator, so many times.
+    /// Records that the relaxed plan contains an operator `times` times.
     pub(super) fn note(&mut self, operator: u32, times: u32) {
         for &(place, amount) in &self.changes[operator as usize] {
             self.left[place] += amount * f64::from(times);
         }
     }
 
-    /// What to add for the sake of a resource that runs out; each resource is told once. `cost`
-    /// says what an operator costs that is within reach.
+    /// Returns an operator that replenishes a resource which runs out. Each resource is reported
+    /// once. `cost` returns the cost of a reachable operator.
     pub(super) fn shortage(&mut self, cost: impl Fn(u32) -> Option<u32>) -> Option<Shortage> {
         for (place, resource) in self.list.iter().enumerate() {
             if self.left[place] >= 0.0 || self.is_settled[place] {
@@ -175,17 +175,18 @@ impl Resources {
     }
 }
 
-/// A fluent that is used up and filled up.
+/// A fluent that is used up and replenished.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reservoir {
     pub(crate) fluent: u32,
     /// The amount that must remain.
     pub(crate) floor: f64,
-    /// The highest value at the beginning or after an action that fills it up; infinite if it has no bound.
+    /// The highest value at the beginning or after an action that replenishes it; infinite if it
+    /// has no bound.
     pub(crate) ceiling: f64,
 }
 
-/// The fluents that are used up and filled up.
+/// Returns the fluents that are used up and replenished.
 pub(crate) fn reservoirs(compiled: &Compiled) -> Vec<Reservoir> {
     let mut floors: Vec<Option<f64>> = vec![None; compiled.fluents.len()];
     let mut ceilings: Vec<Option<f64>> = vec![None; compiled.fluents.len()];
@@ -215,8 +216,8 @@ pub(crate) fn reservoirs(compiled: &Compiled) -> Vec<Reservoir> {
     reservoirs.collect()
 }
 
-/// Notes what has to be left of the fluents that the action uses up: the least that some action
-/// leaves.
+/// Records the minimum remaining values of the fluents that the action uses up: the least value
+/// that some action leaves.
 pub(super) fn note_floors(compiled: &Compiled, action: &Action, floors: &mut [Option<f64>]) {
     for change in changes(compiled, action).filter(|change| change.amount < 0.0) {
         let (fluent, amount) = (change.fluent, change.amount);
@@ -234,7 +235,7 @@ pub(super) fn note_floors(compiled: &Compiled, action: &Action, floors: &mut [Op
     }
 }
 
-/// Notes the highest values of the fluents that the action fills up.
+/// Records the highest values of the fluents that the action replenishes.
 fn note_ceilings(compiled: &Compiled, action: &Action, ceilings: &mut [Option<f64>]) {
     for change in changes(compiled, action).filter(|change| change.amount > 0.0) {
         let (fluent, amount) = (change.fluent, change.amount);
@@ -249,18 +250,19 @@ fn note_ceilings(compiled: &Compiled, action: &Action, ceilings: &mut [Option<f6
     }
 }
 
-/// The least value of a fluent that a condition leaves after a change.
+/// Returns the least value of a fluent after a change, by a condition before it.
 fn least(compiled: &Compiled, condition: &Formula, change: (u32, f64)) -> Option<f64> {
     bounds(compiled, condition, change, true).max_by(f64::total_cmp)
 }
 
-/// The highest value of a fluent that a condition allows after a change.
+/// Returns the highest value of a fluent after a change, by a condition before it.
 fn most(compiled: &Compiled, condition: &Formula, change: (u32, f64)) -> Option<f64> {
     bounds(compiled, condition, change, false).min_by(f64::total_cmp)
 }
 
-/// The lower or the upper bounds on a fluent after a change, by the conjuncts of a condition before it. One that
-/// reads `?duration` as well is taken to be about the sum already.
+/// Returns the lower or the upper bounds on a fluent after a change, by the conjuncts of a
+/// condition before it. A conjunct that also reads `?duration` is assumed to include the change
+/// already.
 fn bounds(
     compiled: &Compiled,
     condition: &Formula,
@@ -283,7 +285,7 @@ fn bounds(
             Comparison::Equal => return None,
         };
         let is_lower = is_at_least == coefficient.is_positive();
-        // What is more than a bound is a little more.
+        // A strict bound is approximated by a small margin.
         let strictly = match (is_strict, is_lower) {
             (false, _) => 0.0,
             (true, true) => 1e-6,

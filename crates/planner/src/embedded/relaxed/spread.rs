@@ -1,14 +1,15 @@
-//! The costs of propositions: from what holds to what can be reached.
+//! Propagation of costs from the propositions that hold to the reachable ones.
 
 use super::super::state::State;
 use super::graph::Kind;
 use super::{MOST, Reaches, Relaxed};
 
 impl Relaxed<'_> {
-    /// Dijkstra's algorithm from what holds. If it stops early, it ends once all of the goal, and of what is
-    /// under way, is reached at no more than the cost that has been done: what has such a cost keeps it and
-    /// its achiever, and so does all that they rest on. The relaxed plan is the same then, but that the end
-    /// of an action which nothing else needs may be missing.
+    /// Runs Dijkstra's algorithm from the propositions that hold. If `stops_early`, it stops once
+    /// the whole goal and the ends of all running actions are reached within the cost processed so
+    /// far. Propositions up to this cost keep their cost and achiever, as do those that they depend
+    /// on. So the relaxed plan is the same, except that the end of an action which nothing else
+    /// needs may be missing.
     pub(super) fn spread(&mut self, state: &State, stops_early: bool) {
         self.fire_sources(state);
         let mut cost = 0;
@@ -26,8 +27,8 @@ impl Relaxed<'_> {
         }
     }
 
-    /// Whether all of the goal costs no more than this, each part by itself, and all that is under
-    /// way can end at no higher cost. Of the goal, the first `met` parts do.
+    /// Returns `true` if each part of the goal costs at most `cost`, and the ends of all running
+    /// actions are reached. The first `met` parts of the goal are known to be within the cost.
     fn is_goal_within(&self, state: &State, cost: usize, met: &mut usize) -> bool {
         while let Some(&goal) = self.graph.goal.get(*met) {
             if self.cost[goal as usize] as usize > cost {
@@ -41,7 +42,7 @@ impl Relaxed<'_> {
         })
     }
 
-    /// The same for what holds and what follows from it by rules.
+    /// As [`spread`](Self::spread), for the propositions that hold and their consequences by rules.
     pub(super) fn spread_at_cost_zero(&mut self, state: &State) {
         self.fire_sources(state);
         while let Some(proposition) = self.buckets.first_mut().and_then(Vec::pop) {
@@ -62,11 +63,11 @@ impl Relaxed<'_> {
         }
     }
 
-    /// The proposition's turn has come, at that cost.
+    /// Processes a proposition from the queue at that cost.
     fn reach(&mut self, proposition: u32, cost: usize) {
         #[allow(clippy::cast_possible_truncation, reason = "below MOST")]
         let reached = cost as u32;
-        // Each cost that a proposition had is in the queue once; only the last one counts.
+        // Each cost of a proposition is queued once; only the last one counts.
         if self.cost[proposition as usize] != reached {
             return;
         }
@@ -83,7 +84,7 @@ impl Relaxed<'_> {
         }
     }
 
-    /// The operator's preconditions are reached.
+    /// Processes an operator whose preconditions are reached.
     fn fire(&mut self, operator: u32) {
         let cost = self.operator_cost[operator as usize];
         let own = self.own_cost[operator as usize];

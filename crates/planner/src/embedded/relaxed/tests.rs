@@ -1,5 +1,5 @@
-//! An estimate that stops early, beside one that does not, and beside costs made plainly: by going over all
-//! operators until nothing changes.
+//! Compares estimates that stop early with complete ones, and with costs computed by iterating over
+//! all operators until nothing changes.
 
 use std::cell::Cell;
 
@@ -17,7 +17,7 @@ use crate::embedded::root::root;
 use crate::embedded::state::State;
 use crate::embedded::testing::{self, compiled};
 
-/// The estimate that goes over everything that can be reached.
+/// Returns the estimate without an early stop.
 fn whole(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Estimate> {
     relaxed.serves_repairs = false;
     let is_in_time = relaxed.prepare(state);
@@ -46,7 +46,8 @@ fn whole(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Estimate> {
     Some(estimate)
 }
 
-/// What each proposition costs: the least, over its achievers, of the sum over what they need.
+/// Returns the cost of each proposition: the minimum, over its achievers, of the sum over their
+/// preconditions.
 fn plain_costs(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Vec<u32>> {
     if !relaxed.prepare(state) {
         relaxed.buckets.iter_mut().for_each(Vec::clear);
@@ -59,7 +60,7 @@ fn plain_costs(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Vec<u32>> {
         let before = costs.clone();
         for (number, operator) in graph.operators.iter().enumerate() {
             let is_past = matches!(operator.kind, Kind::Timed(timed) if timed < state.timed);
-            // What it waits for beside its conditions never comes.
+            // It waits for something other than its conditions, which never becomes true.
             let is_kept_out = relaxed.missing[number] > graph.precondition_counts[number];
             let needs = &graph.preconditions[operator.preconditions.clone()];
             let is_unreached = needs.iter().any(|&need| costs[need as usize] == UNREACHED);
@@ -86,8 +87,8 @@ fn plain_costs(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Vec<u32>> {
     }
 }
 
-/// How often something must happen until a test that fails is passed, or its gap is closed: by counting,
-/// exactly.
+/// Returns the exact number of repetitions until a failing test passes, or its gap is closed, by
+/// counting.
 fn plain_times(compiled: &Compiled, state: &State, test: u32, gain: Gain) -> Option<u32> {
     let test = &compiled.tests[test as usize];
     let gain = match gain {
@@ -153,7 +154,7 @@ fn compare(
     );
     assert!(stopped.steps <= full.steps, "{stopped:?}, {full:?}");
     if stopped.steps != full.steps {
-        // An end by itself, of an action that is not compressed, may be missing.
+        // The separate end of an action that is not compressed may be missing.
         let graph = &late.graph;
         let has_end = |&action: &u32| {
             let (start, end) = graph.operators_of(action);
@@ -164,7 +165,8 @@ fn compare(
     }
 }
 
-/// Compares the estimates of the states on a way through a problem. How many tests of numbers were not passed.
+/// Compares the estimates of the states along a path through a problem. Returns the number of
+/// numeric tests that failed.
 fn walk(draft: &Draft, prices: &[u32], choices: &[prop::sample::Index]) -> usize {
     let task = draft.task();
     let compiled = compiled(&task);
@@ -210,7 +212,8 @@ proptest! {
     }
 }
 
-/// The same where numbers are compared and changed. That they are is counted.
+/// As above, for problems in which numbers are compared and changed. The test counts how often they
+/// matter.
 #[test]
 fn an_estimate_that_stops_early_is_that_of_all_that_can_be_reached_with_numbers() {
     let config = ProptestConfig {
@@ -220,7 +223,7 @@ fn an_estimate_that_stops_early_is_that_of_all_that_can_be_reached_with_numbers(
     };
     let failed = Cell::new(0);
     let way = (numeric_drafts(), prices(), choices());
-    // How many tests are not passed differs from one set of random problems to the next: they are the same each time.
+    // The number of failing tests depends on the random problems, which are the same in each run.
     TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha))
         .run(&way, |(draft, prices, choices)| {
             failed.set(failed.get() + walk(&draft, &prices, &choices));

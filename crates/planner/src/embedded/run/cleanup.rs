@@ -1,7 +1,8 @@
-//! Clean-up of the first plan, where the caller asks for no other one.
+//! Clean-up of the first plan, if the caller requests no other one.
 //!
-//! Better plans are looked for near the first plan, for a share of the work that it took and at most as many
-//! states. Then the best plan is reported. It has few needless and back-and-forth actions.
+//! Better plans are searched for near the first plan, for a share of its work and at most the same
+//! number of states. Then the best plan is reported. It has few unnecessary and back-and-forth
+//! actions.
 
 use super::super::answer::{Counts, Stopped};
 use super::super::tuning::Technique;
@@ -9,14 +10,15 @@ use super::Planner;
 use super::refining::Nearby;
 use super::strand::{OPERATOR_WORK, Strand};
 
-/// The number of times in a clean-up that its work is compared with the limit.
+/// Number of comparisons of a clean-up's work with the limit.
 const REPORTS: u64 = 16;
 
-/// The least states of a first plan that is cleaned up: below that, the preparation takes longer than the plan took.
+/// Minimum number of states of a first plan for a clean-up: below it, the preparation takes longer
+/// than the plan.
 const LEAST_STATES: u64 = 64;
 
-/// The work of a clean-up is this part of the work up to the first plan: a unit near a plan takes several times as
-/// long as one of a search.
+/// Divisor of the work up to the first plan, which gives the work of a clean-up: a unit near a plan
+/// takes several times as long as one of a search.
 const SHARE: u64 = 4;
 
 impl Planner<'_> {
@@ -43,7 +45,7 @@ impl Planner<'_> {
         self.cleanup_limit.as_ref().is_some_and(is_over)
     }
 
-    /// Looks for better plans near the first one.
+    /// Searches for better plans near the first one.
     pub(super) fn clean_up(&mut self) {
         let Counts {
             work, evaluated, ..
@@ -73,7 +75,8 @@ impl Planner<'_> {
         }
     }
 
-    /// Reports the best plan, if it was held back. A caller that interrupted the run has it in the answer.
+    /// Reports the best plan, if it was held back. A caller that interrupted the run gets it in the
+    /// answer.
     pub(super) fn report_held_back(&mut self) {
         if self.cleans_up()
             && self.stopped != Some(Stopped::Interrupted)

@@ -1,13 +1,13 @@
-//! Better plans, once there is one.
+//! Search for better plans after the first one.
 //!
-//! Searches take turns. Where the metric decides, these are others than those for a first plan: some
-//! go for what costs least to finish, which finds a plan soon; others give what was spent its weight
-//! too, which finds cheaper ones. All are bounded by the best plan so far, whoever found it.
+//! Searches take turns. If the metric decides, they differ from those for a first plan: some prefer
+//! the states that cost least to finish, which finds a plan soon; others also weigh the cost so
+//! far, which finds cheaper ones. All are bounded by the best plan so far.
 //!
-//! Beside them better plans are looked for near the best one. All that goes in *legs* of counted
-//! work. In each there is one strand at first, a search and then the refiner, and a second one when
-//! that has gone on for a while, in which another refiner works. What a strand finds is told to the
-//! other one when the leg is over, and of plans that are worth the same, the first strand's counts.
+//! In addition, refiners search for better plans near the best one. The work proceeds in *legs* of
+//! counted work. Each leg has at first one strand, a search and then the refiner, and after a while
+//! a second strand with another refiner. The strands exchange their plans at the end of a leg. Of
+//! equally good plans, the first strand's counts.
 
 use super::super::answer::Stopped;
 use super::super::search::{Aim, Search, Strategy};
@@ -18,10 +18,11 @@ use super::side_by_side::{Job, Tell};
 use super::strand::{Allowance, Frame, Outcome, Strand};
 use super::{Planner, share};
 
-/// Of the memory that the searches leave, the repair of each of two strands may take this part: half of it stays.
+/// Divisor of the memory left by the searches: limit for the repair of each of two strands. Half of
+/// it stays free.
 const REPAIRS_SHARE: usize = 4;
 
-/// A search and its strategy; it is made when its first turn comes.
+/// A search and its strategy. The search is created at its first turn.
 pub(super) struct Entrant<'a> {
     pub(super) strategy: Strategy,
     pub(super) search: Option<Search<'a>>,
@@ -37,7 +38,7 @@ impl<'a> Entrant<'a> {
         }
     }
 
-    /// The search.
+    /// Returns the search, and creates it if necessary.
     pub(super) fn search(&mut self, frame: Frame<'a>, symmetry: &'a Symmetry) -> &mut Search<'a> {
         let strategy = self.strategy;
         let mutex_pairs = frame.mutex_pairs.get().and_then(Option::as_ref);
@@ -51,42 +52,43 @@ pub(super) struct Contest<'a> {
     frame: Frame<'a>,
     symmetry: &'a Symmetry,
     pub(super) entrants: Vec<Entrant<'a>>,
-    /// Whose turn it is.
+    /// Index of the current search.
     current: usize,
-    /// What each is given in this round.
+    /// Number of turns of each search in this round.
     budget: u64,
-    /// What the current one has left of it, once that is known.
+    /// Number of turns left to the current search, once it is known.
     left: Option<u64>,
-    /// How much work searches may still do, or have done too much.
+    /// Work that the searches may still do; negative if they have done too much.
     credit: i64,
-    /// Whether the current one has found a plan of a better metric in this turn: then it may go on, and
-    /// that does not count.
+    /// `true` if the current search has found a plan with a better metric in this turn. It may then
+    /// continue without using up credit.
     is_finding: bool,
 }
 
-/// What comes out of a strand: the work since its last question, and what is left to search.
+/// Result of a strand: the work since its last report, and the remaining search space.
 struct Ended {
     unreported: u64,
     rest: Rest,
 }
 
-/// What searches have left to look at.
+/// Remaining search space of the searches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Rest {
     Something,
-    /// Nothing, but some plans are out of their reach.
+    /// Exhausted, but some plans are out of reach of the searches.
     OutOfReach,
-    /// Nothing.
+    /// Exhausted.
     Nothing,
 }
 
 impl<'a> Contest<'a> {
-    /// Whose turn it is may no longer be there: what it had left does not count.
+    /// Forgets the current turn, whose search may have been removed.
     pub(super) fn forget_turn(&mut self) {
         (self.left, self.is_finding, self.credit) = (None, false, 0);
     }
 
-    /// Lets searches take turns for so much work. The work done, and what is left.
+    /// Lets searches take turns for at most `most` work. Returns the work done, and the remaining
+    /// search space.
     fn go_on(&mut self, strand: &mut Strand<'a, '_>, most: u64) -> (u64, Rest) {
         let compiled = self.frame.compiled;
         let mut done = 0;
@@ -116,7 +118,7 @@ impl<'a> Contest<'a> {
             self.is_finding = finds || self.is_finding && outcome == Outcome::WorkDone;
             match outcome {
                 Outcome::Stopped => return (done, Rest::Something),
-                // Who finds better plans may go on.
+                // A search that finds better plans may continue.
                 Outcome::Better => self.left = Some(turns),
                 Outcome::WorkDone => self.left = Some(left - spent.min(left)),
                 Outcome::TurnsSpent => self.current += 1,
@@ -132,13 +134,13 @@ impl<'a> Contest<'a> {
 }
 
 impl<'a> Planner<'a> {
-    /// Looks for plans of a better metric until there is none, and then for shorter ones that are
-    /// as good. Says why it ended.
+    /// Searches for plans with a better metric until there is none, and then for shorter ones with
+    /// the same metric. Returns the reason for its end.
     pub(super) fn improve(&mut self) -> Stopped {
         let strategies = self.strategies();
         let mut entrants = Vec::new();
         for aim in [Aim::CostToGo, Aim::WeightedAStar(3), Aim::WeightedAStar(1)] {
-            // One of each compression will do.
+            // One strategy of each compression suffices.
             let compressing = strategies.iter().filter(|strategy| {
                 strategy.compresses.is_some() && strategy.replenishes == self.has_reservoirs
             });
@@ -164,8 +166,8 @@ impl<'a> Planner<'a> {
         stopped
     }
 
-    /// Lets searches take turns until one that loses nothing has seen everything, and looks for
-    /// better plans near the best one meanwhile. It begins with the turn of the `first` one.
+    /// Lets searches take turns until a complete one has exhausted its space, and meanwhile
+    /// searches for better plans near the best one. It begins with the turn of search `first`.
     pub(super) fn compete(
         &mut self,
         entrants: Vec<Entrant<'a>>,
@@ -192,7 +194,7 @@ impl<'a> Planner<'a> {
             }
             let is_over = match rest {
                 Rest::Something => false,
-                // What the searches lose may be found near the best plan.
+                // Plans that the searches cannot reach may be found near the best plan.
                 Rest::OutOfReach => !self.is_refining() || self.improved_for >= self.least(),
                 Rest::Nothing => return Stopped::Exhausted,
             };
@@ -202,7 +204,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// How much work a strand has for better plans at least, if no search has seen everything.
+    /// Returns the minimum work of a strand on better plans, if no search has exhausted the
+    /// complete space.
     fn least(&self) -> u64 {
         let tuning = &self.frame.compiled.tuning;
         let weight = self.refiners.first().map_or(0, Nearby::weight);
@@ -213,7 +216,7 @@ impl<'a> Planner<'a> {
             .max(self.least_work)
     }
 
-    /// Whether better plans are looked for near the best one.
+    /// Returns `true` if better plans are searched for near the best one.
     pub(super) fn is_refining(&self) -> bool {
         let tuning = &self.frame.compiled.tuning;
         self.best.is_some()
@@ -222,7 +225,7 @@ impl<'a> Planner<'a> {
             && (tuning.uses(Technique::Rescheduling) || tuning.uses(Technique::Repair))
     }
 
-    /// One leg. What is left to search.
+    /// Runs one leg. Returns the remaining search space.
     fn leg(&mut self, contest: &mut Contest<'a>) -> Rest {
         let compiled = self.frame.compiled;
         let tuning = &compiled.tuning;
@@ -248,7 +251,7 @@ impl<'a> Planner<'a> {
         if has_second && refiners.len() == 1 {
             refiners.push(Nearby::new(compiled, 2));
         }
-        // What a repair takes is free again when it is over, so it is no part of what is counted.
+        // A repair frees its memory at its end, so this memory is not part of the counts.
         let room = frame.settings.max_memory;
         let room = room.saturating_sub(self.progress.counts.memory) / REPAIRS_SHARE;
         for refiner in &mut refiners {
@@ -259,7 +262,8 @@ impl<'a> Planner<'a> {
         let strands = 1 + u64::from(has_second);
         let own = strands * length / (1 + refiners[0].share());
         contest.credit = contest.credit.saturating_add_unsigned(own);
-        // What it mentions first gets other numbers there than here, in no fixed order.
+        // A separate task, because facts are numbered in the order of their first use, which is not
+        // deterministic across threads.
         let own_task = has_second.then(|| own_task.unwrap_or_else(|| frame.task.with_own_table()));
         let (first, others) = refiners.split_at_mut(1);
         let first = &mut first[0];

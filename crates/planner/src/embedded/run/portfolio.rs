@@ -1,4 +1,4 @@
-//! Which searches there are for a first plan, and in which order they have their turns.
+//! The searches for a first plan, and the order of their turns.
 
 use super::super::compile::{self, Compressibility};
 use super::super::formula::Literal;
@@ -8,10 +8,11 @@ use super::super::tuning::{Member, Technique};
 use super::Planner;
 
 impl Planner<'_> {
-    /// The searches that take turns, the complete one last, or the one that joins happenings of one moment
-    /// where that may be needed. Where something is used up and filled
-    /// up, estimates that count it find most plans sooner, but not all. Where actions offer
-    /// something while they run, some searches choose happenings in the order of time.
+    /// Returns the searches that take turns. The complete one is last, or the one that joins
+    /// happenings of one moment, where that may be needed. If some fluent is used up and
+    /// replenished, estimates that account for it find most plans sooner, but not all. If actions
+    /// have effects that hold only while they run, some searches choose happenings in chronological
+    /// order.
     pub(super) fn strategies(&self) -> Vec<Strategy> {
         let tuning = &self.frame.compiled.tuning;
         if let Some(member) = tuning.only {
@@ -34,8 +35,9 @@ impl Planner<'_> {
         let searches_novelty = tuning.uses(Technique::Novelty) && !self.frame.compiled.is_symbolic;
         if self.has_reservoirs && searches_novelty {
             let novelty = Strategy::of(Member::Novelty, tuning);
-            // A state can be new because a reservoir is empty, so the first of these refills in estimates as the search
-            // before it does. Refilling can hide progress: the estimate grows with each step that uses something up.
+            // A state can be novel because a reservoir is empty, so the first of these replenishes
+            // in estimates as the search before it does. Replenishing can hide progress: the
+            // estimate grows with each step that uses something up.
             let plain = novelty.with_share(tuning.novelty_share);
             strategies.splice(1..1, [novelty.replenishing(), plain]);
         }
@@ -46,7 +48,7 @@ impl Planner<'_> {
         let has_timed = !compiled.timed.is_empty() || !compiled.calendars.is_empty();
         let mut add = |member| strategies.push(Strategy::of(member, tuning));
         if needs_concurrency {
-            // States take longest in the order of time.
+            // States take longest in chronological order.
             if counts_landmarks {
                 add(Member::Landmarks);
             }
@@ -60,8 +62,9 @@ impl Planner<'_> {
         if !self.frame.compiled.is_symbolic {
             if tuning.uses(Technique::Width) {
                 if counts_landmarks && !needs_concurrency && !has_timed {
-                    // Over at once without landmarks besides the goals. Not for deadlines and windows: two instances
-                    // of satellite with time windows take 11.9 s with it, and 7.3 and 7.6 s without it.
+                    // Ends at once if there are no landmarks besides the goals. Not used with
+                    // deadlines and windows: two instances of satellite with time windows take 11.9
+                    // s with it, and 7.3 and 7.6 s without it.
                     add(Member::LandmarkWidth);
                 }
                 add(Member::Width);
@@ -78,8 +81,8 @@ impl Planner<'_> {
             strategies.push(Strategy::JOINING);
         }
         if self.frame.compiled.is_symbolic {
-            // Where estimates take for granted what times decide, the best ones can lead away from the goal
-            // for ever.
+            // Where estimates assume tests that depend on times to hold, the best estimates can
+            // lead away from the goal for ever.
             for strategy in strategies.iter_mut().filter(|s| s.is_complete()) {
                 *strategy = strategy.counting_steps();
             }
@@ -87,8 +90,8 @@ impl Planner<'_> {
         strategies
     }
 
-    /// Whether things may have to happen at the same time: some action offers to others what they
-    /// need only while it runs, or waits for others before it can end.
+    /// Returns `true` if plans may need concurrency: some action provides facts for others only
+    /// while it runs, or waits for others before it can end.
     pub(super) fn needs_concurrency(&self) -> bool {
         let compiled = self.frame.compiled;
         let needs = |action: &compile::Action| {

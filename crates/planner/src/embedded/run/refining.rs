@@ -1,4 +1,4 @@
-//! Turns of the search near the best plan.
+//! Refinement near the best plan, in turns.
 
 use super::super::answer::Phase;
 use super::super::apply::Step;
@@ -8,15 +8,15 @@ use super::super::search::Strategy;
 use super::super::tuning::Member;
 use super::strand::{Judged, Strand};
 
-/// What makes better plans of the best one, and which best plan it has seen.
+/// A refiner, and the best plan that it has processed.
 pub(super) struct Nearby<'a> {
     refiner: Refiner<'a>,
-    /// The number of the best plan that it goes on from; zero for none.
+    /// The number of the best plan that it continues from; zero for none.
     pub(super) known: u64,
 }
 
 impl<'a> Nearby<'a> {
-    /// The first one, or the second: they draw other numbers.
+    /// Creates the first refiner, or the second one; their random numbers differ.
     pub(super) fn new(compiled: &'a Compiled, number: u64) -> Self {
         let compresses = Strategy::of(Member::Compressing, &compiled.tuning).compresses;
         Self {
@@ -25,19 +25,19 @@ impl<'a> Nearby<'a> {
         }
     }
 
-    /// From now on it takes no more than so many bytes at once.
+    /// Limits its memory, in bytes.
     pub(super) fn limit_memory(&mut self, most: usize) {
         self.refiner.limit_memory(most);
     }
 
-    /// What one estimate comes to.
+    /// Returns the work units of one estimate.
     pub(super) fn weight(&self) -> u64 {
         1 + self.refiner.weight()
     }
 
-    /// How long it should take for each unit of time of a search.
+    /// Returns its share of time, relative to a search.
     pub(super) fn share(&self) -> u64 {
-        // Before it has seen a plan, it cannot know that it does not understand it.
+        // Before its first plan, it is unknown whether the refiner supports the plans.
         if self.known == 0 || self.refiner.has_plan() {
             self.refiner.share()
         } else {
@@ -46,14 +46,15 @@ impl<'a> Nearby<'a> {
     }
 }
 
-/// What became of a piece of work near the best plan.
+/// Result of a piece of work near the best plan.
 struct Piece {
     found: Option<Vec<Step>>,
     work: u64,
 }
 
 impl Strand<'_, '_> {
-    /// Looks for better plans near the best one, for so much work. `newest` is its number.
+    /// Searches for better plans near the best one, for at most `most` work. `newest` is the number
+    /// of the best plan.
     pub(super) fn refine(&mut self, nearby: &mut Nearby<'_>, newest: u64, most: u64) {
         let mut is_fresh = nearby.known != newest;
         nearby.known = newest;
@@ -83,7 +84,7 @@ impl Strand<'_, '_> {
             let Some(steps) = piece.found else { continue };
             match self.judge(&steps) {
                 Judged::Stopped => return,
-                // The choices are its own.
+                // The choices are the refiner's own.
                 Judged::Better => {}
                 Judged::NoBetter => self.counts.evaluated += steps.len() as u64,
                 Judged::Refused => {
@@ -95,7 +96,7 @@ impl Strand<'_, '_> {
         }
     }
 
-    /// Lets the refiner do something, and asks now and then whether to go on.
+    /// Runs a piece of the refiner's work, and regularly asks whether to continue.
     fn piece<'r>(
         &mut self,
         refiner: &mut Refiner<'r>,

@@ -1,24 +1,24 @@
-//! What becomes of the searches when the memory is used up: the one that has taken the most gives
-//! way, so that the others can go on.
+//! Handling of exhausted memory: the search that uses the most is abandoned, so that the others can
+//! continue.
 //!
-//! Which one that is must not depend on the number of threads. So it is told by what has been heard
-//! of them: those whose turn had not come, and the one that was stopped, may be further.
+//! The choice must not depend on the number of threads. So it uses the reported sizes only.
+//! Searches whose turn had not come, and the one that was stopped, may have progressed further.
 
 use super::super::answer::Stopped;
 use super::Planner;
 use super::improve::{Contest, Entrant};
 
-/// Of the memory, in eighths: searches for better plans give way before it is used up, so that none
-/// has to be stopped.
+/// Memory limit in eighths: searches for better plans are abandoned before the memory is exhausted,
+/// so that none has to be stopped.
 const FULL: usize = 7;
 
-/// The memory that its search takes.
+/// Returns the memory of the search.
 pub(super) fn taken(entrant: &Entrant<'_>) -> usize {
     let search = entrant.search.as_ref();
     search.map_or(0, |search| search.counts().memory)
 }
 
-/// The place of the largest, the first one of equals, if anything is taken.
+/// Returns the index of the largest positive size; of equal ones, the first.
 fn largest(sizes: impl Iterator<Item = usize>) -> Option<usize> {
     let taken = sizes.enumerate().filter(|&(_, size)| size > 0);
     taken
@@ -27,8 +27,9 @@ fn largest(sizes: impl Iterator<Item = usize>) -> Option<usize> {
 }
 
 impl<'a> Planner<'a> {
-    /// The memory was used up in the turn of the first of `running`; the rest of them come later. The largest
-    /// search gives way, and the others of these begin anew. `sizes`: what has been heard of how much they take.
+    /// Handles memory that was exhausted in the turn of the first of `running`; the rest of them
+    /// come later. Abandons the largest search and restarts the others of these. `sizes` are the
+    /// reported sizes.
     pub(super) fn make_room(
         &mut self,
         entrants: &mut [Entrant<'a>],
@@ -48,8 +49,8 @@ impl<'a> Planner<'a> {
         self.progress.counts.memory = entrants.iter().map(taken).sum();
     }
 
-    /// Lets searches for better plans give way while there is little memory left, if something else goes on:
-    /// for as long again as it has, once all searches are over.
+    /// Abandons searches for better plans while little memory is left, if refiners continue. After
+    /// all searches are over, the refiners get at least as much work again as they have had.
     pub(super) fn keep_room(&mut self, contest: &mut Contest<'a>) {
         let most = self.frame.settings.max_memory / 8 * FULL;
         while self.is_refining()
@@ -64,8 +65,9 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The memory was used up in a leg all the same, and what was stopped there may be anywhere: all searches
-    /// give way, and the search near the best plan begins anew. Whether that is possible.
+    /// Handles memory that was exhausted in a leg. Since the state of the stopped search is not
+    /// deterministic, all searches are abandoned, and the refiners restart. Returns `false` if this
+    /// is not possible.
     pub(super) fn clear_room(&mut self, contest: &mut Contest<'a>) -> bool {
         let mut entrants = contest.entrants.iter();
         if self.stopped != Some(Stopped::OutOfMemory)

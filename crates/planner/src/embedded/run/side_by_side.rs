@@ -1,22 +1,23 @@
-//! Strands of work side by side, such that nothing depends on how many threads there are.
+//! Concurrent strands of work, with results that do not depend on the number of threads.
 //!
-//! A strand is a piece of work that knows nothing of the others. What it reports is heard strand by
-//! strand, in their order, as if they had been carried out one after the other; with several threads
-//! the later ones have been at work meanwhile. So the same reports are heard in the same order, and
-//! whoever hears them can end the work at the same one.
+//! A strand is a piece of work that is independent of the others. Its reports are processed strand
+//! by strand, in their order, as if the strands had run one after the other. With several threads,
+//! later strands run in the meantime. So the receiver gets the same reports in the same order, and
+//! can stop the work at the same report.
 
 use super::strand::Report;
 
-/// Told of each report; whether to go on.
+/// Callback for each report. Returns `false` to stop.
 pub(super) type Tell<'t> = &'t mut dyn FnMut(Report) -> bool;
 
-/// A strand. Once it is told to stop, nobody listens to it any more.
+/// A strand. Its reports are ignored after it was stopped.
 pub(super) type Job<'s, R> = Box<dyn FnOnce(Tell<'_>) -> R + Send + 's>;
 
-/// Carries the strands out. Those whose turn has not come keep no more than `ahead` bytes each. `hear` is asked on this thread, with the number of the strand; when it says
-/// no, all is over, and the strands that come later are not asked for what they have found.
+/// Runs the strands. Strands whose turn has not come use at most `ahead` bytes each. `hear` is
+/// called on this thread with the number of the strand. When it returns `false`, all strands end,
+/// and the results of later strands are dropped.
 ///
-/// The results, in order; of all strands, if it has not been told to stop.
+/// Returns the results in order: those of all strands, unless `hear` has returned `false`.
 pub(super) fn side_by_side<R: Send>(
     jobs: Vec<Job<'_, R>>,
     (threads, ahead): (usize, usize),
@@ -52,16 +53,16 @@ mod threaded {
 
     use super::{Job, Report};
 
-    /// What a strand sends.
+    /// Message from a strand.
     enum Message<R> {
         Report(Report),
         Result(R),
     }
 
-    /// A strand that has not begun, its number, and where it sends what it has to tell.
+    /// A strand that has not begun, its number, and the channel for its messages.
     type Waiting<'s, R> = (usize, Job<'s, R>, Sender<Message<R>>);
 
-    /// The number of the strand that is listened to; `None` if all is over.
+    /// The number of the strand whose reports are processed; `None` if all strands must end.
     struct Turn {
         number: Mutex<Option<usize>>,
         changed: Condvar,
@@ -77,7 +78,7 @@ mod threaded {
             *self.number.lock().unwrap_or_else(PoisonError::into_inner)
         }
 
-        /// Waits until it is the turn of that strand, or all is over.
+        /// Waits for the turn of that strand, or for the end of all.
         fn wait(&self, strand: usize) {
             let turn = self.number.lock().unwrap_or_else(PoisonError::into_inner);
             let is_early = |turn: &mut Option<usize>| turn.is_some_and(|turn| turn < strand);
@@ -89,7 +90,7 @@ mod threaded {
         }
     }
 
-    /// All is over when this is dropped, also in a panic: then nobody waits for ever.
+    /// Ends all strands when dropped, also in a panic, so that no thread waits for ever.
     struct Ending<'t>(&'t Turn);
 
     impl Drop for Ending<'_> {
@@ -98,8 +99,8 @@ mod threaded {
         }
     }
 
-    /// As [`side_by_side`](super::side_by_side), by several threads. This one only listens: whoever
-    /// is asked may be tied to it.
+    /// As [`side_by_side`](super::side_by_side), with several threads. The calling thread only
+    /// receives, since `hear` may be bound to it.
     pub(super) fn carried_out<R: Send>(
         jobs: Vec<Job<'_, R>>,
         (threads, ahead): (usize, usize),
@@ -113,7 +114,8 @@ mod threaded {
             queue.push_back((number, job, sender));
             receivers.push(receiver);
         }
-        // The workers alone own it: if one of them panics, nobody waits for what it would have done.
+        // Only the workers own the queue: if one of them panics, its senders are dropped and the
+        // receivers do not block.
         let queue: Arc<Mutex<VecDeque<Waiting<'_, R>>>> = Arc::new(Mutex::new(queue));
         let turn = &Turn {
             number: Mutex::new(Some(0)),
@@ -157,7 +159,7 @@ mod threaded {
                 if report.counts.memory > ahead {
                     turn.wait(number);
                 }
-                // Nobody may be listening any more: then all is over.
+                // If the receiver is gone, the work is over.
                 let is_heard = sender.send(Message::Report(report)).is_ok();
                 is_heard && turn.get().is_some()
             });
@@ -170,7 +172,7 @@ mod threaded {
 mod tests {
     use super::*;
 
-    /// Strand `n` reports `n + 3` times, and gives how many reports it made.
+    /// Returns jobs; strand `n` reports `n + 3` times, and returns the number of its reports.
     fn jobs<'s>() -> Vec<Job<'s, (usize, u64)>> {
         let job = |number: usize| -> Job<'s, (usize, u64)> {
             Box::new(move |tell: Tell<'_>| {

@@ -1,5 +1,5 @@
-//! A strand of the work: a search, or what makes better plans of the best one, for a while. It knows
-//! the best plan that there was when it began, and tells others of its own plans by reports.
+//! A strand of work: a search or a refiner, for some time. It knows the best plan from its
+//! beginning, and passes on its own plans in reports.
 
 use std::sync::{Arc, OnceLock};
 
@@ -18,26 +18,26 @@ use super::super::needless::without_needless;
 use super::super::search::{Aim, Search, Turn};
 use super::side_by_side::Tell;
 
-/// How much work lies between two reports, in operators of estimates and what they change: about ten
-/// milliseconds.
+/// Work between two reports, in operators of estimates and their effects: about ten milliseconds.
 const REPORT_WORK: u64 = 2_000_000;
 
-/// Work that is counted for a turn of a search: a state is made, compared and stored.
+/// Work units of a turn of a search: a state is generated, compared and stored.
 const TURN_WORK: u64 = 8_000;
 
-/// Work that is counted for an operator of an estimate.
+/// Work units of an operator of an estimate.
 pub(super) const OPERATOR_WORK: u64 = 5;
 
-/// The number of looked-up pairs that lie between two reports at most: some milliseconds.
+/// Maximum number of pair lookups between two reports: some milliseconds.
 const REPORT_LOOKUPS: u64 = 4_000_000;
 
-/// What turns count for between two reports, at most, where each state is a linear program.
+/// Maximum weight of the turns between two reports if each state needs a linear program.
 const REPORT_SYMBOLIC_TURNS: u64 = 8;
 
-/// What turns count for between two reports, at most: one each, more where much is unsettled.
+/// Maximum weight of the turns between two reports: one each, more if many happenings are
+/// unsettled.
 const REPORT_TURNS: u64 = 256;
 
-/// What all strands have in common, and none changes.
+/// Immutable data shared by all strands.
 #[derive(Clone, Copy)]
 pub(in super::super) struct Frame<'a> {
     pub(in super::super) task: &'a Task,
@@ -48,7 +48,7 @@ pub(in super::super) struct Frame<'a> {
     pub(in super::super) compiled: &'a Compiled,
     /// Mutex pairs for incomplete searches, computed once the first plan takes longer.
     pub(in super::super) mutex_pairs: &'a OnceLock<Option<MutexPairs>>,
-    /// The most work between two reports, in operators of estimates.
+    /// The maximum work between two reports, in operators of estimates.
     pub(super) report_work: u64,
 }
 
@@ -76,7 +76,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// A plan, and the choices that it comes from.
+/// A plan, and the choices that led to it.
 #[derive(Debug)]
 pub(in super::super) struct Best {
     pub(super) found: Found,
@@ -90,28 +90,28 @@ impl Best {
     }
 }
 
-/// What a strand has to tell.
+/// Report of a strand.
 #[derive(Debug, Default)]
 pub(super) struct Report {
     pub(super) phase: Phase,
-    /// What the strand has done since it began.
+    /// Work of the strand since its beginning.
     pub(super) counts: Counts,
-    /// A plan that is better than any that the strand knows.
+    /// A plan that is better than any known to the strand.
     pub(super) found: Option<Arc<Best>>,
-    /// A plan that is being made better: if the work ends now, it will do.
+    /// A plan that is still being improved. It is used if the work ends now.
     pub(super) pending: Option<Arc<Best>>,
-    /// Whether the strand has ended; that is no question whether to go on.
+    /// `true` if the strand has ended. The receiver's answer is then ignored.
     pub(super) is_last: bool,
-    /// Whether it has seen everything, so that there is no need of others.
+    /// `true` if it has exhausted the search space, so that other strands are unnecessary.
     pub(super) has_seen_everything: bool,
 }
 
-/// See the module.
+/// Context of a strand: its best plan, its counts and its reports.
 pub(super) struct Strand<'a, 't> {
     pub(super) frame: Frame<'a>,
     /// The best plan that it knows.
     pub(super) best: Option<Arc<Best>>,
-    /// What it has done.
+    /// Work done so far.
     pub(super) counts: Counts,
     pub(super) phase: Phase,
     /// The work since the last report.
@@ -122,7 +122,7 @@ pub(super) struct Strand<'a, 't> {
     tell: Tell<'t>,
 }
 
-/// How much of its time a search may use: it goes on until it has had so many turns, or done so much.
+/// Limit on a search: it continues until it has had `turns` turns, or done `work` work.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Allowance {
     pub(super) turns: u64,
@@ -138,22 +138,22 @@ impl Allowance {
     }
 }
 
-/// The reason why a search no longer works.
+/// Reason for the end of a search's turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// It was told to.
+    /// It was stopped.
     Stopped,
     /// There is a better plan.
     Better,
-    /// There is nothing left to look at.
+    /// The search space is exhausted.
     Over,
     /// The turns are used up.
     TurnsSpent,
-    /// There are turns left, but it has done so much as it was to do.
+    /// There are turns left, but the work limit is reached.
     WorkDone,
 }
 
-/// What became of choices that were taken for a plan.
+/// Result of validating the choices of a candidate plan.
 pub(super) enum Judged {
     Refused,
     NoBetter,
@@ -180,7 +180,7 @@ impl<'a, 't> Strand<'a, 't> {
         }
     }
 
-    /// Tells what it has done, for the last time. The work since the last question.
+    /// Sends the last report. Returns the work since the previous report.
     pub(super) fn end(mut self, has_seen_everything: bool) -> u64 {
         self.settle();
         (self.tell)(Report {
@@ -193,14 +193,14 @@ impl<'a, 't> Strand<'a, 't> {
         self.unreported
     }
 
-    /// Counts what the thread has done since this was called last.
+    /// Adds the thread's work since the last call to the counts.
     fn settle(&mut self) {
         let now = work::spent();
         self.counts.work += now - self.settled;
         self.settled = now;
     }
 
-    /// Asks whether to go on.
+    /// Reports the progress. Returns `false` to stop.
     pub(super) fn ask(&mut self) -> bool {
         self.report(None, None)
     }
@@ -219,7 +219,8 @@ impl<'a, 't> Strand<'a, 't> {
         !self.is_stopped
     }
 
-    /// Lets a search look at states. Why it ended, how many turns that counts for, and the work.
+    /// Lets a search expand states. Returns the outcome, the number of turns that it counts for,
+    /// and the work.
     pub(super) fn work(
         &mut self,
         search: &mut Search<'_>,
@@ -260,8 +261,8 @@ impl<'a, 't> Strand<'a, 't> {
             }
             let result = search.turn();
             spent += search.price();
-            // To schedule and to judge a candidate takes longer than many turns, and one that is no
-            // better than the best plan may be followed by any number of others.
+            // Scheduling and validating a candidate takes longer than many turns, and a candidate
+            // that is no better than the best plan may be followed by any number of others.
             let mut is_report_due = false;
             match result {
                 Turn::Over => {
@@ -301,8 +302,9 @@ impl<'a, 't> Strand<'a, 't> {
         (outcome, spent, work_since(search, begin))
     }
 
-    /// Whether a search goes on though its turns are used up: it still comes nearer to a first plan.
-    /// One that does not compress works no more than a first round may come to.
+    /// Returns `true` if a search continues although its turns are used up, because it still
+    /// approaches a first plan. A search that does not compress works at most as much as a first
+    /// round.
     fn keeps_its_turn(&self, search: &Search<'_>, turns: u64, spent: u64) -> bool {
         let tuning = &self.frame.compiled.tuning;
         self.best.is_none()
@@ -319,7 +321,7 @@ impl<'a, 't> Strand<'a, 't> {
         counts.memory = before.0.memory + now.memory - start.memory;
     }
 
-    /// Lets the refiner, or what it is given, count its work, and asks now and then whether to go on.
+    /// Records work of the refiner or the clean-up, and regularly asks whether to continue.
     pub(super) fn counted(&mut self, before: u64, evaluated: u64, work: u64) -> bool {
         self.counts.evaluated = before + evaluated;
         work::spend(OPERATOR_WORK * work);
@@ -327,7 +329,7 @@ impl<'a, 't> Strand<'a, 't> {
         self.unreported < self.frame.report_work || self.ask()
     }
 
-    /// Asks the judge about the plan of these choices, and tells of it if it is better than the best.
+    /// Validates the plan of these choices, and reports it if it is better than the best plan.
     pub(super) fn judge(&mut self, steps: &[Step]) -> Judged {
         let Frame {
             task,
@@ -365,7 +367,7 @@ impl<'a, 't> Strand<'a, 't> {
         let pending = is_better.then(|| Arc::clone(&whole));
         let mut goes_on = || self.report(None, pending.clone());
         let (plan, verdict) = if constrained.is_some() {
-            // A constraint may need what the goal does not.
+            // A constraint may need steps that the goal does not need.
             (plan, verdict)
         } else {
             without_needless(task, situation, plan, verdict, &mut goes_on)
@@ -373,7 +375,7 @@ impl<'a, 't> Strand<'a, 't> {
         if self.is_stopped {
             return Judged::Stopped;
         }
-        // A metric can prefer what nothing needs, such as one that rewards time.
+        // A metric can prefer steps that nothing needs, for example if it rewards time.
         let fewer = best(self.value(plan, &verdict));
         let found = if whole.is_better_than(Some(&fewer)) {
             whole
@@ -391,7 +393,7 @@ impl<'a, 't> Strand<'a, 't> {
         }
     }
 
-    /// From now on only plans count that are better than the best one.
+    /// Restricts the search to plans that are better than the best one.
     fn demand_better(&self, search: &mut Search<'_>) {
         let Some(best) = &self.best else { return };
         let compiled = self.frame.compiled;

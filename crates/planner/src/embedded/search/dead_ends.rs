@@ -1,5 +1,5 @@
-//! Dead ends: states that the stronger bound (temporal `h²`) shows no plan to go through, and how
-//! often it is asked.
+//! Dead ends: states from which the stronger bound (temporal `h²`) proves that there is no plan,
+//! and the frequency of its computation.
 
 use super::super::compile::Compiled;
 use super::super::pairs::Pairs;
@@ -10,16 +10,16 @@ use super::super::time::{NEVER, Ticks};
 #[derive(Debug)]
 pub(super) struct DeadEnds<'a> {
     compiled: &'a Compiled,
-    /// Made when it is first asked.
+    /// Created at its first use.
     pairs: Option<Pairs<'a>>,
-    /// Whether there are too many pairs.
+    /// `true` if there are too many pairs.
     is_too_large: bool,
     budget: CheckBudget,
-    /// How much there is to an estimate.
+    /// Size of an estimate: number of operators.
     size: u64,
-    /// After how many states it is asked.
+    /// Number of states evaluated so far.
     pub(super) evaluated: u64,
-    /// Nothing may happen later.
+    /// Latest time of a happening.
     pub(super) horizon: Ticks,
 }
 
@@ -36,12 +36,13 @@ impl<'a> DeadEnds<'a> {
         }
     }
 
-    /// The number of pairs that have been looked up.
+    /// Returns the number of pairs that have been looked up.
     pub(super) fn lookups(&self) -> u64 {
         self.pairs.as_ref().map_or(0, |pairs| pairs.work)
     }
 
-    /// Whether no plan begins like this, as far as it is known, or worth the time to find out.
+    /// Returns `true` if the state is proved to be a dead end. Returns `false` without a check if
+    /// the budget does not permit one.
     pub(super) fn is_dead_end(&mut self, state: &State) -> bool {
         if self.pairs.is_none() && !self.is_too_large {
             self.pairs = Pairs::of(self.compiled);
@@ -63,19 +64,19 @@ impl<'a> DeadEnds<'a> {
     }
 }
 
-/// How much of the time the stronger bound may take: at first at most about half, if it cuts all
-/// states. Many that it cuts would never have had their turn, so cutting many need not save much;
-/// but the longer a search takes, the likelier it does, and the more is allowed.
+/// Share of the time that the stronger bound may take: at first at most about half, if it prunes
+/// all states. Many of the pruned states would never have been expanded, so the savings may be
+/// small. They are more likely the longer a search takes, so the share grows.
 ///
-/// Time is counted in pairs looked up; an estimate takes as long as some 80 of them for each of its
-/// operators.
+/// Time is measured in looked-up pairs. An estimate takes as long as about 80 of them for each of
+/// its operators.
 #[derive(Clone, Copy, Debug)]
 struct CheckBudget {
-    /// The number of pairs that may be looked up now.
+    /// Number of pairs that may be looked up now.
     credit: u64,
-    /// How many the last answer took.
+    /// Number of pairs looked up by the last check.
     price: u64,
-    /// How many of the last answers have cut a state, in 256ths.
+    /// Fraction of the last checks that pruned a state, in 256ths.
     cuts: u64,
 }
 
@@ -86,14 +87,14 @@ impl CheckBudget {
         cuts: 64,
     };
 
-    /// One more state with an estimate of that size; a larger share of the time may be taken the
-    /// longer the search takes. Whether to ask.
+    /// Adds the credit for one more state with an estimate of size `size`. `share` grows with the
+    /// duration of the search. Returns `true` if a check is permitted.
     fn asks(&mut self, size: u64, share: u64) -> bool {
         self.credit = (self.credit + (16 + self.cuts * share / 4) * size).min(2 * self.price);
         self.credit >= self.price
     }
 
-    /// An answer took so many look-ups.
+    /// Records a check that looked up `price` pairs.
     fn note(&mut self, price: u64, has_cut: bool) {
         self.price = price;
         self.credit = self.credit.saturating_sub(price);

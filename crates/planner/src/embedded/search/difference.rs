@@ -1,14 +1,15 @@
-//! The difference between two settled states, as a short sequence of bytes.
+//! Difference between two settled states, as a short sequence of bytes.
 //!
-//! Numbers are written in groups of seven bits, small ones first. Of lists, only what changed is written: the
-//! distance from the last place that changed, and the change; 0 ends the list.
+//! Numbers are written in groups of seven bits, the low ones first. For lists, only the changes are
+//! written: the distance from the last changed position, and the change; 0 ends the list.
 
 use elbowroom_num::Rational;
 
 use super::super::state::State;
 use super::super::time::Ticks;
 
-/// Writes how `state` differs from `base`. `None` if it has a number that is too large.
+/// Writes the difference of `state` from `base`. Returns `None` if it contains a number that is too
+/// large.
 pub(super) fn write(base: &State, state: &State, bytes: &mut Vec<u8>) -> Option<()> {
     put(bytes, u64::from(state.timed));
     let mut places = Places::default();
@@ -35,12 +36,12 @@ pub(super) fn write(base: &State, state: &State, bytes: &mut Vec<u8>) -> Option<
     Some(())
 }
 
-/// The number of annotations that are compared at once.
+/// Number of annotations that are compared at once.
 const BLOCK: usize = 16;
 
 fn put_annotations(bytes: &mut Vec<u8>, base: &State, state: &State) {
     let mut places = Places::default();
-    // Most of them are as late as the one before.
+    // Most of them are equal to the one before.
     let mut before = state.settled_end;
     let blocks = base.annotations.chunks(BLOCK);
     for (block, (old, new)) in blocks.zip(state.annotations.chunks(BLOCK)).enumerate() {
@@ -79,7 +80,8 @@ pub(super) fn apply(bytes: &[u8], state: &mut State) {
     }
 }
 
-/// Changes the facts as was written, and returns the number of timed initials that have happened.
+/// Applies the written changes of facts, and returns the number of timed initials that have
+/// happened.
 pub(super) fn apply_facts(bytes: &[u8], facts: &mut [u64]) -> u32 {
     let mut bytes = Bytes(bytes);
     let timed = bytes.take_timed();
@@ -87,10 +89,10 @@ pub(super) fn apply_facts(bytes: &[u8], facts: &mut [u64]) -> u32 {
     timed
 }
 
-/// The places of a list, in ascending order.
+/// The positions of a list, in ascending order.
 #[derive(Default)]
 struct Places {
-    /// The last one, and one more.
+    /// The last position plus one.
     last: usize,
 }
 
@@ -113,7 +115,7 @@ fn low_bits(number: u64) -> u8 {
     number.to_le_bytes()[0] & 0x7f
 }
 
-/// Writes a number of either sign so that small ones are short.
+/// Writes a signed number so that small absolute values are short.
 fn put_signed(bytes: &mut Vec<u8>, number: i64) {
     put(bytes, ((number << 1) ^ (number >> 63)).cast_unsigned());
 }
@@ -122,7 +124,7 @@ fn put_change(bytes: &mut Vec<u8>, old: Ticks, new: Ticks) {
     put_signed(bytes, new.wrapping_sub(old));
 }
 
-/// Writes the denominator and the numerator; a denominator of 0 for nothing.
+/// Writes the denominator and the numerator; a denominator of 0 for no value.
 fn put_number(bytes: &mut Vec<u8>, number: Option<&Rational>) -> Option<()> {
     let Some(number) = number else {
         put(bytes, 0);
@@ -160,7 +162,7 @@ impl Bytes<'_> {
         }
     }
 
-    /// Goes to the next place of a list, counted from 1. Returns `false` at the end.
+    /// Moves to the next position of a list, counted from 1. Returns `false` at the end.
     fn moves(&mut self, place: &mut usize) -> bool {
         let distance = usize::try_from(self.take()).unwrap_or(usize::MAX);
         *place += distance;
@@ -214,7 +216,7 @@ mod tests {
             })
     }
 
-    /// Takes some parts of one state and the others of another one.
+    /// Returns a state with some parts of one state and the others of another one.
     fn mixed(one: &State, other: &State, choices: &[bool]) -> State {
         let mut mixed = one.clone();
         let mut choices = choices.iter().cycle();

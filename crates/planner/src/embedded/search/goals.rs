@@ -1,4 +1,4 @@
-//! Whether a plan could end in a state, and what led there.
+//! Goal test, and the steps that lead to a state.
 
 use std::borrow::Cow;
 
@@ -10,12 +10,12 @@ use super::super::state::State;
 use super::super::symbolic;
 use super::{ROOT, Search};
 
-/// Whether a plan could end here.
+/// Returns `true` if a plan can end in this state.
 pub(crate) fn is_goal(compiled: &Compiled, state: &State) -> bool {
     if !state.open.is_empty() {
         return false;
     }
-    // The goal is read after all that happens by itself.
+    // The goal is evaluated after all timed initials.
     let mut stepper = Stepper::new(compiled);
     let mut state = Cow::Borrowed(state);
     while state.timed < compiled.timed_until_goal {
@@ -31,7 +31,8 @@ pub(crate) fn is_goal(compiled: &Compiled, state: &State) -> bool {
     }
 }
 
-/// Returns `true` if the numbers that are left after the ends of all running actions do not meet the goal.
+/// Returns `true` if the numbers that remain after the ends of all running actions do not satisfy
+/// the goal.
 pub(super) fn misses_goal(compiled: &Compiled, state: &State) -> bool {
     let settled = |fluent| symbolic::settled_value(compiled, state, fluent);
     !compiled.goal.may_hold(&mut |test| {
@@ -49,7 +50,7 @@ pub(super) fn misses_goal(compiled: &Compiled, state: &State) -> bool {
 }
 
 impl Search<'_> {
-    /// The choices that lead to a state.
+    /// Returns the choices that lead to a state.
     pub(super) fn steps_to(&mut self, mut number: u32) -> Vec<Step> {
         let mut steps = Vec::new();
         loop {
@@ -67,15 +68,15 @@ impl Search<'_> {
         steps
     }
 
-    /// Whether the metric of a state in which the goal holds may be within the limit. This is for
-    /// metrics that do not only grow, and spares the judge.
+    /// Returns `true` if the metric of a goal state may be within the limit. For metrics that do
+    /// not only grow, this avoids unnecessary validation.
     pub(super) fn may_be_better(&self, state: &State) -> bool {
         let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
             return true;
         };
         let mut to_come = self.compiled.timed[state.timed as usize..].iter();
         if to_come.any(|timed| !timed.assigns.is_empty()) {
-            // The metric counts after all timed initials, too.
+            // The metric also counts after all timed initials.
             return true;
         }
         let spent = state.spent(metric);

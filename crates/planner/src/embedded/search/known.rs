@@ -1,23 +1,23 @@
-//! What has been looked at before.
+//! Duplicate detection: states that have been visited.
 
 use super::super::state::{Projection, State};
 use super::Search;
 use super::states::is_settled;
 
-/// The numbers of states by their hash: a table of lists, the newest state of each first.
+/// State numbers by hash: a table of lists, each with the newest state first.
 #[derive(Debug, Default)]
 pub(super) struct Hashes {
-    /// For each value of the low bits the newest state, or [`END`]; a power of two of them.
+    /// For each value of the low bits, the newest state, or [`END`]. The length is a power of two.
     newest: Vec<u32>,
-    /// For each state half of its hash, and the one before it in its list.
+    /// For each state, half of its hash, and the previous state in its list.
     states: Vec<(u32, u32)>,
 }
 
-/// No state comes before.
+/// End of a list.
 const END: u32 = u32::MAX;
 
 impl Hashes {
-    /// An estimate of the memory that a state takes, in bytes.
+    /// Approximate memory of a state, in bytes.
     pub(super) const MEMORY_OF_STATE: usize = 16;
 
     /// Adds the next state.
@@ -41,7 +41,7 @@ impl Hashes {
         half as usize & (self.newest.len() - 1)
     }
 
-    /// The states with this hash, and perhaps few others.
+    /// Returns the states with this hash, and perhaps a few others.
     pub(super) fn like(&self, hash: u64) -> impl Iterator<Item = u32> {
         let half = half(hash);
         let mut next = if self.newest.is_empty() {
@@ -69,7 +69,7 @@ fn half(hash: u64) -> u32 {
 }
 
 impl Search<'_> {
-    /// Whether a state that is at least as good has been looked at.
+    /// Returns `true` if a state that is at least as good has been visited.
     pub(super) fn is_known(
         &mut self,
         hash: u64,

@@ -1,4 +1,4 @@
-//! The landmarks of a search that counts them, and what a state lacks.
+//! The landmarks of a search that counts them, and the landmarks that a state lacks.
 
 use super::super::landmarks::Landmarks;
 use super::super::mutex::Mutexes;
@@ -8,21 +8,21 @@ use super::super::tuning::IS_WHOLE;
 use super::novelty::goals_left;
 use super::{Search, Turn};
 
-/// The work of one turn of finding landmarks, for each unit of what an estimate may take.
+/// Work of a turn that searches for landmarks, per unit of the maximum work of an estimate.
 const WORK_OF_TURN: u64 = 4;
 
-/// What a search knows of the landmarks.
+/// State of the landmarks in a search.
 #[derive(Debug)]
 pub(super) enum SearchLandmarks {
     Unknown,
-    /// They are being found. So much has been done.
+    /// The landmarks are being computed. The number is the work done so far.
     InTheMaking(Box<Labels>, u64),
     Known(Landmarks),
 }
 
 impl Search<'_> {
-    /// Finds the landmarks from the first state on, if they count, a part of them in each turn. `None` if
-    /// nothing of that is left to do.
+    /// Computes the landmarks of the first state, if they count, a part of them in each turn.
+    /// Returns `None` when this is finished.
     pub(super) fn find_landmarks(&mut self, initial: &State) -> Option<Turn> {
         if !self.strategy.counts_landmarks {
             return None;
@@ -39,7 +39,7 @@ impl Search<'_> {
                 if is_all {
                     let graph = self.relaxed.graph();
                     let found = Landmarks::of(graph, &labels, &initial.open);
-                    // Without any on the way to the goal, they count no more than parts of the goal.
+                    // If all landmarks are goals, they are no better than counting goals.
                     let is_only = self.compiled.tuning.only.is_some();
                     let found = found.filter(|found| found.on_the_way > 0 || is_only);
                     found.map(|mut landmarks| {
@@ -63,7 +63,7 @@ impl Search<'_> {
         };
         self.labour += WORK_OF_TURN;
         let Some(found) = found else {
-            // Without landmarks, this search is none.
+            // Without landmarks, this search has no purpose.
             self.has_lost = true;
             return Some(Turn::Over);
         };
@@ -71,8 +71,9 @@ impl Search<'_> {
         Some(Turn::Nothing)
     }
 
-    /// The landmarks accepted after a choice that led to the state, and how many are left; where novelty
-    /// counts without landmarks, how much of the goal is left.
+    /// Returns the accepted landmarks after a choice that led to the state, and the number of
+    /// remaining ones. Where novelty counts without landmarks, returns the number of remaining
+    /// goals.
     pub(super) fn left(&self, parent: u32, state: &State) -> (Vec<u64>, u32) {
         if let SearchLandmarks::Known(landmarks) = &self.landmarks {
             let parent = self.nodes.get(parent as usize);

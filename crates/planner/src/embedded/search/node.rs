@@ -9,26 +9,26 @@ use super::novelty::Progress;
 use super::runaway::Drift;
 use super::waiting::Waiting;
 
-/// A node. Its state is stored elsewhere, as most searches need little memory for a node.
+/// A node. Its state is stored separately, as most searches need little memory for a node.
 #[derive(Debug)]
 pub(super) struct Node {
-    /// The node before it, and the step that led here.
+    /// The previous node, and the step that led here.
     pub(super) origin: Waiting,
-    /// The number of goals or landmarks left, where that matters.
+    /// The number of remaining goals or landmarks, where that matters.
     pub(super) left: u32,
     /// Number of its [accepted landmarks](SharedNotes::accepted), or [`NONE`].
     pub(super) accepted: u32,
     /// Number of its [progress](SharedNotes::progress), or [`NONE`].
     pub(super) progress: u32,
     pub(super) dead_end: DeadEnd,
-    /// `None` if there is nothing to note.
+    /// `None` if there are no notes.
     pub(super) notes: Option<Box<Notes>>,
 }
 
 /// Notes about a state, for some searches.
 #[derive(Debug, Default)]
 pub(super) struct Notes {
-    /// The part of the unsettled past that matters, in a search that compares it exactly.
+    /// The relevant part of the unsettled happenings, in a search that compares it exactly.
     pub(super) projection: Option<Box<Projection>>,
     /// For problems with numbers.
     pub(super) drift: Drift,
@@ -39,7 +39,7 @@ impl Notes {
         self.projection.is_some() || !compiled.fluents.is_empty()
     }
 
-    /// An estimate of the memory that they take, in bytes.
+    /// Returns an estimate of the memory, in bytes.
     pub(super) fn size(&self) -> usize {
         let projection = self.projection.as_ref();
         size_of::<Self>() + projection.map_or(0, |projection| projection.size())
@@ -57,23 +57,23 @@ impl Node {
 /// The stronger bound's verdict on a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum DeadEnd {
-    /// It was not asked.
+    /// Not computed.
     Unchecked,
-    /// There may be a plan, or such checks have been given up.
+    /// No proof was found, or the budget did not permit a check.
     Unproved,
-    /// No plan goes through the state.
+    /// No plan passes through the state.
     Proved,
 }
 
 /// No shared note.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Notes that many nodes have in common.
+/// Notes shared by many nodes.
 #[derive(Debug, Default)]
 pub(super) struct SharedNotes {
     /// The landmarks accepted on the way to a node, where they count.
     pub(super) accepted: Shared<Box<[u64]>>,
-    /// Progress on the path to a node, in a search for new successors.
+    /// Progress on the path to a node, in a search by the novelty of successors.
     pub(super) progress: Shared<Progress>,
 }
 
@@ -91,11 +91,12 @@ impl<T> Default for Shared<T> {
     }
 }
 
-/// An estimate of the memory that a table needs for an entry, in bytes, without the value.
+/// Approximate memory of a table entry, in bytes, without the value.
 const MEMORY_OF_ENTRY: usize = 32;
 
 impl<T: Hash + Eq> Shared<T> {
-    /// Returns the number of a value, and the memory that it takes if it is new. `size`: that of the value.
+    /// Returns the number of a value, and the memory of the entry if the value is new. `size` is
+    /// the size of the value.
     pub(super) fn number(&mut self, value: T, size: usize) -> (u32, usize) {
         let (number, known) = self.values.insert_full(value, ());
         let memory = known.map_or(MEMORY_OF_ENTRY + size, |()| 0);

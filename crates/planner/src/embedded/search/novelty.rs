@@ -1,13 +1,14 @@
-//! How new a state is.
+//! Novelty of states.
 //!
-//! A state is the newer, the smaller the sets of facts are that no state had before of the same
-//! worth: single facts, or pairs. What is new comes first, whatever an estimate says: so a search
-//! leaves plateaus on which an estimate is blind.
+//! A state is more novel, the smaller the sets of facts are that no earlier state of the same worth
+//! contained: single facts, or pairs. Novel states come first, regardless of their estimate. So a
+//! search leaves plateaus of the estimate.
 //!
-//! This is best-first width search (Lipovetzky & Geffner, AAAI 2017), in two forms. In BFWS(f₂) the
-//! worth of a state is how many goals it lacks, and its estimate. In BFWS(f₅) it is how many goals
-//! it lacks, and how much of a relaxed plan has been brought about on the way to it since that
-//! number last fell; that needs no estimate, but for a relaxed plan where the number falls.
+//! This is best-first width search (Lipovetzky & Geffner, AAAI 2017), in two forms. In BFWS(f₂),
+//! the worth of a state is its number of unachieved goals and its estimate. In BFWS(f₅), it is the
+//! number of unachieved goals, and the number of facts of a relaxed plan that were achieved since
+//! this number last decreased. That needs no estimate, except for a relaxed plan where the number
+//! decreases.
 
 use super::super::compile::Compiled;
 use super::super::formula::{Formula, Literal};
@@ -18,11 +19,12 @@ use super::super::state::State;
 #[derive(Debug)]
 pub(super) struct Novelty {
     looks_at_pairs: bool,
-    /// For each worth, a bit for each fact; then for each fact a bit for each fact up to it, in words of its own.
+    /// For each worth, a bit for each fact; then for each fact a bit for each fact up to it, in
+    /// separate words.
     seen: Map<(u32, u32), Vec<u64>>,
     /// Number of words of these that were read.
     words: u64,
-    /// The effects of relaxed plans, of states in which a goal was reached.
+    /// The effects of the relaxed plans of states that reached a goal.
     relaxed_plans: Vec<Vec<Literal>>,
 }
 
@@ -30,19 +32,19 @@ pub(super) struct Novelty {
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Progress {
     goals_left: u32,
-    /// The relaxed plan of the last state in which a goal was reached.
+    /// Number of the relaxed plan of the last state that reached a goal.
     relaxed_plan: u32,
-    /// Which of its literals were true since, a bit for each.
+    /// The literals of that plan that were true since, as a bit set.
     reached: Box<[u64]>,
 }
 
 impl Progress {
-    /// Whether a successor that lacks so many goals has one more.
+    /// Returns `true` if a successor with `left` remaining goals has reached one more goal.
     pub(super) fn has_new_goal(&self, left: u32) -> bool {
         left < self.goals_left
     }
 
-    /// An estimate of the memory it takes, in bytes.
+    /// Returns an estimate of the memory, in bytes.
     pub(super) fn size(&self) -> usize {
         size_of::<Self>() + 8 * self.reached.len()
     }
@@ -58,7 +60,8 @@ impl Novelty {
         }
     }
 
-    /// How far the way to a state has come, whose relaxed plan brings these literals about.
+    /// Returns the progress on the path to a state, whose relaxed plan achieves the literals
+    /// `subgoals`.
     pub(super) fn progress(
         &mut self,
         state: &State,
@@ -88,8 +91,8 @@ impl Novelty {
         &self.relaxed_plans[progress.relaxed_plan as usize]
     }
 
-    /// The worth of a successor: how many goals it lacks, and how much of the relaxed plan has been
-    /// reached.
+    /// Returns the worth of a successor: the number of remaining goals, and the number of achieved
+    /// literals of the relaxed plan.
     pub(super) fn worth(&self, state: &State, left: u32, before: &Progress) -> (u32, u32) {
         if left < before.goals_left {
             return (left, 0);
@@ -101,8 +104,8 @@ impl Novelty {
         (left, u32::try_from(reached.count()).unwrap_or(u32::MAX))
     }
 
-    /// 1 if the state has a fact that no state of that worth had before, 2 if it has such a pair,
-    /// 3 otherwise; and how much memory it takes to remember that.
+    /// Returns 1 if the state has a fact that no earlier state of that worth had, 2 if it has such
+    /// a pair, 3 otherwise. Also returns the additional memory.
     pub(super) fn of(
         &mut self,
         compiled: &Compiled,
@@ -129,7 +132,7 @@ impl Novelty {
         (novelty, memory)
     }
 
-    /// Number of words of known facts and pairs that were read.
+    /// Returns the number of words of known facts and pairs that were read.
     pub(super) fn words(&self) -> u64 {
         self.words
     }
@@ -153,16 +156,16 @@ fn newness(seen: &mut [u64], facts: &[u64], looks_at_pairs: bool) -> (i64, u64) 
     (novelty, words as u64)
 }
 
-/// Number of words for the pairs of the facts before this one.
+/// Returns the number of words for the pairs of the facts before this one.
 ///
-/// A fact has one word for each 64 facts up to it. Its last word may contain a pair for a second time, which is new
-/// exactly if it is new in the other place.
+/// A fact has one word for each 64 facts up to it. Its last word may contain a pair for a second
+/// time, which is new exactly if it is new in the other position.
 fn row(fact: usize) -> usize {
     let (whole, rest) = (fact / 64, fact % 64);
     64 * (whole * (whole + 1) / 2) + rest * (whole + 1)
 }
 
-/// The places of the bits that are set.
+/// Returns the positions of the set bits.
 fn bits(words: &[u64]) -> impl Iterator<Item = usize> + '_ {
     words.iter().enumerate().flat_map(|(place, &word)| {
         let mut left = word;
@@ -174,7 +177,7 @@ fn bits(words: &[u64]) -> impl Iterator<Item = usize> + '_ {
     })
 }
 
-/// Adds facts to those seen; whether one is new. `seen` may have fewer words.
+/// Adds facts to those seen. Returns `true` if one is new. `seen` may have fewer words.
 fn remember(seen: &mut [u64], facts: &[u64]) -> bool {
     let mut is_new = false;
     for (seen, facts) in seen.iter_mut().zip(facts) {
@@ -184,7 +187,7 @@ fn remember(seen: &mut [u64], facts: &[u64]) -> bool {
     is_new
 }
 
-/// How many conjuncts of the goal do not hold.
+/// Returns the number of conjuncts of the goal that do not hold.
 pub(super) fn goals_left(compiled: &Compiled, state: &State) -> u32 {
     let goal: &Formula = &compiled.goal;
     let literals = goal.literals.iter().filter(|l| !l.holds(&state.facts));
@@ -208,7 +211,7 @@ mod tests {
 
     use super::*;
 
-    /// Sets of facts and of pairs, as the definition has them.
+    /// Sets of facts and of pairs, as in the definition.
     #[derive(Default)]
     struct Twin {
         facts: BTreeSet<usize>,

@@ -1,11 +1,11 @@
-//! Queues of waiting successors, by rank.
+//! Queues of successors, by rank.
 
 use std::collections::BTreeMap;
 
 use super::super::apply::Step;
 use super::waiting::{Waiting, WaitingList};
 
-/// Successors by rank, the lowest first; of one rank, first come first served.
+/// Successors by rank, the lowest first; within a rank, in order of insertion.
 #[derive(Debug, Default)]
 pub(super) struct Queue {
     buckets: BTreeMap<i64, WaitingList>,
@@ -17,17 +17,17 @@ impl Queue {
         self.buckets.is_empty()
     }
 
-    /// Adds a successor, and returns the number of bytes that it takes.
+    /// Adds a successor, and returns its memory in bytes.
     pub(super) fn push(&mut self, rank: i64, waiting: Waiting) -> usize {
         self.buckets.entry(rank).or_default().push_back(waiting)
     }
 
-    /// The first one, and its rank.
+    /// Removes the first successor. Returns it with its rank.
     pub(super) fn pop(&mut self) -> Option<(i64, Waiting)> {
         self.pop_from(false)
     }
 
-    /// Puts successors of a state before all others of that rank.
+    /// Inserts successors of a state before all others of that rank.
     pub(super) fn put_back(&mut self, rank: i64, parent: u32, steps: &[Step]) {
         if steps.is_empty() {
             return;
@@ -38,10 +38,11 @@ impl Queue {
         }
     }
 
-    /// The same as [`pop`](Queue::pop), but of the first rank the newest and the oldest take turns.
+    /// As [`pop`](Queue::pop), but alternates between the newest and the oldest successor of the
+    /// first rank.
     ///
-    /// The oldest first, a search looks at all of a plateau before it goes on from any of its
-    /// states; the newest first, it goes straight on, and plans are long.
+    /// With the oldest first, a search visits a whole plateau before it continues from any of its
+    /// states. With the newest first, it proceeds depth-first, and plans are long.
     pub(super) fn pop_alternately(&mut self) -> Option<(i64, Waiting)> {
         self.is_turn_of_newest = !self.is_turn_of_newest;
         self.pop_from(self.is_turn_of_newest)

@@ -1,34 +1,34 @@
-//! Sequences of steps that only change numbers and come no nearer to the goal.
+//! Detection of sequences of steps that only change numbers and do not approach the goal.
 //!
-//! Numbers have no bound, so such a sequence can be infinite, each state of it new. After some steps, each
-//! further one adds to the rank.
+//! Numbers are unbounded, so such a sequence can be infinite, with each of its states new. After
+//! some steps, each further one increases the rank.
 
 use super::super::state::State;
 use super::{Node, Search};
 
-/// The number of such steps that are free.
+/// Number of such steps without a penalty.
 const FREE: u32 = 8;
 
 /// Length of the latest part of a state's path that only changed numbers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Drift {
-    /// Hash of all but the numbers.
+    /// Hash of the state without numbers.
     facts: u64,
     estimate: u32,
-    /// The number of earlier states with the same facts, one or two steps apart, none of them with a higher
-    /// estimate than the next one.
+    /// Number of earlier states with the same facts, one or two steps apart, none of them with a
+    /// higher estimate than the next one.
     length: u32,
 }
 
 impl Drift {
-    /// Its addition to the rank.
+    /// Returns the addition to the rank.
     pub(super) fn penalty(self) -> i64 {
         i64::from(self.length.saturating_sub(FREE))
     }
 }
 
 impl Search<'_> {
-    /// Returns the drift of a state that a step from `parent` led to.
+    /// Returns the drift of a state that is reached by a step from `parent`.
     pub(super) fn drift(&self, parent: u32, state: &State, estimate: u32) -> Drift {
         if self.compiled.fluents.is_empty() {
             return Drift::default();

@@ -1,8 +1,8 @@
-//! The states of a search, kept as differences to the states that they came from.
+//! The states of a search, stored as differences to their parents.
 //!
-//! A step changes few facts and annotations, while a state may have thousands of both. So a state is stored as
-//! the difference to its parent, or, after a number of steps, to the first state. It is restored when its
-//! successors have their turns. A small cache has the states used last.
+//! A step changes few facts and annotations, while a state may have thousands of both. So a state
+//! is stored as the difference to its parent, or, after a number of steps, to the first state. It
+//! is restored when its successors are expanded. A small cache holds the states used last.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,7 +11,8 @@ use super::super::network::SETTLED;
 use super::super::state::State;
 use super::difference;
 
-/// The longest chain of differences. The next one is to the first state, so that restoring takes few steps.
+/// The maximum length of a chain of differences. The next difference is to the first state, so that
+/// restoring takes few steps.
 const MOST_LINKS: u8 = 8;
 
 /// The number of states in the cache.
@@ -20,7 +21,7 @@ const MOST_RECENT: usize = 8;
 /// The number of bytes that are allocated together.
 const CHUNK: usize = 1 << 16;
 
-/// See the module. The first state is number 0.
+/// Storage of states by number. The first state is number 0.
 #[derive(Debug, Default)]
 pub(super) struct States {
     kept: Vec<Kept>,
@@ -28,26 +29,26 @@ pub(super) struct States {
     /// times.
     whole: Vec<Arc<State>>,
     chunks: Vec<Vec<u8>>,
-    /// The states used last, the last one at the end.
+    /// The states used last; the most recent one is at the end.
     recent: VecDeque<(u32, Arc<State>)>,
     /// The difference that is being written.
     written: Vec<u8>,
 }
 
-/// The place of a state.
+/// Location of a stored state.
 #[derive(Clone, Copy, Debug)]
 struct Kept {
-    /// The state that it differs from; [`WHOLE`] if it is no difference.
+    /// The state that it differs from; [`WHOLE`] if it is stored completely.
     base: u32,
-    /// The chunk and the place in it, where the number of links and the difference begin; or the place among
-    /// whole states.
+    /// The chunk and the position in it of the number of links, which the difference follows; or
+    /// the index among whole states.
     place: u32,
 }
 
 const WHOLE: u32 = u32::MAX;
 
 impl States {
-    /// Keeps a state that came from `parent`, and returns the memory that it takes, in bytes. The first state
+    /// Stores a state whose parent is `parent`, and returns its memory in bytes. The first state
     /// has no parent.
     pub(super) fn push(&mut self, parent: Option<u32>, state: State) -> usize {
         let number = u32::try_from(self.kept.len()).expect("memory is used up long before");
@@ -88,7 +89,7 @@ impl States {
         state.size() + 32
     }
 
-    /// Copies the new difference into a chunk. `None` if it does not fit.
+    /// Copies the new difference into a chunk. Returns `None` if it does not fit.
     fn store(&mut self) -> Option<u32> {
         let length = self.written.len();
         let has_room = |chunk: &Vec<u8>| chunk.len() + length <= CHUNK;
@@ -105,7 +106,7 @@ impl States {
         Some(place)
     }
 
-    /// The number of links to the next whole state, and the difference.
+    /// Returns the number of links to the next whole state, followed by the difference.
     fn written_at(&self, number: u32) -> &[u8] {
         let place = self.kept[number as usize].place as usize;
         &self.chunks[place / CHUNK][place % CHUNK..]
@@ -127,7 +128,7 @@ impl States {
         state
     }
 
-    /// The state, if it need not be restored.
+    /// Returns the state if it need not be restored.
     pub(super) fn whole_or_recent(&self, number: u32) -> Option<&Arc<State>> {
         self.whole(number).or_else(|| {
             let mut recent = self.recent.iter().rev();
@@ -141,12 +142,13 @@ impl States {
         (kept.base == WHOLE).then(|| &self.whole[kept.place as usize])
     }
 
-    /// Returns `true` if something in the state is not settled.
+    /// Returns `true` if some part of the state is not settled.
     pub(super) fn is_unsettled(&self, number: u32) -> bool {
         self.whole(number).is_some_and(|whole| !is_settled(whole))
     }
 
-    /// Returns `true` if facts and number of timed initials are the same in both states. `facts` is a buffer.
+    /// Returns `true` if the facts and the number of timed initials are the same in both states.
+    /// `facts` is a buffer.
     pub(super) fn has_facts_of(&self, number: u32, state: &State, facts: &mut Vec<u64>) -> bool {
         facts.clone_from(&state.facts);
         let (mut base, mut timed) = (number, None);
@@ -154,7 +156,7 @@ impl States {
             if let Some(whole) = self.whole(base) {
                 break whole;
             }
-            // Changes of facts undo themselves, in any order.
+            // Changes of facts are their own inverse, in any order.
             let of_link = difference::apply_facts(&self.written_at(base)[1..], facts);
             timed = timed.or(Some(of_link));
             base = self.kept[base as usize].base;
@@ -206,7 +208,7 @@ impl States {
     }
 }
 
-/// Returns `true` if all happenings have their times, and no action is under way.
+/// Returns `true` if all happenings have fixed times, and no action is running.
 pub(super) fn is_settled(state: &State) -> bool {
     state.open.is_empty()
         && state.network.is_empty()
@@ -215,7 +217,7 @@ pub(super) fn is_settled(state: &State) -> bool {
         && state.symbolic.is_none()
 }
 
-/// Copies what a difference is about.
+/// Copies the parts of a state that a difference covers.
 fn copy(from: &State, to: &mut State) {
     to.facts.clone_from(&from.facts);
     to.values.clone_from(&from.values);

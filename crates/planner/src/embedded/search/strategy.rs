@@ -1,75 +1,80 @@
-//! How a search goes about it.
+//! Strategies of searches.
 
 use super::super::compile::{Compiled, Compressibility};
 use super::super::relaxed::Relaxed;
 use super::super::tuning::{Member, Technique, Tuning};
 
-/// How a search goes about it.
+/// Strategy of a search.
 #[derive(Clone, Copy, Debug)]
 #[allow(
     clippy::struct_excessive_bools,
     reason = "each is one way to go about it, and any of them may be combined"
 )]
 pub(crate) struct Strategy {
-    /// If present, actions that can be compressed at least so safely are, and states are compared
-    /// roughly. Some plans are lost.
+    /// If present, actions that are at least as safe to compress are compressed, and states are
+    /// compared approximately. Some plans are lost.
     pub(crate) compresses: Option<Compressibility>,
-    /// `true` if envelopes that have macro-operators start as parts of these only. Some plans are lost.
+    /// `true` if envelopes with macro-operators start only as parts of these. Some plans are lost.
     pub(crate) uses_macros: bool,
-    /// How many states that differ in times only are kept; more are dropped, and some plans lost.
+    /// Maximum number of states that differ only in times. Further ones are dropped, and some plans
+    /// lost.
     pub(crate) variants: usize,
-    /// Whether what is chosen later also happens later, or at the same time. Then it is known, of
-    /// what is under way, by when it must be over. Some plans are lost.
+    /// `true` if later choices happen no earlier. The latest ends of the running actions are then
+    /// known. Some plans are lost.
     pub(crate) is_chronological: bool,
-    /// Whether what is new comes first, and then what has more of the goal; and whether successors
-    /// are looked at one by one for that, or the states that are expanded.
+    /// If present, novel states come first, and then states with more goals achieved. The value
+    /// selects whether the novelty of each successor or of each expanded state is computed.
     pub(crate) novelty: Option<NoveltyOf>,
-    /// Whether the landmarks left come before the estimate, or count as what is left of the goal.
+    /// `true` if the number of remaining landmarks has priority over the estimate, or counts as the
+    /// number of remaining goals.
     pub(crate) counts_landmarks: bool,
-    /// Whether relaxed plans draw on what is never filled up.
+    /// `true` if relaxed plans account for consumables, which are never replenished.
     pub(crate) draws_on_consumables: bool,
-    /// Whether what is used up and never filled up is spared.
+    /// `true` if consumables are saved.
     pub(crate) saves_consumables: bool,
-    /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
+    /// `true` if the estimate accounts for the resources that a relaxed plan uses up, and
+    /// replenishes them.
     pub(crate) replenishes: bool,
-    /// `true` if happenings of one moment may bring about the over-all conditions of each other in any
+    /// `true` if happenings of one moment may satisfy each other's over-all conditions in any
     /// order; see [`State::joint`](super::super::state::State::joint).
     pub(crate) joins: bool,
     /// `true` if the number of steps that led to a state is added to its estimate.
     pub(crate) counts_steps: bool,
-    /// The number of states that it visits in a round before the first plan, in relation to other searches.
+    /// The number of states that it visits in a round before the first plan, relative to other
+    /// searches.
     pub(crate) share: u64,
     /// The aim.
     pub(crate) aim: Aim,
 }
 
-/// Of what a search asks how new it is.
+/// States whose novelty a search computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoveltyOf {
-    /// Of the states that are expanded, among those of as much of the goal and the same estimate
+    /// The expanded states, among those with the same number of goals and the same estimate
     /// (BFWS(f₂); Lipovetzky & Geffner, AAAI 2017).
     Expanded,
-    /// Of each successor, among those of as much of the goal and of a relaxed plan (BFWS(f₅)).
-    /// States are estimated only where they have one more goal.
+    /// Each successor, among those with the same number of goals and achieved literals of a relaxed
+    /// plan (BFWS(f₅)). States are estimated only if they have one more goal.
     Successors,
 }
 
 /// The aim of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Aim {
-    /// A plan, whatever its metric, and then shorter ones. The nearest goal comes first.
+    /// A plan, regardless of its metric, and then shorter ones. States nearest to a goal come
+    /// first.
     Goal,
-    /// Plans of a better metric. What costs least to finish comes first.
+    /// Plans with a better metric. States with the lowest remaining cost come first.
     CostToGo,
-    /// Plans of a better metric. What has been spent counts too, what is still to be spent so many
-    /// times as much (weighted A*; Pohl 1970).
+    /// Plans with a better metric. The rank is the cost spent plus the remaining cost times this
+    /// factor (weighted A*; Pohl 1970).
     WeightedAStar(i64),
-    /// Shorter plans of the same metric.
+    /// Shorter plans with the same metric.
     Shortest,
 }
 
 impl Strategy {
-    /// Loses nothing but what [`Search::is_incomplete`](super::Search::is_incomplete) tells.
+    /// Loses no plans, except as [`Search::is_incomplete`](super::Search::is_incomplete) reports.
     pub(crate) const COMPLETE: Self = Self {
         compresses: None,
         uses_macros: false,
@@ -86,13 +91,13 @@ impl Strategy {
         aim: Aim::Goal,
     };
 
-    /// Loses nothing, and joins happenings of one moment.
+    /// Loses no plans, and joins happenings of one moment.
     pub(crate) const JOINING: Self = Self {
         joins: true,
         ..Self::COMPLETE
     };
 
-    /// The strategy of that member of the portfolio.
+    /// Returns the strategy of that member of the portfolio.
     pub(crate) fn of(member: Member, tuning: &Tuning) -> Self {
         let uses_macros = tuning.uses(Technique::Macros);
         match member {
@@ -136,7 +141,7 @@ impl Strategy {
         }
     }
 
-    /// Returns `true` if macro-operators take the place of the starts of some envelopes.
+    /// Returns `true` if macro-operators replace the starts of some envelopes.
     pub(super) fn replaces_starts(self, compiled: &Compiled) -> bool {
         self.uses_macros && !compiled.macros.is_empty()
     }
@@ -160,7 +165,7 @@ impl Strategy {
         relaxed
     }
 
-    /// Compresses actions that are at least so safe.
+    /// Compresses actions that are at least as safe as `least`.
     fn compressing(least: Compressibility, tuning: &Tuning) -> Self {
         Self {
             compresses: Some(least),
@@ -170,19 +175,20 @@ impl Strategy {
         }
     }
 
-    /// Whether the newest and the oldest preferred successors take turns on a plateau: where actions are
-    /// compressed and only the estimate decides. A search for what is new leaves plateaus by itself.
+    /// Returns `true` if the newest and the oldest preferred successors alternate on a plateau: if
+    /// actions are compressed and only the estimate counts. A search by novelty leaves plateaus by
+    /// itself.
     pub(crate) fn alternates(&self) -> bool {
         self.compresses.is_some() && self.novelty.is_none() && self.aim == Aim::Goal
     }
 
-    /// Whether it loses nothing but what
-    /// [`Search::is_incomplete`](super::Search::is_incomplete) tells.
+    /// Returns `true` if it loses no plans, except as
+    /// [`Search::is_incomplete`](super::Search::is_incomplete) reports.
     pub(crate) fn is_complete(&self) -> bool {
         self.compresses.is_none() && !self.is_chronological
     }
 
-    /// The same, filling up what is used up.
+    /// Returns the same strategy with replenishing.
     pub(crate) fn replenishing(self) -> Self {
         Self {
             replenishes: true,
@@ -190,12 +196,12 @@ impl Strategy {
         }
     }
 
-    /// The same, with another share of a round.
+    /// Returns the same strategy with another share of a round.
     pub(crate) fn with_share(self, share: u64) -> Self {
         Self { share, ..self }
     }
 
-    /// The same, adding the number of steps to the estimate.
+    /// Returns the same strategy with the number of steps added to the estimate.
     pub(crate) fn counting_steps(self) -> Self {
         Self {
             counts_steps: true,
@@ -203,7 +209,7 @@ impl Strategy {
         }
     }
 
-    /// The same with another aim.
+    /// Returns the same strategy with another aim.
     pub(crate) fn towards(self, aim: Aim) -> Self {
         Self { aim, ..self }
     }

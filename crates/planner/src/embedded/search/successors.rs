@@ -1,4 +1,4 @@
-//! The successors of a state: when their turn comes, and what they are.
+//! Generation and ordering of the successors of a state.
 
 use super::super::apply::Step;
 use super::super::compile::NONE;
@@ -10,7 +10,7 @@ use super::waiting::Waiting;
 use super::{Aim, NoveltyOf, ROOT, Search};
 
 impl Search<'_> {
-    /// Lets the successors wait for their turn.
+    /// Queues the successors.
     pub(super) fn expand(&mut self, number: u32, estimate: &Estimate) {
         self.expanded += 1;
         if self.strategy.novelty == Some(NoveltyOf::Successors) {
@@ -40,7 +40,7 @@ impl Search<'_> {
         }
         self.generated += estimate.applicable.len() as u64;
         if self.is_timeless && !estimate.applicable.is_empty() {
-            // Most of them never have their turn, and they are the same whenever they are listed.
+            // Most of them are never expanded, and the list is the same at any time.
             self.add_waiting(rank, Waiting::all_of(number));
         } else {
             for &step in &estimate.applicable {
@@ -56,7 +56,7 @@ impl Search<'_> {
         }
     }
 
-    /// The successor of the lowest rank.
+    /// Removes the successor with the lowest rank.
     pub(super) fn pop_any(&mut self) -> Option<(u32, Step)> {
         loop {
             let (rank, waiting) = self.all.pop()?;
@@ -69,7 +69,7 @@ impl Search<'_> {
         }
     }
 
-    /// The successor that has waited longest.
+    /// Removes the successor that has waited longest.
     pub(super) fn pop_oldest(&mut self) -> Option<(u32, Step)> {
         loop {
             let waiting = self.oldest.pop_front()?;
@@ -84,7 +84,8 @@ impl Search<'_> {
         }
     }
 
-    /// The successors of a state that was expanded when the search was timeless: as they were then.
+    /// Returns the successors of a state that was expanded when the search was timeless. They are
+    /// the same as then.
     fn list(&mut self, number: u32) -> Vec<Step> {
         let state = self.states.get(number);
         self.relaxed.horizon = NEVER;
@@ -95,8 +96,8 @@ impl Search<'_> {
         steps
     }
 
-    /// Lets the successors wait for their turn, each by how new it is itself, and then by how much
-    /// of the goal it has. They are made for that, and made again when their turn comes.
+    /// Queues the successors by their own novelty, and then by their number of remaining goals.
+    /// They are generated for this, and generated again when they are expanded.
     fn expand_by_width(&mut self, number: u32, estimate: &Estimate) {
         let Some(mut novelty) = self.novelty.take() else {
             return;
@@ -129,8 +130,8 @@ impl Search<'_> {
         self.novelty = Some(novelty);
     }
 
-    /// Whether a state needs an estimate: where the novelty of successors counts, only if one more
-    /// goal has been reached, or in the beginning.
+    /// Returns `true` if a state needs an estimate. Where the novelty of successors counts, only
+    /// the first state and states with one more goal need one.
     pub(super) fn needs_estimate(&self, parent: u32, left: u32) -> bool {
         if self.strategy.novelty != Some(NoveltyOf::Successors) {
             return true;
@@ -139,13 +140,13 @@ impl Search<'_> {
         progress.is_none_or(|before| before.has_new_goal(left))
     }
 
-    /// Progress on the path to a node.
+    /// Returns the progress on the path to a node.
     fn progress(&self, number: u32) -> Option<&Progress> {
         let node = self.nodes.get(number as usize)?;
         self.shared.progress.get(node.progress)
     }
 
-    /// The number of steps that led to a node.
+    /// Returns the number of steps that led to a node.
     fn depth(&self, number: u32) -> i64 {
         let parent = |node: &u32| {
             let parent = self.nodes[*node as usize].origin.parent;
@@ -155,8 +156,8 @@ impl Search<'_> {
         i64::try_from(steps.count()).unwrap_or(i64::MAX)
     }
 
-    /// What a state has used up of what is not filled up, all of it counting as much as the way to
-    /// the goal was long in the beginning.
+    /// Returns the penalty for the consumables that a state has used up. A consumable that is used
+    /// up completely counts as much as the first estimate.
     fn penalty(&mut self, number: u32) -> i64 {
         if self.consumables.is_empty() {
             return 0;
@@ -172,7 +173,7 @@ impl Search<'_> {
         penalty
     }
 
-    /// The rank of a state in the queue of its search; lower ranks come first.
+    /// Returns the rank of a state in the queue of its search; lower ranks come first.
     fn rank(&mut self, number: u32, estimate: u32) -> i64 {
         if let Some(novelty) = &mut self.novelty {
             let left = self.nodes[number as usize].left;
@@ -198,7 +199,8 @@ impl Search<'_> {
         step_costs.spent(self.compiled, &self.states.get(number)) + factor * estimate
     }
 
-    /// The successor; in a compressing search, one in which what has started is over, if possible.
+    /// Generates the successor. In a compressing search, the started action is also ended, if
+    /// possible.
     pub(super) fn make(&mut self, state: &State, step: Step) -> Option<(Step, State)> {
         if let Step::Start(action) | Step::Compressed(action) = step {
             let data = self.compiled.action(action);

@@ -1,14 +1,14 @@
-//! Compact double-ended queue of waiting successors.
+//! Compact double-ended queue of successors.
 //!
-//! An entry is stored as its difference to the entry before it: one or two bytes for most successors of one
-//! state. It can be read from both ends, because the last byte of each number is marked, and so is the last
-//! number of each entry.
+//! An entry is stored as its difference to the entry before it: one or two bytes for most
+//! successors of one state. It can be read from both ends, because the last byte of each number is
+//! marked, and so is the last number of each entry.
 
 use std::collections::VecDeque;
 
 use super::super::apply::Step;
 
-/// A successor that waits, or all successors of a state.
+/// A queued successor, or all successors of a state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Waiting {
     pub(super) parent: u32,
@@ -36,13 +36,13 @@ impl Waiting {
         Self { parent, step }
     }
 
-    /// All successors, which are listed when their turn comes.
+    /// Returns an entry for all successors of a state, which are listed when it is removed.
     pub(super) fn all_of(parent: u32) -> Self {
         let step = 5 << NUMBER_BITS;
         Self { parent, step }
     }
 
-    /// The step; `None` for all of them.
+    /// Returns the step, or `None` for all of them.
     pub(super) fn next(self) -> Option<Step> {
         let number = self.step & ((1 << NUMBER_BITS) - 1);
         match self.step >> NUMBER_BITS {
@@ -55,14 +55,14 @@ impl Waiting {
         }
     }
 
-    /// The difference to the entry before it: that of the steps, and that of the states.
+    /// Returns the differences of the steps and of the states to the previous entry.
     fn since(self, before: Self) -> (i64, i64) {
         let difference = |new: u32, old: u32| i64::from(new) - i64::from(old);
         let parents = difference(self.parent, before.parent);
         (difference(self.step, before.step), parents)
     }
 
-    /// The entry that differs so much; `sign` is 1 for the next one and -1 for the one before.
+    /// Returns the entry at a difference; `sign` is 1 for the next one and -1 for the previous one.
     fn moved(self, (step, parent): (i64, i64), sign: i64) -> Self {
         let moved = |old: u32, difference: i64| {
             u32::try_from(i64::from(old) + sign * difference).unwrap_or(u32::MAX)
@@ -74,11 +74,11 @@ impl Waiting {
     }
 }
 
-/// See the module.
+/// Compact double-ended queue.
 #[derive(Debug, Default)]
 pub(super) struct WaitingList {
     bytes: VecDeque<u8>,
-    /// The entry that the first one is a difference to.
+    /// The entry to which the first one is a difference.
     before: Waiting,
     /// The last entry.
     last: Waiting,
@@ -89,7 +89,7 @@ impl WaitingList {
         self.bytes.is_empty()
     }
 
-    /// Adds an entry at the end, and returns the number of bytes that it takes.
+    /// Adds an entry at the end, and returns its memory in bytes.
     pub(super) fn push_back(&mut self, entry: Waiting) -> usize {
         if self.is_empty() {
             self.before = entry;
@@ -159,7 +159,7 @@ impl WaitingList {
         Some(entry)
     }
 
-    /// Reserves memory. Long lists grow by a quarter, so that little of it is unused.
+    /// Reserves memory. Long lists grow by a quarter, so that little memory is unused.
     fn reserve(&mut self, additional: usize) {
         let length = self.bytes.len();
         if length + additional > self.bytes.capacity() {

@@ -1,20 +1,21 @@
-//! The unsettled past of a state, seen from what can still be pushed.
+//! Projection of a state's unsettled happenings to those that can still be delayed.
 
 use super::super::network::{NodeId, SETTLED};
 use super::super::time::{NEVER, Ticks};
 use super::State;
 
-/// The network of a state, seen from what can still be pushed: the starts under way.
+/// The network of a state, projected to the nodes that can still be delayed: the starts of running
+/// actions.
 ///
-/// Later happenings only push these, and are only pushed by the annotations. So of two states that
-/// are discretely the same and whose settled pasts compare, the one with the smaller distances and
-/// the later latest times allows every schedule that the other allows. A happening that may have to
-/// move to a later window is looked at as a start is; for each window left here, the other state
-/// must have one from the same list.
+/// Later happenings delay only these, and are delayed only by the annotations. So of two states
+/// that are discretely the same and whose settled parts compare, the one with the smaller distances
+/// and the later latest times allows every schedule that the other allows. A happening that may
+/// have to move to a later window is treated like a start. For each window left here, the other
+/// state must have one from the same list.
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
     rows: Vec<Row>,
-    /// How many of the rows are those of starts under way, and of what was chosen last.
+    /// Number of rows for the starts of running actions and the last choice.
     open: usize,
     windows: Vec<Window>,
 }
@@ -23,16 +24,16 @@ pub(crate) struct Projection {
 #[derive(Clone, Debug)]
 struct Row {
     earliest: Ticks,
-    /// How late it can be.
+    /// Latest time of the node.
     latest: Ticks,
-    /// The least distances to the nodes of all rows: the starts under way, what was chosen last
-    /// where choices come in the order of time, and what has windows.
+    /// The least distances to the nodes of all rows: the starts of running actions, the last choice
+    /// where choices come in chronological order, and happenings with windows.
     to_rows: Vec<Ticks>,
     /// The least distances to the annotations, by annotation.
     to_annotations: Vec<(u32, Ticks)>,
 }
 
-/// The rows of the nodes that lie in one interval of a list.
+/// The rows of the nodes that must be in one interval of a list.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     windows: u32,
@@ -41,12 +42,12 @@ struct Window {
     last: usize,
 }
 
-/// No row yet.
+/// No row assigned.
 const NO_ROW: usize = usize::MAX;
 
 impl State {
-    /// The part of the unsettled past that matters: everything that later choices can push, and how
-    /// far.
+    /// Returns the relevant part of the unsettled happenings: those that later choices can delay,
+    /// with their bounds.
     pub(crate) fn projection(&self) -> Projection {
         let nodes = self.open.iter().map(|open| open.node);
         let mut nodes: Vec<NodeId> = nodes
@@ -80,7 +81,7 @@ impl State {
         }
     }
 
-    /// The windows of unsettled happenings, whose nodes join those of the rows.
+    /// Adds the nodes of windows to those of the rows. Returns the windows of unsettled happenings.
     fn windows(&self, nodes: &mut Vec<NodeId>) -> Vec<Window> {
         let mut all = self.network.within().to_vec();
         let earliest = |node| self.network.earliest(node);
@@ -102,8 +103,8 @@ impl State {
 }
 
 impl Projection {
-    /// Whether what can follow the other, in time, can follow this. With `is_timeless`, only
-    /// distances matter, as nothing happens at a fixed time.
+    /// Returns `true` if every schedule that can follow the other state can also follow this one.
+    /// If `is_timeless`, only distances matter, since no happening has a fixed time.
     pub(crate) fn is_no_later_than(&self, other: &Self, is_timeless: bool) -> bool {
         let Some(of) = self.rows_in(other) else {
             return false;
@@ -123,8 +124,8 @@ impl Projection {
         })
     }
 
-    /// For each row, the row of the other projection that is compared with it. `None` if a window is left
-    /// here that the other does not have.
+    /// Returns for each row the row of the other projection to compare it with, or `None` if the
+    /// other lacks a window that is left here.
     fn rows_in(&self, other: &Self) -> Option<Vec<usize>> {
         let open = 0..self.open.min(other.open);
         let mut rows: Vec<usize> = open.collect();
@@ -144,7 +145,7 @@ impl Projection {
         (!rows.contains(&NO_ROW)).then_some(rows)
     }
 
-    /// An estimate of the memory it takes, in bytes.
+    /// Returns an estimate of the memory, in bytes.
     pub(crate) fn size(&self) -> usize {
         let row = |row: &Row| {
             size_of::<Row>() + 8 * row.to_rows.capacity() + 16 * row.to_annotations.capacity()

@@ -1,8 +1,8 @@
 //! Upper bounds on numbers that depend on times, without a linear program.
 //!
-//! A battery that was charged for an open time has a level that is a linear expression over the start and the
-//! end of that action. Two kinds of constraints bound it: the demand that the level stays within the capacity,
-//! which is about the same expression but for a constant, and the duration bounds.
+//! The level of a battery that was charged for an open time is a linear expression over the start
+//! and the end of that action. Two kinds of constraints bound it: the demand that the level stays
+//! within the capacity, which is the same expression up to a constant, and the duration bounds.
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
@@ -14,8 +14,8 @@ use super::super::state::State;
 use super::super::time::Scale;
 use super::{is_assigned_later, settled_course};
 
-/// An upper bound on the value of a fluent after the ends of all running actions, without its jumps at these
-/// ends. `None` if it has no bound.
+/// Returns an upper bound on the value of a fluent after the ends of all running actions, without
+/// its jumps at these ends, or `None` if it has no bound.
 pub(crate) fn highest_level(compiled: &Compiled, state: &State, fluent: u32) -> Option<Rational> {
     if let Some(value) = &state.values[fluent as usize] {
         return Some(value.clone());
@@ -31,8 +31,9 @@ pub(crate) fn highest_level(compiled: &Compiled, state: &State, fluent: u32) -> 
     highest_value(course.base, symbolic, &state.network, compiled.scale)
 }
 
-/// An upper bound on the value of an expression over times. The latest happenings are bounded by durations,
-/// and the rest by a demand, or all of them by either; the least of these bounds counts.
+/// Returns an upper bound on the value of an expression over times. The latest happenings are
+/// bounded by durations, and the rest by a demand, or all of them by either; the least of these
+/// bounds counts.
 fn highest_value(
     mut form: Form,
     symbolic: &Symbolic,
@@ -55,8 +56,8 @@ fn highest_value(
     }
 }
 
-/// The bound on an expression by the demand `demanded comparison 0`, if that is about a multiple of it and a
-/// constant.
+/// Returns the bound on an expression by the demand `demanded comparison 0`, if that concerns a
+/// multiple of it and a constant.
 fn by_demand(form: &Form, demanded: &Form, comparison: Comparison) -> Option<Rational> {
     let (first, known) = (form.terms.first()?, demanded.terms.first()?);
     let factor = &first.1 / &known.1;
@@ -71,8 +72,8 @@ fn by_demand(form: &Form, demanded: &Form, comparison: Comparison) -> Option<Rat
     (bounds_above && is_multiple).then(|| &form.constant - &(&factor * &demanded.constant))
 }
 
-/// Takes a multiple of a duration out of an expression: the latest happening, and an earlier one with the
-/// opposite coefficient. Returns an upper bound on it by the constraints between the two.
+/// Removes a multiple of a duration from an expression: the latest happening, and an earlier one
+/// with the opposite coefficient. Returns an upper bound on it by the constraints between the two.
 fn take_duration(form: &mut Form, network: &Network, scale: Scale) -> Option<Rational> {
     let (end, coefficient) = form.terms.last()?.clone();
     let opposite = -&coefficient;

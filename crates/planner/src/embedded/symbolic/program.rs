@@ -1,7 +1,7 @@
-//! The linear program of a state: whether there are times for it, and which ones are the best.
+//! The linear program of a state, which decides if feasible times exist, and which times are best.
 //!
-//! The search asks in ticks, to which all fixed times are rounded down. The times of a plan are asked
-//! for exactly.
+//! The search uses ticks, to which all fixed times are rounded down. The times of a plan are
+//! computed exactly.
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
@@ -17,29 +17,30 @@ use super::super::time::{NEVER, Ticks};
 use super::super::tuning::Technique;
 use super::projected;
 
-/// What is known exactly of the nodes of a network, which has it in ticks.
+/// Exact data of the nodes of a network, which stores them in ticks.
 #[derive(Debug, Default)]
 pub(crate) struct Exact {
-    /// How far it is from one node to another at least.
+    /// The minimum distances between nodes.
     pub(crate) distances: Vec<(NodeId, NodeId, Rational)>,
-    /// The ends of what has been under way from the beginning.
+    /// The ends of the actions that were running in the situation.
     pub(crate) ends: Vec<KnownEnd>,
 }
 
-/// When something may end that has been under way from the beginning, by its duration alone. Its start
-/// need not lie on the grid.
+/// Bounds on the end of an action that was running in the situation, by its duration alone. Its
+/// start may be off the grid.
 #[derive(Debug)]
 pub(crate) struct KnownEnd {
     pub(crate) node: NodeId,
-    /// The earliest and the latest time as the network has them.
+    /// The earliest and the latest time in the network.
     pub(crate) rounded: (Ticks, Ticks),
     pub(crate) earliest: Rational,
-    /// `None`: whenever it likes.
+    /// `None` if there is no bound.
     pub(crate) latest: Option<Rational>,
 }
 
 impl KnownEnd {
-    /// The earliest time, where the network's is `floor`: that can come from something else.
+    /// Returns the exact earliest time, given the network's bound `floor`, which may have another
+    /// cause.
     pub(crate) fn after(&self, floor: Ticks, compiled: &Compiled) -> Rational {
         if floor > self.rounded.0 {
             let other = not_before(floor, compiled);
@@ -49,7 +50,7 @@ impl KnownEnd {
         }
     }
 
-    /// The latest time, where the network's is `latest`.
+    /// Returns the exact latest time, given the network's bound `latest`.
     fn before(&self, latest: Ticks, compiled: &Compiled) -> Option<Rational> {
         if latest < self.rounded.1 {
             Some(compiled.scale.units(latest))
@@ -59,16 +60,16 @@ impl KnownEnd {
     }
 }
 
-/// A time that is no earlier than a fixed time, given the tick to which that has been rounded down. What
-/// can happen at once happens at the situation's time.
+/// Returns a time that is no earlier than a fixed time, given the tick to which the fixed time was
+/// rounded down. Happenings that can happen immediately happen at the situation's time.
 pub(crate) fn not_before(floor: Ticks, compiled: &Compiled) -> Rational {
     let is_free = floor <= compiled.now;
     let slack = i64::from(!compiled.is_exact && !is_free);
     compiled.earliest(floor + slack)
 }
 
-/// The exact distance of two nodes, where one bound of it is known exactly, and the network has `rounded`.
-/// That can come from another bound.
+/// Returns the exact distance of two nodes, given one bound that is known exactly, and the
+/// network's distance `rounded`, which may have another cause.
 pub(crate) fn exact_distance(
     rounded: &Rational,
     known: &Rational,
@@ -81,7 +82,7 @@ pub(crate) fn exact_distance(
     }
 }
 
-/// Limit on the metric, where it depends on times.
+/// Limit on the metric, if it depends on times.
 pub(super) struct Limit<'a> {
     /// The metric without the time.
     pub(super) spent: Form,
@@ -91,7 +92,8 @@ pub(super) struct Limit<'a> {
 }
 
 impl Limit<'_> {
-    /// Comparison with zero of the metric without `constant`, plus the number returned.
+    /// Returns the comparison of the metric with zero as a demand: without `constant`, plus the
+    /// number returned.
     pub(super) fn as_demand(&self, constant: &Rational) -> (Rational, Comparison) {
         let comparison = if self.bound.may_equal {
             Comparison::AtMost
@@ -107,8 +109,8 @@ impl Limit<'_> {
     }
 }
 
-/// Whether there are times that meet all demands and the network, and leave what has been spent
-/// within the limit. Notes such times in the state.
+/// Returns `true` if some times satisfy all demands, the network and the limit on the cost. Stores
+/// such times in the state.
 pub(crate) fn is_possible(
     state: &mut State,
     compiled: &Compiled,
@@ -126,7 +128,7 @@ pub(crate) fn is_possible(
     if !symbolic.has_demands() && limit.is_none() {
         return true;
     }
-    // Off the grid, a happening without delay is later than in the network.
+    // Off the grid, an undelayed happening is later than in the network.
     let is_projected = compiled.tuning.uses(Technique::Projection)
         && compiled.scale.units(compiled.now) == compiled.beginning.time;
     if !is_projected {
@@ -161,7 +163,8 @@ pub(super) fn has_solution(
     program.check().is_ok()
 }
 
-/// Returns `true` if the earliest time of each happening satisfies all demands. That needs no linear program.
+/// Returns `true` if the earliest time of each happening satisfies all demands, without a linear
+/// program.
 fn are_met_at_the_earliest(
     network: &Network,
     demands: &[(Form, Comparison)],
@@ -174,7 +177,7 @@ fn are_met_at_the_earliest(
     let is_met = |(form, comparison): &(Form, Comparison)| {
         comparison.holds(&form.at(&earliest), &Rational::ZERO)
     };
-    // Rounded to ticks, times need not keep the distances between them.
+    // Times rounded to ticks may violate the distances between them.
     let is_kept = |(from, to, distance): (NodeId, NodeId, Ticks)| {
         let gap = &earliest[usize::from(to)] - &earliest[usize::from(from)];
         gap >= compiled.scale.units(distance)
@@ -182,8 +185,8 @@ fn are_met_at_the_earliest(
     demands.iter().all(is_met) && network.edges().all(is_kept)
 }
 
-/// Times that meet all demands and the network; what is known exactly replaces the network's rounded
-/// numbers. The metric is as low as it can be, and then the last one is as early as possible.
+/// Returns times that satisfy all demands and the network. Exact data replace the network's rounded
+/// numbers. The metric is minimal, and then the last happening is as early as possible.
 pub(crate) fn solve(state: &State, compiled: &Compiled, exact: &Exact) -> Option<Vec<Rational>> {
     let symbolic = state.symbolic.as_ref()?;
     let (mut program, times, end) =
@@ -195,7 +198,7 @@ pub(crate) fn solve(state: &State, compiled: &Compiled, exact: &Exact) -> Option
     if let Some((spent, time)) = objective {
         let row = objective_row(&spent, &time, &times, end);
         let least = program.minimize(&row).ok()?;
-        // Where it has no minimum, as far as these happenings go, the makespan alone decides.
+        // If it has no minimum over these happenings, only the makespan decides.
         if let Optimum::Value(least) = least {
             let row = program.define(&row);
             program.assert_upper(row, least, 0);
@@ -213,8 +216,8 @@ pub(crate) fn solve(state: &State, compiled: &Compiled, exact: &Exact) -> Option
     symbolic.demands.iter().all(is_met).then_some(times)
 }
 
-/// The metric, as far as it has been spent, and what each unit of time counts. `None` if times
-/// have no bearing on it, or it is not linear in them.
+/// Returns the metric so far, and the weight of a unit of time. Returns `None` if the metric does
+/// not depend on times, or is not linear in them.
 fn objective(state: &State, metric: &Metric) -> Option<(Form, Rational)> {
     let symbolic = state.symbolic.as_ref()?;
     let Numeric::Linear(values) = &metric.values else {
@@ -231,13 +234,13 @@ fn objective(state: &State, metric: &Metric) -> Option<(Form, Rational)> {
             sum = sum.plus(weight, &course.base);
         }
     }
-    // The end is not before the last happening, but need not be at it.
+    // The end is not before the last happening, but may be after it.
     let time = metric.time.is_positive().then(|| metric.time.clone());
     let time = time.unwrap_or_default();
     (!sum.terms.is_empty() || time.is_positive()).then_some((sum, time))
 }
 
-/// The same as a row of the program, without the constant.
+/// Returns the objective as a row of the program, without the constant.
 fn objective_row(
     spent: &Form,
     time: &Rational,
@@ -254,7 +257,7 @@ fn objective_row(
     row
 }
 
-/// The times between which a node lies, by its bounds in the network.
+/// Returns the bounds on the time of a node from the network.
 fn window(
     (floor, latest): (Ticks, Ticks),
     compiled: &Compiled,
@@ -273,8 +276,8 @@ fn window(
     (earliest, (latest < NEVER).then(|| scale.units(latest)))
 }
 
-/// The linear program, the variables of its nodes, and one that is not before any of them. `exact`: what
-/// is known exactly, where times are asked for that a plan can have.
+/// Returns the linear program, the variables of its nodes, and one that is not before any of them.
+/// `exact` are the exact data, if the times of a plan are computed.
 pub(super) fn program(
     network: &Network,
     demands: &[(Form, Comparison)],

@@ -1,13 +1,13 @@
-//! Decides whether a state has times, by the few happenings in its demands.
+//! Feasibility of a state's times, decided by the few happenings in its demands.
 //!
-//! These are starts and ends of actions whose duration can be chosen, and of what changes continuously
-//! meanwhile. All other happenings only limit them, and what the network allows them is again a network:
-//! that of the least distances among them. Times that keep these distances extend to all other happenings
-//! (the minimal network is decomposable: Dechter, Meiri & Pearl, AIJ 49, 1991), so that the linear program
-//! is as large as the number of choices that are really open.
+//! These are starts and ends of actions whose duration can be chosen, and of continuous changes.
+//! All other happenings only restrict them, and these restrictions form a network again: the
+//! network of the least distances among them. Times that keep these distances extend to all other
+//! happenings (the minimal network is decomposable: Dechter, Meiri & Pearl, AIJ 49, 1991), so that
+//! the size of the linear program is the number of choices that are really open.
 //!
-//! Before that, two kinds of times are tried, for which no linear program is needed: the earliest ones, and
-//! those of the state before, the new happenings at their earliest.
+//! Before that, two kinds of times are tried, for which no linear program is needed: the earliest
+//! ones, and those of the state before, with the new happenings at their earliest times.
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::simplex::{Simplex, VariableId};
@@ -21,21 +21,21 @@ use super::program::{Limit, assert_comparison};
 
 /// Distances of a network between some of its nodes.
 struct Projected {
-    /// Ascending.
+    /// In ascending order.
     nodes: Vec<NodeId>,
     earliest: Vec<Ticks>,
     latest: Vec<Ticks>,
-    /// By how much a plan ends after each node at least.
+    /// Minimum distance from each node to the end of the plan.
     tails: Vec<Ticks>,
-    /// When a plan ends, at the earliest.
+    /// Earliest end of the plan.
     end: Ticks,
     /// The least distances, row by row; `-NEVER` if there is none.
     distances: Vec<Ticks>,
     scale: Scale,
 }
 
-/// Times of the happenings that demands are about, which extend to times of all happenings, and meet all
-/// demands and the limit. `None` if there are none.
+/// Returns times of the happenings in the demands that extend to times of all happenings, and
+/// satisfy all demands and the limit. Returns `None` if there are none.
 pub(super) fn times(
     network: &Network,
     symbolic: &Symbolic,
@@ -115,7 +115,7 @@ impl Projected {
         })
     }
 
-    /// When all can be over.
+    /// Returns the end of all happenings.
     fn end_of(&self, times: &[Rational]) -> Rational {
         let tails = times.iter().zip(&self.tails);
         tails.fold(self.scale.units(self.end), |end, (time, &tail)| {
@@ -123,7 +123,7 @@ impl Projected {
         })
     }
 
-    /// Known times, and all others at the earliest time that these leave.
+    /// Returns the known times, and the earliest times of all others given these.
     fn extended(&self, known: &[(NodeId, Rational)]) -> Vec<Rational> {
         let mut times: Vec<Option<Rational>> = vec![None; self.nodes.len()];
         for (node, time) in known {
@@ -164,7 +164,8 @@ impl Projected {
             })
     }
 
-    /// The first node at a fixed distance from each one, itself if there is no other one.
+    /// Returns for each node the first node at a fixed distance from it, or the node itself if
+    /// there is no other one.
     fn leaders(&self) -> Vec<usize> {
         let is_fixed = |from: usize, to: usize| {
             let (there, back) = (self.distance(from, to), self.distance(to, from));
@@ -178,8 +179,8 @@ impl Projected {
             .collect()
     }
 
-    /// Returns `true` if a distance follows from two others. Among nodes without fixed distances, all of those can be left
-    /// out at once (Muscettola, Morris & Tsamardinos, KR 1998).
+    /// Returns `true` if a distance follows from two others. Among nodes without fixed distances,
+    /// all implied distances can be removed at once (Muscettola, Morris & Tsamardinos, KR 1998).
     fn is_implied(&self, from: usize, to: usize, leaders: &[usize]) -> bool {
         let distance = self.distance(from, to);
         let latest = self.latest[from];
@@ -277,7 +278,7 @@ impl Projected {
     }
 }
 
-/// Asserts `row + constant comparison 0`; `None` if that has no variable, and is false.
+/// Asserts `row + constant comparison 0`. Returns `None` if it has no variable, and is false.
 fn assert_row(
     program: &mut Simplex,
     row: &[(VariableId, Rational)],

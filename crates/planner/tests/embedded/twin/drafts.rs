@@ -19,17 +19,17 @@ pub(crate) struct Draft {
 
 #[derive(Clone, Debug)]
 pub(crate) struct DraftAction {
-    /// 0: it takes no time.
+    /// 0 for an instantaneous action.
     duration: u8,
     at_start: Option<(u8, bool)>,
     over_all: Option<u8>,
     start: Vec<(u8, bool)>,
     end: Vec<(u8, bool)>,
-    /// Taken from the store at the start, which must have so much.
+    /// Amount taken from the store at the start, which must contain it.
     cost: u8,
-    /// Put into the store at the end.
+    /// Amount added to the store at the end.
     gain: i8,
-    /// Whether the store must not run out meanwhile.
+    /// `true` if the store must not run out while the action runs.
     pub(crate) minds: bool,
 }
 
@@ -71,8 +71,8 @@ pub(crate) fn drafts() -> impl Strategy<Value = Draft> {
         })
 }
 
-/// Drafts with an end: the store is never refilled. Several happenings of one time that touch it,
-/// which are beyond the planner, do not matter to anyone.
+/// Drafts with finite plans: the store is never replenished. Several happenings of one time that
+/// change it, which the planner does not support, do not affect any condition.
 pub(crate) fn thrifty_drafts() -> impl Strategy<Value = Draft> {
     drafts().prop_map(|mut draft| {
         for action in &mut draft.actions {
@@ -85,7 +85,7 @@ pub(crate) fn thrifty_drafts() -> impl Strategy<Value = Draft> {
 
 fn written(literals: &[(u8, bool)], when: &str) -> String {
     let mut text = String::new();
-    // A fact both added and deleted at once is not what is tested here.
+    // Simultaneous addition and deletion of a fact is not the subject of this test.
     let mut seen = Vec::new();
     for (fact, truth) in literals {
         if seen.contains(fact) {
@@ -106,10 +106,10 @@ fn written(literals: &[(u8, bool)], when: &str) -> String {
     text
 }
 
-/// What an action costs: at its start, at its end, and for each unit of its duration.
+/// Cost of an action: at its start, at its end, and for each unit of its duration.
 pub(crate) type Price = (u8, u8, u8);
 
-/// What is to be minimized, or not.
+/// Metrics of the random problems.
 pub(crate) const METRICS: &[&str] = &[
     "minimize (cost)",
     "minimize (+ (cost) (total-time))",
@@ -123,7 +123,7 @@ impl Draft {
         self.task_with(&[], "")
     }
 
-    /// The task in which actions cost something.
+    /// Returns the task with costs of actions.
     pub(crate) fn task_with(&self, prices: &[Price], metric: &str) -> Task {
         let mut domain = "(:requirements :durative-actions :numeric-fluents :adl
             :timed-initial-literals) (:predicates (f0) (f1) (f2) (f3)) (:functions (store) (cost))"
@@ -196,7 +196,7 @@ impl Draft {
                 .concat()
         };
         let mut initial = facts(self.initial) + "(= (store) 2) (= (cost) 0)";
-        // What happens at one time has no order, so nothing may become true and false then.
+        // Happenings of one time have no order, so no fact may become both true and false.
         let mut said = std::collections::BTreeSet::new();
         for (time, fact, truth) in &self.timed {
             if !said.insert((time, fact)) {

@@ -8,7 +8,7 @@ use elbowroom_model::validate::{self, Settings as Strictness, Verdict};
 use elbowroom_model::{Footprint, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-/// The most happenings of a plan that the twin looks for.
+/// The maximum number of happenings of a plan that the exhaustive search considers.
 pub(crate) const MOST: usize = 6;
 
 /// One happening of a sequence: an action's start or instant, or the end of an earlier one.
@@ -22,7 +22,7 @@ enum Choice {
 #[derive(Debug)]
 pub(crate) struct TooMany;
 
-/// All sequences of happenings up to a length, timed initials put in between in all ways.
+/// All sequences of happenings up to a length, interleaved with timed initials in all ways.
 pub(crate) struct Twin<'a> {
     task: &'a Task,
     actions: Vec<Action>,
@@ -32,7 +32,7 @@ pub(crate) struct Twin<'a> {
 }
 
 impl<'a> Twin<'a> {
-    /// Looks at so many sequences at most.
+    /// Creates an exhaustive search over at most `budget` sequences.
     pub(crate) fn new(task: &'a Task, actions: Vec<Action>, budget: usize) -> Self {
         Self {
             task,
@@ -43,7 +43,7 @@ impl<'a> Twin<'a> {
         }
     }
 
-    /// Allows an action to overlap itself, or not.
+    /// Sets whether an action may overlap itself.
     pub(crate) fn with_self_overlap(self, self_overlap: bool) -> Self {
         Self {
             self_overlap,
@@ -53,7 +53,8 @@ impl<'a> Twin<'a> {
 }
 
 impl Twin<'_> {
-    /// Whether some continuation of the sequence is a plan; `None` if the budget does not suffice.
+    /// Returns `true` if some continuation of the sequence is a plan, or `None` if the budget does
+    /// not suffice.
     pub(crate) fn finds(&mut self) -> Option<bool> {
         let mut finds = false;
         let _ = self.walk(&mut |_| {
@@ -63,7 +64,8 @@ impl Twin<'_> {
         Some(finds)
     }
 
-    /// The least metric of all continuations, if some are plans, and the least makespan with that.
+    /// Returns the least metric of all continuations that are plans, and the least makespan with
+    /// that metric.
     pub(crate) fn least_metric(&mut self) -> Result<Option<(Rational, Rational)>, TooMany> {
         let mut least: Option<(Rational, Rational)> = None;
         let task = self.task;
@@ -80,7 +82,7 @@ impl Twin<'_> {
         Ok(least)
     }
 
-    /// Visits all continuations that are plans; `None` if the budget does not suffice.
+    /// Visits all continuations that are plans. Returns `None` if the budget does not suffice.
     fn walk(
         &mut self,
         visit: &mut dyn FnMut(&validate::Report) -> ControlFlow<()>,
@@ -114,7 +116,7 @@ impl Twin<'_> {
         matches!(self.sequence[place], Choice::Start(own) if own == action)
     }
 
-    /// The places of the starts that have not ended.
+    /// Returns the positions of the starts that have not ended.
     fn open(&self) -> Vec<usize> {
         let mut open = Vec::new();
         for (place, choice) in self.sequence.iter().enumerate() {
@@ -136,7 +138,7 @@ impl Twin<'_> {
     ) -> ControlFlow<()> {
         let timed = self.task.timed().len();
         let count = self.sequence.len();
-        // For each timed initial, how many happenings come before it; not descending.
+        // For each timed initial, the number of happenings before it; not descending.
         let mut places = vec![0; timed];
         loop {
             if let Some(report) = self.report(&places) {
@@ -150,7 +152,7 @@ impl Twin<'_> {
         }
     }
 
-    /// Schedules the happenings as early as their order allows, and asks the judge.
+    /// Schedules the happenings as early as their order allows, and validates the plan.
     fn report(&self, places: &[usize]) -> Option<validate::Report> {
         let epsilon = Rational::new(1, 1000);
         let prints: Vec<Footprint> = self

@@ -5,15 +5,15 @@ use super::Builder;
 use crate::embedded::compile::NONE;
 use crate::embedded::formula::Formula;
 
-/// Most alternatives of one condition, and most variants of one action.
+/// Maximum number of alternatives of one condition, and of variants of one action.
 const MOST: usize = 16;
 
 impl Builder<'_> {
-    /// Adds an action, with its over-all condition as the last one that was noted, in as many variants as its
-    /// disjunctions over moving numbers have alternatives.
+    /// Adds an action, with its over-all condition as the last one that was recorded, in as many
+    /// variants as its disjunctions over moving numbers have alternatives.
     ///
-    /// While the action runs, the over-all condition may pass from one alternative to another. So the action
-    /// itself is kept in addition to such variants.
+    /// While the action runs, the over-all condition may pass from one alternative to another. So
+    /// the original action is kept in addition to such variants.
     pub(super) fn push_action(&mut self, action: Action) {
         if self.moving.is_empty() || action.start == NONE {
             self.actions.push(action);
@@ -60,7 +60,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The snap with each of the conditions instead of its own.
+    /// Returns copies of the snap with each of the conditions.
     fn snaps_with(&mut self, snap: u32, conditions: Vec<Formula>) -> Vec<u32> {
         let mut numbers = vec![snap];
         for (place, condition) in conditions.into_iter().enumerate() {
@@ -76,8 +76,8 @@ impl Builder<'_> {
         numbers
     }
 
-    /// The alternatives of a condition as far as moving numbers decide between them; the condition itself if
-    /// there are too many.
+    /// Returns the alternatives of a condition between which moving numbers decide, or the
+    /// condition itself if there are too many.
     fn split(&self, condition: &Formula) -> Vec<Formula> {
         let is_moving = |part: &Formula| self.reads_moving(part);
         let alternatives = condition.alternatives(&is_moving, MOST);

@@ -1,4 +1,4 @@
-//! What durations are bound by, and who reads them.
+//! Bounds of durations, and the actions that read `?duration`.
 
 use elbowroom_model::ground::{self, Change as ModelChange, DurativeBody};
 use elbowroom_model::problem::Comparison;
@@ -7,7 +7,7 @@ use super::super::{Bound, Duration};
 use crate::embedded::formula::Numeric;
 
 impl Duration {
-    /// Takes in a constraint.
+    /// Adds a constraint.
     pub(super) fn constrain(&mut self, constraint: &ground::DurationConstraint, value: Numeric) {
         let Some(constant) = value.as_constant() else {
             self.bounds.push(Bound {
@@ -32,7 +32,7 @@ impl Duration {
     }
 }
 
-/// Whether a condition or an effect of the action reads `?duration`.
+/// Returns `true` if a condition or an effect of the action reads `?duration`.
 pub(in crate::embedded::compile) fn reads_duration(body: &DurativeBody) -> bool {
     let mut reads = false;
     let mut look = |leaf: &ground::Expression| {

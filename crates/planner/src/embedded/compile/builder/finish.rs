@@ -1,5 +1,5 @@
-//! The compiled problem, once all actions are numbered: annotations, timed initials, and what
-//! follows from looking at all actions together.
+//! Final steps of the compilation, once all actions are numbered: annotations, timed initials, and
+//! properties that depend on all actions.
 
 mod dates;
 
@@ -26,23 +26,23 @@ use crate::embedded::time::{Scale, Ticks};
 use crate::embedded::tuning::Technique;
 use crate::embedded::windows::Windows;
 
-/// How many happenings get their annotations between two questions whether to go on.
+/// Number of happenings annotated between two calls of `goes_on`.
 const SNAPS_PER_QUESTION: usize = 1024;
 
-/// The timed initials to come, each with the distances that it keeps.
+/// The future timed initials, each with its separations.
 struct Coming {
     happenings: Vec<TimedHappening>,
     separations: Vec<Separations>,
 }
 
-/// The longest distance that some snap keeps from some annotation.
+/// Returns the longest distance that some snap keeps from some annotation.
 fn longest_distance(snaps: &[Snap]) -> Ticks {
     let distances = snaps.iter().flat_map(|snap| &snap.after);
     distances.map(|&(_, distance)| distance).max().unwrap_or(0)
 }
 
 impl Builder<'_> {
-    /// All that is compiled, put together; `None` if it was told to stop.
+    /// Assembles the compiled problem. Returns `None` if `goes_on` returned `false`.
     pub(super) fn finish(
         mut self,
         grounding: &Grounding,
@@ -150,7 +150,7 @@ impl Builder<'_> {
         })
     }
 
-    /// The rules of derived facts by stratum, and their heads.
+    /// Returns the rules of derived facts by stratum, and their heads.
     fn rules(&mut self, grounding: &Grounding) -> (Vec<Vec<Rule>>, Vec<Vec<u32>>) {
         let symbols = &mut self.symbols;
         let rules = grounding.rules.iter().map(|rule| {
@@ -162,12 +162,13 @@ impl Builder<'_> {
         stratified(rules, self.task, &self.symbols)
     }
 
-    /// The timed initials after the situation that matter to some happening, condition or number.
+    /// Returns the timed initials after the situation that matter to some happening, condition or
+    /// number.
     fn coming(&self, situation: &Situation) -> Coming {
         let makes = self.separations.iter().flat_map(|s| &s.makes);
         let is_write = |access: &&Access| matches!(access, Access::Added(_) | Access::Deleted(_));
         let written: BTreeSet<Access> = makes.filter(is_write).copied().collect();
-        // A fact that nothing reads, and no action writes, keeps nothing apart.
+        // A fact that nothing reads, and no action writes, requires no separation.
         let matters = |change: &ModelChange| match change {
             ModelChange::Add(fact) | ModelChange::Delete(fact) => {
                 self.symbols.known_fact(*fact).is_some()
@@ -195,7 +196,7 @@ impl Builder<'_> {
         separations.collect()
     }
 
-    /// Gives the happenings their annotations, and notes which timed initials must come after them,
+    /// Sets the annotations of the happenings, and records the timed initials that must follow them
     /// or would break an over-all condition.
     fn annotate(
         &mut self,
@@ -238,7 +239,7 @@ impl Builder<'_> {
         Some(())
     }
 
-    /// The timed initials to come, and whether all their times lie on the grid.
+    /// Returns the future timed initials, and whether all their times are on the grid.
     fn timed(
         &self,
         coming: &Coming,
@@ -277,8 +278,7 @@ impl Builder<'_> {
         (timed.collect(), are_exact)
     }
 
-    /// Which actions do nothing at their end but add facts that matter only where they are true;
-    /// see `compression`.
+    /// Marks the actions whose ends only add facts that matter only when true; see `compression`.
     fn note_compression_safe(
         &mut self,
         annotations: &Annotations,
@@ -303,8 +303,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Settles which actions may be compressed, and compiles continuous changes of exclusive fluents to their ends.
-    /// Returns for each fluent whether it is exclusive.
+    /// Determines the actions that may be compressed, and compiles continuous changes of exclusive
+    /// fluents to their ends. Returns for each fluent whether it is exclusive.
     fn compile_drains(
         &mut self,
         situation: &Situation,
@@ -321,7 +321,7 @@ impl Builder<'_> {
         exclusive
     }
 
-    /// For each fluent, whether continuous changes of it concern one action at a time.
+    /// Returns for each fluent whether its continuous changes affect at most one action at a time.
     fn exclusive_fluents(
         &self,
         situation: &Situation,
@@ -343,7 +343,7 @@ impl Builder<'_> {
         parts.exclusive_fluents()
     }
 
-    /// Adds what continuous changes demand to the conditions of starts.
+    /// Adds the tests implied by continuous changes to the conditions of starts.
     fn add_implied_tests(&mut self, exclusive: &[bool]) {
         for action in self
             .actions
@@ -361,7 +361,7 @@ impl Builder<'_> {
         }
     }
 
-    /// `exclusive`: see [`exclusive`].
+    /// Sets the compressibility of each action. For `exclusive`, see [`exclusive`].
     fn note_compressibility(&mut self, exclusive: &[bool], compresses_flows: bool) {
         let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
         for (number, action) in self.actions.iter_mut().enumerate() {
@@ -371,7 +371,7 @@ impl Builder<'_> {
             let snaps = [action.start, action.end].map(|snap| &self.snaps[snap as usize]);
             let offers = |l: Literal| readers[l.index()].has_other_than(narrow(number));
             action.compressibility = compressibility(snaps[0], snaps[1], &offers);
-            // What changes continuously may be there to be read meanwhile.
+            // Other actions may read a continuously changing value meanwhile.
             let mut flows = action.flows.iter();
             if flows.any(|flow| !exclusive[flow.fluent as usize]) {
                 let most = if compresses_flows {
@@ -384,7 +384,7 @@ impl Builder<'_> {
         }
     }
 
-    /// See [`Compiled::timed_until_goal`].
+    /// Computes [`Compiled::timed_until_goal`].
     fn timed_until_goal(&self, grounding: &Grounding, coming: &Coming) -> u32 {
         let mut goal = Separations::default();
         goal.need_from_now_on(self.task, &grounding.goal, &self.links);
@@ -394,7 +394,7 @@ impl Builder<'_> {
         last.map_or(0, |last| narrow(last + 1))
     }
 
-    /// The metric, and what has been spent of it in the situation.
+    /// Returns the metric and its value in the situation.
     fn metric(&mut self, situation: &Situation, timed: &[Timed]) -> (Option<Metric>, Rational) {
         let Some(draft) = self.metric.take() else {
             return (None, Rational::ZERO);

@@ -8,7 +8,8 @@ use crate::embedded::compile::is_conflict;
 use crate::embedded::formula::Formula;
 
 impl Builder<'_> {
-    /// The happening; what its effects read at the action's start is added to the guards.
+    /// Compiles a happening. The conditions that its effects read at the action's start are added
+    /// to the guards.
     pub(super) fn snap(&mut self, body: &ground::SnapAction, guards: &mut Vec<Formula>) -> Snap {
         let mut snap = Snap {
             condition: self.symbols.formula(&body.condition),
@@ -59,7 +60,7 @@ impl Builder<'_> {
         snap
     }
 
-    /// The effect of a change on the search's numbers, if there is any.
+    /// Returns the effect of a change on the search's numbers, if there is any.
     fn change(&mut self, change: &ModelChange) -> Option<Change> {
         match change {
             ModelChange::Add(fact) => self.symbols.known_fact(*fact).map(Change::Add),
@@ -82,7 +83,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The addition of a change to the metric's sum.
+    /// Returns the amount that a change adds to the metric's sum.
     fn cost(&self, change: &ModelChange) -> Option<ground::Expression> {
         let ModelChange::Update {
             operator,

@@ -1,4 +1,4 @@
-//! What random problems say of two numbers, `n0` and `n1`.
+//! Random conditions and effects on two numbers, `n0` and `n1`.
 
 use std::fmt::Write;
 
@@ -12,7 +12,7 @@ pub(super) struct Demand {
     bound: i8,
 }
 
-/// A number is changed by a constant, and so many times the other number.
+/// A change of a number by a constant, plus a multiple of the other number.
 #[derive(Clone, Debug)]
 pub(super) struct Change {
     number: u8,
@@ -21,8 +21,8 @@ pub(super) struct Change {
     others: i8,
 }
 
-/// What an action needs of the numbers at the start, throughout and at the end, and how it changes each of them
-/// at the start and at the end.
+/// The numeric conditions of an action at the start, over all and at the end, and its changes at
+/// the start and at the end.
 #[derive(Clone, Debug)]
 pub(super) struct Numbers {
     needs: Vec<(&'static str, Demand)>,
@@ -32,7 +32,7 @@ pub(super) struct Numbers {
 
 fn demands() -> impl Strategy<Value = Demand> {
     let comparison = prop::sample::select(vec![">=", ">=", ">", "<=", "<", "="]);
-    // Most ask for one number, as most conditions do.
+    // Most demands concern one number, as most conditions do.
     let factors = prop_oneof![
         Just((1, 0)),
         Just((0, 1)),
@@ -56,7 +56,7 @@ fn changes() -> impl Strategy<Value = Change> {
     })
 }
 
-/// What an action has to do with the numbers.
+/// Generates the conditions and effects of an action on the numbers.
 pub(super) fn numbers() -> impl Strategy<Value = Numbers> {
     let when = prop::sample::select(vec!["at start", "at start", "over all", "at end"]);
     (
@@ -67,7 +67,7 @@ pub(super) fn numbers() -> impl Strategy<Value = Numbers> {
         .prop_map(|(needs, start, end)| Numbers { needs, start, end })
 }
 
-/// What the goal asks of them.
+/// Generates the goal's conditions on the numbers.
 pub(super) fn goals() -> impl Strategy<Value = Vec<Demand>> {
     prop::collection::vec(demands(), 0..3)
 }
@@ -96,7 +96,7 @@ impl Change {
 }
 
 impl Numbers {
-    /// The conditions.
+    /// Returns the conditions as text.
     pub(super) fn needs(&self) -> String {
         let mut text = String::new();
         for (when, demand) in &self.needs {
@@ -105,7 +105,7 @@ impl Numbers {
         text
     }
 
-    /// The effects at the start, and those at the end.
+    /// Returns the effects at the start, and those at the end.
     pub(super) fn effects(&self) -> [String; 2] {
         [("at start", &self.start), ("at end", &self.end)].map(|(when, change)| {
             let change = change.as_ref();

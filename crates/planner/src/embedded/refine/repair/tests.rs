@@ -1,4 +1,4 @@
-//! What the nodes of a repair take is counted, and ends it.
+//! Memory accounting of a repair, and its limit.
 
 use std::fmt::Write;
 
@@ -9,7 +9,7 @@ use super::*;
 use crate::embedded::testing::compiled;
 use crate::embedded::time::NEVER;
 
-/// So many lamps, all of which have to burn: a relaxed plan lights each of them.
+/// Returns a task with `count` lamps that must all be lit; a relaxed plan lights each of them.
 fn lamps(count: usize) -> Task {
     let domain = "(define (domain lamps) (:requirements :typing :durative-actions)
         (:types lamp) (:predicates (burns ?l - lamp))
@@ -31,7 +31,8 @@ fn lamps(count: usize) -> Task {
     Task::new(read.expect("it is right").0)
 }
 
-/// What comes of the search for a plan of which nothing is left, and what it keeps, with so much memory.
+/// Searches for a plan without any remaining items under a memory limit. Returns the result and the
+/// tree.
 fn searched(task: &Task, most_memory: usize) -> (Option<Vec<Item>>, Tree) {
     let compiled = compiled(task);
     let compresses = Some(Compressibility::HoldsResource);
@@ -64,7 +65,7 @@ fn searched(task: &Task, most_memory: usize) -> (Option<Vec<Item>>, Tree) {
     (found, tree)
 }
 
-/// What is kept, added up anew.
+/// Recomputes the memory of the tree.
 fn counted(tree: &Tree) -> usize {
     let waiting: usize = tree.queue.values().map(Node::size).sum();
     waiting + PLACE_SIZE * tree.nodes.len()
@@ -85,7 +86,7 @@ fn a_repair_ends_when_its_nodes_take_more_than_they_may() {
         assert_eq!(found, None, "with {most} bytes");
         assert_eq!(tree.memory, counted(&tree));
         assert!(tree.memory > most, "it went on for as long as it might");
-        // One node more than there was room for, and that which had its turn.
+        // One node beyond the limit, and the one that was being expanded.
         assert!(
             tree.memory <= most + 3 * largest,
             "{} of {most}",

@@ -1,9 +1,9 @@
 //! Conflict-driven clause learning over orders (Marques-Silva & Sakallah, IEEE Transactions on
-//! Computers 48, 1999; Moskewicz et al., "Chaff", DAC 2001), with [`Times`] as its theory: what the
-//! bounds on times rule out is explained by paths and learnt (lazy clause generation; Ohrimenko,
-//! Stuckey & Codish, Constraints 14, 2009).
+//! Computers 48, 1999; Moskewicz et al., "Chaff", DAC 2001), with [`Times`] as its theory: orders
+//! that the bounds on times exclude are explained by paths and learnt (lazy clause generation;
+//! Ohrimenko, Stuckey & Codish, Constraints 14, 2009).
 //!
-//! A literal is twice its variable, plus one where that is false.
+//! A literal is twice its variable, plus one for the negative literal.
 
 mod learning;
 
@@ -17,7 +17,7 @@ pub(super) const TRUE: u32 = u32::MAX - 1;
 /// A literal that is never true.
 pub(super) const FALSE: u32 = u32::MAX - 2;
 
-/// The other literal of the variable.
+/// Returns the negation of the literal.
 pub(super) fn negated(literal: u32) -> u32 {
     match literal {
         TRUE => FALSE,
@@ -32,67 +32,69 @@ const RESTART: u64 = 64;
 enum Reason {
     Decision,
     Clause(u32),
-    /// The bounds on times, when the clock was there.
+    /// The bounds on times at this clock value.
     Bounds(u32),
 }
 
 #[derive(Clone, Debug)]
 struct Clause {
     literals: Vec<u32>,
-    /// From how many levels its literals were, if it is learnt (Audemard & Simon, IJCAI 2009).
+    /// Number of levels of its literals when it was learnt (Audemard & Simon, IJCAI 2009).
     levels: u32,
 }
 
-/// What became of a search.
+/// Outcome of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// All that has to be decided is decided.
+    /// All required variables are decided.
     Consistent,
-    /// No order is left.
+    /// No order exists.
     Contradiction,
-    /// None is over so early as it is to be for now.
+    /// No order reaches the current target.
     TooEarly,
-    /// There were so many conflicts.
+    /// The limit on restarts was reached.
     TooHard,
     WorkDone,
 }
 
-/// See the module.
+/// CDCL solver over orders and times.
 #[derive(Debug, Default)]
 pub(super) struct Solver {
     pub(super) times: Times,
-    /// The edge that each literal stands for, if any.
+    /// The edge of each literal, if any.
     pub(super) edges: Vec<Option<Edge>>,
-    /// For each place of times, the literals whose edges its value may rule out, with the other place and
-    /// the distance.
+    /// For each position of times, the literals whose edges its value may exclude, with the other
+    /// position and the distance.
     concerned: Vec<Vec<(u32, u32, Ticks)>>,
     clauses: Vec<Clause>,
-    /// How many of them are learnt, and how many may be.
+    /// Number of learnt clauses, and the limit on it.
     learnt: (usize, usize),
-    /// For each literal, the clauses that watch it, and another of their literals.
+    /// For each literal, the clauses that watch it, each with another of their literals.
     watches: Vec<Vec<(u32, u32)>>,
-    /// For each literal, whether it is true.
+    /// For each literal, `true` if it is assigned true.
     is_true: Vec<bool>,
     levels: Vec<u32>,
     reasons: Vec<Reason>,
     phases: Vec<bool>,
-    /// Which variables are decided; others only where times are in conflict.
+    /// For each variable, `true` if the search branches on it. Other pairs are decided only if
+    /// their times conflict.
     is_decided: Vec<bool>,
     activities: Vec<f64>,
     bump: f64,
-    /// Variables by activity; out of date now and then.
+    /// Variables by activity; entries may be outdated.
     heap: BinaryHeap<(u64, u32)>,
     trail: Vec<u32>,
-    /// Where each level begins in the trail, and the clock of times.
+    /// Beginning of each level in the trail, and the clock of times.
     limits: Vec<(usize, u32)>,
-    /// Up to where the trail was propagated, by clauses and by times.
+    /// Positions up to which clauses and times have propagated the trail.
     heads: (usize, usize),
     is_seen: Vec<bool>,
     is_contradictory: bool,
     conflicts: u64,
-    /// Conflicts until the next restart, and how many restarts there were for this target.
+    /// Conflicts until the next restart, and the number of restarts for the current target.
     restart: (u64, u64),
-    /// A literal that all is over by some time: it is assumed for now.
+    /// A literal which states that all happenings end by some time. It is assumed until the target
+    /// changes.
     target: Option<(u32, Ticks)>,
     pub(super) work: u64,
 }
@@ -105,7 +107,7 @@ impl Solver {
         }
     }
 
-    /// A new variable, which is tried with that value first.
+    /// Adds a variable; `phase` is the value that is tried first.
     pub(super) fn variable(&mut self, phase: bool, edges: [Option<Edge>; 2]) -> u32 {
         let variable = u32::try_from(self.levels.len()).unwrap_or(NONE / 4);
         self.levels.push(0);
@@ -135,30 +137,31 @@ impl Solver {
         self.is_true[literal as usize]
     }
 
-    /// Whether neither the literal nor its negation is true.
+    /// Returns `true` if the literal is unassigned.
     pub(super) fn is_open(&self, literal: u32) -> bool {
         !self.is_true(literal) && !self.is_true(literal ^ 1)
     }
 
-    /// All literals with an edge, and that.
+    /// Returns all literals with an edge, and the edges.
     pub(super) fn all_edges(&self) -> impl Iterator<Item = (u32, Edge)> + '_ {
         let edges = (0..).zip(&self.edges);
         edges.filter_map(|(literal, edge)| Some((literal, (*edge)?)))
     }
 
-    /// Adds an edge that always holds; before all decisions.
+    /// Adds an edge that always holds. Must be called before all decisions.
     pub(super) fn always(&mut self, edge: Edge) {
         self.is_contradictory |= self.times.assert(edge, NONE).is_err();
     }
 
-    /// From now on all is over by then.
+    /// Requires that all happenings end by `latest`.
     pub(super) fn hurry(&mut self, latest: Ticks) {
         self.back_to(0);
         self.is_contradictory |= self.times.hurry(latest, NONE).is_err();
         self.rule_out();
     }
 
-    /// For now only orders count that are over by then, which what is learnt takes into account.
+    /// Sets a temporary target: orders must end by `latest`. Learnt clauses include the literal of
+    /// the target.
     pub(super) fn aim(&mut self, latest: Ticks) {
         self.back_to(0);
         if let Some((literal, _)) = self.target
@@ -170,17 +173,17 @@ impl Solver {
         self.restart = (0, 0);
     }
 
-    /// By when all is to be over for now.
+    /// Returns the current target.
     pub(super) fn target(&self) -> Option<Ticks> {
         self.target.map(|target| target.1)
     }
 
-    /// Tries that order first.
+    /// Sets the preferred value of the literal's variable.
     pub(super) fn prefer(&mut self, literal: u32) {
         self.phases[literal as usize / 2] = literal.is_multiple_of(2);
     }
 
-    /// From now on one of these literals is true. All decisions are taken back.
+    /// Adds a clause and reverts all decisions.
     pub(super) fn add(&mut self, literals: &[u32]) {
         self.back_to(0);
         if literals.contains(&TRUE) {
@@ -231,7 +234,7 @@ impl Solver {
         self.trail.push(literal);
     }
 
-    /// Takes back all decisions after that level.
+    /// Reverts all decisions after that level.
     fn back_to(&mut self, level: u32) {
         let Some(&(begin, clock)) = self.limits.get(level as usize) else {
             return;
@@ -260,7 +263,8 @@ impl Solver {
         self.heap.push((activity, NONE - variable));
     }
 
-    /// Draws conclusions; the literals that cannot all be true, if they contradict each other.
+    /// Propagates all consequences. Returns the literals that cannot all be true if there is a
+    /// conflict.
     fn propagate(&mut self) -> Result<(), Contradiction> {
         loop {
             while let Some(&literal) = self.trail.get(self.heads.0) {
@@ -327,7 +331,7 @@ impl Solver {
         Err(literals.map(|literal| literal ^ 1).collect())
     }
 
-    /// Finds the orders that the bounds on times rule out.
+    /// Finds the orders that the bounds on times exclude.
     fn rule_out(&mut self) {
         let mut changed = std::mem::take(&mut self.times.changed);
         changed.sort_unstable();
@@ -357,7 +361,7 @@ impl Solver {
         self.enqueue(literal, Reason::Decision);
     }
 
-    /// The variable of those to be decided that had most to do with conflicts.
+    /// Returns the undecided variable with the highest conflict activity.
     fn next(&mut self) -> Option<u32> {
         while let Some((activity, variable)) = self.heap.pop() {
             let variable = NONE - variable;
@@ -369,7 +373,7 @@ impl Solver {
         None
     }
 
-    /// Goes on for so much work, or until all is decided, or after so many restarts.
+    /// Runs until `most` work is done, all variables are decided, or `restarts` restarts were made.
     pub(super) fn run(&mut self, most: u64, restarts: u64) -> Outcome {
         let end = self.spent() + most;
         while !self.is_contradictory {
@@ -413,13 +417,13 @@ impl Solver {
         Outcome::Contradiction
     }
 
-    /// The work so far.
+    /// Returns the work so far.
     pub(super) fn spent(&self) -> u64 {
         self.work + self.times.work
     }
 }
 
-/// The sequence 1, 1, 2, 1, 1, 2, 4, … (Luby, Sinclair & Zuckerman, 1993).
+/// Returns an element of the sequence 1, 1, 2, 1, 1, 2, 4, … (Luby, Sinclair & Zuckerman, 1993).
 fn luby(number: u64) -> u64 {
     let mut number = number;
     loop {

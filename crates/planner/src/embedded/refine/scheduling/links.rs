@@ -5,11 +5,11 @@ use super::super::Ticker;
 use super::clauses::{FALSE, TRUE, negated};
 use super::model::{MOST, Model, Need, snap_of};
 
-/// So many makers and breakers of one condition are too many, in pairs.
+/// Maximum number of pairs of makers and breakers of one condition.
 const MOST_OF_ONE: usize = 20_000;
 
 impl Model<'_> {
-    /// Finds who changes which fact.
+    /// Finds the happenings that change each fact.
     pub(super) fn note_changers(&mut self) {
         let mut timed = 0;
         for (node, item) in (0..).zip(&self.items) {
@@ -30,7 +30,7 @@ impl Model<'_> {
         }
     }
 
-    /// Lets each condition on facts have a supporter.
+    /// Adds the clauses that every condition on facts has a supporter.
     pub(super) fn support_all(&mut self, ticker: &mut Ticker<'_>) -> Option<()> {
         let mut spent = 0;
         self.visit_needs(ticker, &mut |model, need, formula| {
@@ -47,7 +47,8 @@ impl Model<'_> {
         Some(())
     }
 
-    /// Someone brings about what is needed, and nobody breaks it in between.
+    /// Adds the clauses that some happening makes the literal true, and no happening breaks it
+    /// before the need.
     fn support(&mut self, need: Need, literal: Literal) -> Option<()> {
         let fact = literal.fact();
         let [adding, deleting] = self.changers.get(&fact).cloned().unwrap_or_default();
@@ -72,7 +73,7 @@ impl Model<'_> {
         if size > MOST_OF_ONE || self.size > MOST {
             return None;
         }
-        // In the plan itself, the last one before is the supporter.
+        // In the plan itself, the last maker before the need is the supporter.
         let is_before = |node: u32| begin.is_none_or(|begin| node < begin);
         let mut own = makers.iter().copied().filter(|&node| is_before(node)).max();
         let mut supporters: Vec<(Option<u32>, u32)> = Vec::new();

@@ -1,9 +1,9 @@
-//! The plan as a problem of ordering: what its happenings need of each other.
+//! The plan as an ordering problem: the dependencies between its happenings.
 //!
 //! Two happenings that interfere come in one order or the other, with the least separation. Each
-//! condition on a fact has a supporter, and what breaks it comes before the supporter or after the
-//! need (causal links and threats; `McAllester` & Rosenblitt, AAAI 1991; for the reordering of plans:
-//! Siddiqui & Haslum, 2012; Muise, Beck & `McIlraith`, JAIR 57, 2016).
+//! condition on a fact has a supporter, and each happening that breaks it comes before the
+//! supporter or after the need (causal links and threats; `McAllester` & Rosenblitt, AAAI 1991; for
+//! the reordering of plans: Siddiqui & Haslum, 2012; Muise, Beck & `McIlraith`, JAIR 57, 2016).
 
 use std::collections::BTreeMap;
 
@@ -21,34 +21,34 @@ use super::numbers::{Demand, Sum};
 use super::times::{Edge, UNBOUNDED};
 use elbowroom_num::Rational;
 
-/// So many pairs that interfere, and literals of clauses, are too many.
+/// Maximum number of interfering pairs, and of literals in clauses.
 pub(super) const MOST: usize = 500_000;
 
-/// An instance of an action, or one time of timed initials.
+/// An instance of an action, or the timed initials of one time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Block {
     /// Its happenings in order.
     pub(super) nodes: Vec<u32>,
-    /// How long it may take, if it does.
+    /// Bounds on the duration, if it has one.
     pub(super) least: Ticks,
     pub(super) most: Ticks,
     pub(super) duration: Option<Rational>,
-    /// When it started, if it was under way before.
+    /// Start time of an action that was already running in the situation.
     pub(super) start: Option<Ticks>,
 }
 
-/// When a condition must hold.
+/// Time at which a condition must hold.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Need {
-    /// As the happening comes.
+    /// Just before the happening.
     At(u32),
-    /// From after the one happening, or the beginning, until the other.
+    /// From after the first happening, or from the beginning, until the second one.
     Throughout(Option<u32>, u32),
-    /// At the end.
+    /// At the end of the plan.
     Goal,
 }
 
-/// See the module. A *node* is a happening: its place in the plan.
+/// Ordering problem of a plan. A *node* is a happening, by its position in the plan.
 pub(super) struct Model<'a> {
     pub(super) compiled: &'a Compiled,
     pub(super) solver: Solver,
@@ -56,11 +56,11 @@ pub(super) struct Model<'a> {
     /// The block of each node.
     pub(super) block_of: Vec<u32>,
     pub(super) blocks: Vec<Block>,
-    /// The literal that a pair is ordered as in the plan.
+    /// For each pair, the literal which states that it is ordered as in the plan.
     pub(super) pairs: Map<(u32, u32), u32>,
     /// The pairs that interfere and keep their order.
     pub(super) kept: Vec<(u32, u32)>,
-    /// For each fact, who adds it and who deletes it.
+    /// For each fact, the nodes that add it and those that delete it.
     pub(super) changers: Map<u32, [Vec<u32>; 2]>,
     pub(super) root: State,
     pub(super) demands: Vec<Demand>,
@@ -69,7 +69,8 @@ pub(super) struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// The plan of these items, of which timed initials keep their order. `None` if there is something that cannot be told like this.
+    /// Returns the model of these items, in which timed initials keep their order. Returns `None`
+    /// if the model cannot express the plan.
     pub(super) fn of(
         compiled: &'a Compiled,
         items: &[Item],
@@ -102,7 +103,7 @@ impl<'a> Model<'a> {
         (!ticker.is_stopped).then_some(model)
     }
 
-    /// Plays the plan, and reads off how long its actions take.
+    /// Replays the plan to determine the durations of its actions.
     fn find_blocks(&mut self, ticker: &mut Ticker<'_>) -> Option<()> {
         let compiled = self.compiled;
         let mut scene = Scene::beginning(compiled);
@@ -142,7 +143,7 @@ impl<'a> Model<'a> {
         ticker.ask().then_some(())
     }
 
-    /// Gives each happening its window, and ends their distance from starts.
+    /// Adds the window of each happening, and the distances between starts and ends.
     fn place(&mut self) -> Option<()> {
         let compiled = self.compiled;
         let mut timed = 0;
@@ -181,7 +182,7 @@ impl<'a> Model<'a> {
         Some(())
     }
 
-    /// What is before all timed initials that the plan does not come to.
+    /// Bounds the happenings that must precede timed initials after the end of the plan.
     fn precede_the_rest(&mut self, taken: usize) {
         let compiled = self.compiled;
         for (node, item) in (0..).zip(&self.items) {
@@ -205,7 +206,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Finds the pairs that must keep some distance.
+    /// Finds the pairs that must be separated by some distance.
     fn separate(&mut self, ticker: &mut Ticker<'_>) -> Option<()> {
         let compiled = self.compiled;
         let mut marking: Map<u32, Vec<u32>> = Map::default();
@@ -257,8 +258,8 @@ impl<'a> Model<'a> {
         ticker.ask().then_some(())
     }
 
-    /// Demands that of two instances of an action that must not overlap itself one ends before the other one
-    /// starts.
+    /// Requires that instances of an action that must not overlap itself follow each other: one
+    /// ends before the other one starts.
     fn keep_apart(&mut self, ticker: &mut Ticker<'_>) -> Option<()> {
         let mut instances: BTreeMap<u32, Vec<Block>> = BTreeMap::new();
         for block in &self.blocks {
@@ -293,16 +294,17 @@ impl<'a> Model<'a> {
         Some(())
     }
 
-    /// Returns the literal that one instance starts after the end of the other one.
+    /// Returns the literal which states that one instance starts after the end of the other one.
     fn follows(&mut self, later: &Block, earlier: &Block) -> u32 {
         match (earlier.nodes.last(), later.nodes.first(), later.start) {
             (Some(&end), Some(&start), None) => self.before(end, start),
-            // It was running in the beginning.
+            // It was running in the initial situation.
             _ => FALSE,
         }
     }
 
-    /// A pair that may come in either order, with the distances to keep, or that keeps its own.
+    /// Adds a pair that may be ordered either way, with the distances to keep (zero if `None`). A
+    /// pair of timed initials keeps its order.
     fn pair(&mut self, first: u32, second: u32, distances: [Option<Ticks>; 2]) -> u32 {
         let edge = |from, to, distance: Option<Ticks>| Edge {
             from,
@@ -330,7 +332,7 @@ impl<'a> Model<'a> {
         !(is_timed(first) && is_timed(second))
     }
 
-    /// The literal that one happening comes before another one.
+    /// Returns the literal which states that one happening precedes another one.
     pub(super) fn before(&mut self, first: u32, second: u32) -> u32 {
         if first == second {
             return FALSE;
@@ -347,7 +349,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Calls `visit` for each condition of the plan; `None` as soon as that does.
+    /// Calls `visit` for each condition of the plan. Returns `None` as soon as `visit` does.
     pub(super) fn visit_needs(
         &mut self,
         ticker: &mut Ticker<'_>,
@@ -378,7 +380,7 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The snap that happens there; none of timed initials.
+/// Returns the snap of the item, or `None` for timed initials.
 pub(super) fn snap_of(compiled: &Compiled, item: Item) -> Option<u32> {
     match item.kind {
         Kind::Timed => None,

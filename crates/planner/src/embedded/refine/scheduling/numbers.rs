@@ -1,9 +1,9 @@
 //! Conditions on numbers that the happenings of a plan change by constants: cumulative resources,
 //! reservoirs, counters.
 //!
-//! What two instances cannot do together is told at once. The rest is learnt from schedules in which
-//! a condition fails: one of those that took something comes later, or is over, or one of those that
-//! bring something comes earlier (precedence constraint posting; Cesta, Oddi & Smith, Journal of
+//! Conflicts of two instances become clauses at once. The others are learnt from schedules in which
+//! a condition fails: some happening that consumes must come later, or be over, or some happening
+//! that produces must come earlier (precedence constraint posting; Cesta, Oddi & Smith, Journal of
 //! Heuristics 8, 2002; Laborie, AIJ 143, 2003).
 
 use std::cmp::Reverse;
@@ -17,10 +17,10 @@ use super::super::Ticker;
 use super::clauses::negated;
 use super::model::{Model, Need, snap_of};
 
-/// What each block adds to a sum: its happenings that do, in order, and how much.
+/// For each block that changes a sum, its happenings that do, in order, with the amounts.
 pub(super) type Sum = Vec<(u32, Vec<(u32, i64)>)>;
 
-/// A sum that may not be negative (nor zero, if that is strict) while it is needed.
+/// A sum that must not be negative (nor zero, if the test is strict) while it is needed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Demand {
     need: Need,
@@ -35,17 +35,17 @@ impl Demand {
     }
 }
 
-/// A moment: before a happening, or right after it.
+/// A moment: just before or just after a happening.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     node: u32,
     is_after: bool,
 }
 
-/// Who changes a fluent, and by how much.
+/// For each fluent, the happenings that change it, with the amounts.
 type Changes = Map<u32, Vec<(u32, Rational)>>;
 
-/// The sums of the values after each happening of a block, beginning with zero.
+/// Returns the sums after each happening of a block, beginning with zero.
 fn prefixes(deltas: &[(u32, i64)]) -> impl Iterator<Item = i64> + Clone + '_ {
     let sums = deltas.iter().scan(0, |sum, (_, delta)| {
         *sum += delta;
@@ -59,11 +59,11 @@ fn most(deltas: &[(u32, i64)]) -> i64 {
 }
 
 impl Model<'_> {
-    /// Notes all conditions on numbers that the order of happenings can break.
+    /// Records all conditions on numbers that the order of happenings can break.
     pub(super) fn demand_all(&mut self, ticker: &mut Ticker<'_>) -> Option<()> {
         let mut needs: Vec<(Need, u32)> = Vec::new();
         self.visit_needs(ticker, &mut |_, need, formula| {
-            // At the end, the sum of all changes is the same in any order.
+            // At the end, the sum of all changes does not depend on the order.
             if !matches!(need, Need::Goal) {
                 needs.extend(formula.tests.iter().map(|&test| (need, test)));
             }
@@ -120,7 +120,7 @@ impl Model<'_> {
         Some(())
     }
 
-    /// The block that has the need.
+    /// Returns the block that has the need.
     fn block(&self, need: Need) -> u32 {
         match need {
             Need::At(node) | Need::Throughout(_, node) => self.block_of[node as usize],
@@ -128,7 +128,7 @@ impl Model<'_> {
         }
     }
 
-    /// The changes of the fluents that conditions read; `None` if they are no constants.
+    /// Returns the changes of the fluents that conditions read, or `None` if they are not constant.
     fn changes(&self, needs: &[(Need, u32)]) -> Option<Changes> {
         let compiled = self.compiled;
         let mut is_read = vec![false; compiled.fluents.len()];
@@ -189,7 +189,7 @@ impl Model<'_> {
         Some(changes)
     }
 
-    /// Notes a condition, unless it holds whatever the order.
+    /// Records a condition, unless it holds in every order.
     fn demand(
         &mut self,
         (need, is_strict): (Need, bool),
@@ -241,7 +241,8 @@ impl Model<'_> {
         Some(())
     }
 
-    /// The moments at which a condition may begin to fail, and what is true of them.
+    /// Returns the moments at which a condition may begin to fail, each with the literals that must
+    /// be true for it to matter.
     fn points(&mut self, demand: Demand) -> Vec<(Point, Vec<u32>)> {
         let point = |node: u32, is_after: bool| Point { node, is_after };
         match demand.need {
@@ -269,8 +270,8 @@ impl Model<'_> {
         }
     }
 
-    /// Tells which single instance must not be in which part of its course at a moment. The work, or
-    /// `None` if the condition can never hold.
+    /// Adds clauses for single instances: the phases in which an instance must not be at a moment.
+    /// Returns the work, or `None` if the condition can never hold.
     fn tell_pairs(&mut self, demand: Demand) -> Option<u64> {
         let mut work = 0;
         for (point, known) in self.points(demand) {
@@ -308,7 +309,8 @@ impl Model<'_> {
         Some(work)
     }
 
-    /// What a block has added by then, if that is known: it is that of the moment, or of the condition.
+    /// Returns the amount that a block has added by a moment, if it is known: the block is that of
+    /// the moment, or of the condition.
     fn fixed(
         &self,
         demand: Demand,
@@ -331,7 +333,8 @@ impl Model<'_> {
         }
     }
 
-    /// The literals that so many of these happenings are over by then.
+    /// Adds the literals which state that exactly the first `passed` happenings are over at a
+    /// moment.
     fn course(
         &mut self,
         point: Point,
@@ -347,8 +350,8 @@ impl Model<'_> {
         }
     }
 
-    /// Clauses that an order breaks in which a condition on numbers fails. `rank`: the place of each
-    /// happening.
+    /// Returns the clauses that an order violates because a condition on numbers fails. `rank` is
+    /// the position of each happening.
     pub(super) fn broken(&mut self, rank: &[usize]) -> Vec<Vec<u32>> {
         let mut clauses = Vec::new();
         for number in 0..self.demands.len() {
@@ -376,7 +379,8 @@ impl Model<'_> {
     ) -> Option<Vec<u32>> {
         let place = rank[point.node as usize];
         let (mut value, mut top) = (demand.base, demand.base);
-        // Who adds less than it might, by how much, and how many of its happenings are over.
+        // The blocks that add less than they could: the difference, the block, and the number of
+        // its happenings that are over.
         let mut less: Vec<(i64, usize, usize)> = Vec::new();
         self.solver.work += self.sums[demand.sum].len() as u64;
         for (number, (block, deltas)) in self.sums[demand.sum].iter().enumerate() {

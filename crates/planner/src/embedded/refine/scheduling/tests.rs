@@ -1,5 +1,5 @@
-//! On random small plans, the order that the search ends with is over as early as the earliest of all
-//! orders, each played through the states of the planner.
+//! Checks on small random plans that the final order of the search ends as early as the earliest of
+//! all orders, each replayed through the states of the planner.
 
 use std::fmt::Write;
 
@@ -18,7 +18,7 @@ use super::super::sequence::{Item, Kind, Scene};
 use super::super::{Ticker, incumbent};
 use super::Scheduling;
 
-/// What a random problem is made of.
+/// Elements of a random problem.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::struct_excessive_bools, reason = "each may be there or not")]
 struct Kinds {
@@ -27,14 +27,14 @@ struct Kinds {
     has_timed: bool,
     /// Conditions on a fact that only timed initials change.
     has_calendar: bool,
-    /// Conditions on numbers throughout.
+    /// Over-all conditions on numbers.
     has_numbers_throughout: bool,
 }
 
 const ACTIONS: usize = 4;
 const FACTS: usize = 3;
 
-/// Some literals at these moments.
+/// Adds some literals with this time specifier.
 fn literals(random: &mut Random, when: &str, most: usize, text: &mut String) {
     for _ in 0..random.below(most + 1) {
         let fact = random.below(FACTS);
@@ -150,8 +150,8 @@ fn random_task(random: &mut Random, kinds: Kinds) -> Task {
     Task::new(read.expect("it is right").0)
 }
 
-/// The next items: those of all actions that have not been tried, ends of what is under way, and the next
-/// timed initials.
+/// Returns the possible next items: all actions that have not been tried, the ends of running
+/// actions, and the next timed initials.
 fn next_items(compiled: &Compiled, scene: &Scene, rest: &[Item]) -> Vec<Item> {
     let is_open = |item: &Item| scene.open.contains(&item.block);
     let mut next: Vec<Item> = Vec::new();
@@ -170,7 +170,7 @@ fn next_items(compiled: &Compiled, scene: &Scene, rest: &[Item]) -> Vec<Item> {
     next
 }
 
-/// A plan by chance: items in an order that is possible.
+/// Returns a random plan: items in an applicable order.
 fn random_plan(compiled: &Compiled, random: &mut Random) -> Option<Vec<Item>> {
     let mut rest = Vec::new();
     for (block, action) in (0..).zip(0..compiled.actions.len()) {
@@ -208,7 +208,7 @@ fn random_plan(compiled: &Compiled, random: &mut Random) -> Option<Vec<Item>> {
     is_goal(compiled, &scene.state).then_some(items)
 }
 
-/// The earliest end of all orders of these items.
+/// Computes the earliest end of all orders of these items.
 fn earliest(compiled: &Compiled, scene: &Scene, rest: &mut Vec<Item>, best: &mut Ticks) {
     if scene.state.earliest_end() >= *best {
         return;
@@ -233,7 +233,7 @@ fn earliest(compiled: &Compiled, scene: &Scene, rest: &mut Vec<Item>, best: &mut
     }
 }
 
-/// The end that scheduling comes to, `None` if it does not take the plan.
+/// Returns the end of the final order of scheduling, or `None` if it does not support the plan.
 fn scheduled(compiled: &Compiled, incumbent: Incumbent, target: Ticks) -> Option<Ticks> {
     let mut ticker = Ticker {
         weight: 1,
@@ -257,7 +257,7 @@ fn scheduled(compiled: &Compiled, incumbent: Incumbent, target: Ticks) -> Option
     Some(best.worth.end)
 }
 
-/// How many plans were compared, and how many of these there is a better order for.
+/// Returns the number of plans compared, and the number of those with a better order.
 fn compare(kinds: Kinds, seeds: std::ops::Range<u64>) -> (usize, usize) {
     let (mut compared, mut improved) = (0, 0);
     for seed in seeds {

@@ -1,9 +1,9 @@
-//! The times of happenings under distances that come and go: difference logic as the theory of a
-//! search over orders, with the longest paths as explanations (Nieuwenhuis & Oliveras, "DPLL(T) with
-//! exhaustive theory propagation and its application to difference logic", CAV 2005).
+//! Times of happenings under retractable distances: difference logic as the theory of a search over
+//! orders, with the longest paths as explanations (Nieuwenhuis & Oliveras, "DPLL(T) with exhaustive
+//! theory propagation and its application to difference logic", CAV 2005).
 //!
-//! Each happening has two *places*: one for its earliest time, and one for its latest, with the
-//! sign turned round. So both only grow, and meet in a contradiction where their sum is positive.
+//! Each happening has two *places*: one for its earliest time, and one for the negated latest time.
+//! So both values only grow, and they contradict each other if their sum is positive.
 
 use std::collections::VecDeque;
 
@@ -21,14 +21,14 @@ pub(super) struct Edge {
 }
 
 impl Edge {
-    /// The places of the earliest time of `from` and of the latest one of `to`: the edge is
-    /// impossible where their values and the distance come to more than zero.
+    /// Returns the places of the earliest time of `from` and of the latest one of `to`. The edge is
+    /// impossible if their values and the distance sum up to more than zero.
     pub(super) fn places(self) -> [u32; 2] {
         [2 * self.from, 2 * self.to + 1]
     }
 }
 
-/// Who pushes whom, and the literal that says so.
+/// Propagation edge to a place, and the literal that asserts it.
 #[derive(Clone, Copy, Debug)]
 struct Link {
     to: u32,
@@ -36,43 +36,43 @@ struct Link {
     literal: u32,
 }
 
-/// A place has got this value.
+/// A change of a place's value.
 #[derive(Clone, Copy, Debug)]
 struct Change {
     place: u32,
     value: Ticks,
-    /// The place that pushed it; [`NONE`] of a bound.
+    /// The place that caused the change; [`NONE`] for a bound.
     from: u32,
     distance: Ticks,
     literal: u32,
-    /// The change of the same place before.
+    /// The previous change of the same place.
     before: u32,
 }
 
-/// See the module.
+/// Bounds on the times of happenings under a set of edges.
 #[derive(Debug, Default)]
 pub(super) struct Times {
-    /// The newest change of each place.
+    /// The latest change of each place.
     newest: Vec<u32>,
-    /// Its value.
+    /// The value of each place.
     values: Vec<Ticks>,
-    /// Of each happening.
+    /// For each happening, `true` if it counts for the end.
     counts: Vec<bool>,
     changes: Vec<Change>,
     links: Vec<Vec<Link>>,
     waiting: VecDeque<u32>,
     is_waiting: Vec<bool>,
-    /// The places that have changed since this was emptied.
+    /// The places that have changed since the list was last emptied.
     pub(super) changed: Vec<u32>,
     pub(super) work: u64,
 }
 
-/// The literals that cannot all be true.
+/// Literals that cannot all be true.
 pub(super) type Contradiction = Vec<u32>;
 
 impl Times {
-    /// Adds a happening that takes place in a window of time. One of a fixed time does not count for when
-    /// all is over.
+    /// Adds a happening with a time window. A happening with a fixed time does not count for the
+    /// end of all.
     pub(super) fn add(&mut self, earliest: Ticks, latest: Ticks) {
         self.counts.push(earliest < latest);
         for value in [earliest, -latest] {
@@ -85,7 +85,7 @@ impl Times {
         }
     }
 
-    /// Narrows the window of a happening, before anything else.
+    /// Narrows the window of a happening, before any edges are added.
     pub(super) fn bound(&mut self, node: u32, earliest: Ticks, latest: Ticks) {
         for (place, value) in [(2 * node, earliest), (2 * node + 1, -latest)] {
             if value > self.value(place) {
@@ -94,24 +94,24 @@ impl Times {
         }
     }
 
-    /// The value of a place.
+    /// Returns the value of a place.
     pub(super) fn value(&self, place: u32) -> Ticks {
         self.values[place as usize]
     }
 
-    /// The earliest time of a happening.
+    /// Returns the earliest time of a happening.
     pub(super) fn earliest(&self, node: u32) -> Ticks {
         self.value(2 * node)
     }
 
-    /// When all is over at the earliest.
+    /// Returns the earliest time at which all happenings are over.
     pub(super) fn earliest_end(&self) -> Ticks {
         let nodes = (0..).zip(&self.counts).filter(|node| *node.1);
         let times = nodes.map(|(node, _)| self.earliest(node));
         times.max().unwrap_or(-NEVER)
     }
 
-    /// How many changes there were.
+    /// Returns the number of changes.
     pub(super) fn clock(&self) -> u32 {
         u32::try_from(self.changes.len()).unwrap_or(NONE)
     }
@@ -153,7 +153,7 @@ impl Times {
         Ok(())
     }
 
-    /// Lets everything be over by then, as long as the literal holds.
+    /// Requires that all happenings end by `latest`, as long as the literal holds.
     pub(super) fn hurry(&mut self, latest: Ticks, literal: u32) -> Result<(), Contradiction> {
         self.begin();
         for place in (1..).step_by(2).take(self.newest.len() / 2) {
@@ -165,14 +165,14 @@ impl Times {
         self.settle(NONE)
     }
 
-    /// Nothing waits, though something may have when it ended in a contradiction.
+    /// Empties the queue, which a contradiction may have left non-empty.
     fn begin(&mut self) {
         for place in self.waiting.drain(..) {
             self.is_waiting[place as usize] = false;
         }
     }
 
-    /// Pushes on until nothing moves. What would push `origin` closes a cycle.
+    /// Propagates until no value changes. A change of `origin` closes a positive cycle.
     fn settle(&mut self, origin: u32) -> Result<(), Contradiction> {
         while let Some(place) = self.waiting.pop_front() {
             self.is_waiting[place as usize] = false;
@@ -205,7 +205,7 @@ impl Times {
         self.meet(to)
     }
 
-    /// Whether the earliest time of a happening is no later than its latest one.
+    /// Checks that the earliest time of a happening is no later than its latest one.
     fn meet(&self, place: u32) -> Result<(), Contradiction> {
         let other = self.value(place ^ 1);
         if self.value(place) + other <= 0 {
@@ -217,7 +217,7 @@ impl Times {
         Err(reasons)
     }
 
-    /// The literals of the cycle that has just pushed its origin.
+    /// Returns the literals of the cycle that has just changed its origin.
     fn cycle(&self, origin: u32) -> Contradiction {
         let mut reasons = Vec::new();
         let mut place = origin;
@@ -239,7 +239,7 @@ impl Times {
         reasons
     }
 
-    /// The newest change of a place before the clock was there.
+    /// Returns the latest change of a place before this clock value.
     fn at(&self, place: u32, clock: u32) -> u32 {
         let mut number = self.newest[place as usize];
         while number >= clock {
@@ -248,13 +248,13 @@ impl Times {
         number
     }
 
-    /// The value of a place before the clock was there.
+    /// Returns the value of a place before this clock value.
     pub(super) fn value_at(&self, place: u32, clock: u32) -> Ticks {
         self.changes[self.at(place, clock) as usize].value
     }
 
-    /// The literals because of which a place had at least that value before the clock was there: those
-    /// of the path that came to it first, so that they say more.
+    /// Adds the literals because of which a place had at least this value before this clock value.
+    /// Uses the path that reached the value first, so that the explanation is more general.
     pub(super) fn explain(&self, place: u32, needed: Ticks, clock: u32, reasons: &mut Vec<u32>) {
         let (mut place, mut needed, mut clock) = (place, needed, clock);
         loop {
@@ -277,7 +277,7 @@ impl Times {
         }
     }
 
-    /// Takes back the changes since the clock was there.
+    /// Reverts the changes since this clock value.
     pub(super) fn undo(&mut self, clock: u32) {
         for number in (clock as usize..self.changes.len()).rev() {
             let change = self.changes[number];
@@ -289,7 +289,7 @@ impl Times {
         self.changed.clear();
     }
 
-    /// Takes back an edge; the last one first.
+    /// Removes an edge; edges are removed in reverse order.
     pub(super) fn retract(&mut self, edge: Edge) {
         self.links[2 * edge.from as usize].pop();
         self.links[2 * edge.to as usize + 1].pop();

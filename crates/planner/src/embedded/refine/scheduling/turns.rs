@@ -1,4 +1,4 @@
-//! When a better order is looked for.
+//! Schedule of the search for better orders.
 
 use super::super::super::compile::Metric;
 use super::super::super::tuning::{IS_WHOLE, Technique};
@@ -8,12 +8,12 @@ use super::super::{Refiner, Ticker};
 use super::Scheduling;
 
 impl Refiner<'_> {
-    /// There is another best plan: goes on from that if it has the same actions.
+    /// Reacts to a new best plan: continues from it if it has the same actions.
     pub(in super::super) fn schedule_from_best(&mut self) {
         let Some((worth, items)) = self.best.as_ref().filter(|_| IS_WHOLE) else {
             return;
         };
-        // Another order of the same actions is gone on from.
+        // If only the order differs, the search continues.
         let of_these = |scheduling: &Scheduling<'_>| scheduling.is_of(items);
         self.scheduling = self.scheduling.take().filter(of_these);
         if let Some(scheduling) = &mut self.scheduling {
@@ -26,16 +26,16 @@ impl Refiner<'_> {
         self.scheduled_for = 0;
     }
 
-    /// Whether better orders of the best plan's actions are looked for next: there may be some, and the
-    /// metric knows of time.
+    /// Returns `true` if better orders of the best plan's actions are searched for next: some may
+    /// exist, and the metric depends on time.
     pub(in super::super) fn is_turn_to_schedule(&self) -> bool {
         let tuning = &self.compiled.tuning;
         let is_timed = |metric: &Metric| !metric.time.is_zero();
         let may_find = if let Some(scheduling) = &self.scheduling {
             !scheduling.is_over
         } else {
-            // Where other actions might do, not as long as others still find better plans: a poor plan in its best
-            // order is hard to better.
+            // If other actions are possible, wait until other methods no longer find better plans,
+            // because a poor plan in its best order is hard to improve.
             let is_late = self.fruitless >= tuning.scheduling_late;
             !self.is_scheduled && (is_late || self.is_all_about_order())
         };
@@ -43,7 +43,7 @@ impl Refiner<'_> {
         let is_slow = self.scheduling.as_ref().is_some_and(Scheduling::is_slow);
         let patience = match self.scheduling_patience {
             _ if is_slow => 0,
-            // Others still find better plans.
+            // Other methods still find better plans.
             0 if self.fruitless < tuning.scheduling_after => 0,
             patience => patience.max(tuning.scheduling_burst),
         };
@@ -54,13 +54,14 @@ impl Refiner<'_> {
             && (spent <= others || self.scheduled_for < patience)
     }
 
-    /// Whether there are not many more actions than those of the best plan, as in a job shop.
+    /// Returns `true` if there are not many more actions than those of the best plan, as in a job
+    /// shop.
     fn is_all_about_order(&self) -> bool {
         let items = self.best.as_ref().map_or(0, |(_, items)| items.len());
         2 * items >= self.compiled.actions.len()
     }
 
-    /// Looks for a better order.
+    /// Searches for a better order.
     pub(in super::super) fn schedule(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
         let (worth, items) = self.best.as_ref()?;
         if self.scheduling.is_none() {
@@ -69,7 +70,7 @@ impl Refiner<'_> {
         }
         let scheduling = self.scheduling.as_mut()?;
         let found = scheduling.next(self.compiled.tuning.scheduling_work, ticker)?;
-        // Unless it turns out to be better, something about the plan is not understood.
+        // If the found order is not better, the model does not represent the plan correctly.
         let better = Incumbent::of(self.compiled, &found);
         scheduling.is_over = better.is_none_or(|better| better.worth.end >= worth.end);
         Some(found)

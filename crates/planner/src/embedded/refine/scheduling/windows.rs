@@ -1,4 +1,4 @@
-//! The windows of happenings, as orders of a happening and the gaps between its intervals.
+//! Windows of happenings, as orders of a happening and the gaps between its intervals.
 
 use super::super::super::windows::Interval;
 use super::model::{Model, snap_of};
@@ -11,7 +11,7 @@ impl Model<'_> {
         let Some(windows) = &compiled.windows else {
             return Some(());
         };
-        // A node that all fixed times are measured from.
+        // A node to which all fixed times are relative.
         let zero = u32::try_from(self.items.len()).ok()?;
         self.solver.times.add(0, 0);
         for (node, item) in (0..).zip(self.items.clone()) {
@@ -41,7 +41,7 @@ impl Model<'_> {
         Some(())
     }
 
-    /// Lets both happenings lie in one interval: before each gap, or after it.
+    /// Requires that both happenings are in one interval: before each gap, or after it.
     fn keep_within(&mut self, zero: u32, intervals: &[Interval], (first, last): (u32, u32)) {
         let (Some(begin), Some(end)) = (intervals.first(), intervals.last()) else {
             return;

@@ -1,4 +1,4 @@
-//! From actions to operators.
+//! Conversion of actions to operators.
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
@@ -17,14 +17,14 @@ pub(super) struct Draft<'a> {
     pub(super) kind: Kind,
     pub(super) needs: Vec<u32>,
     pub(super) is_running: Option<u32>,
-    /// Stays that it begins.
+    /// Stays that it adds.
     pub(super) offers: Vec<u32>,
     pub(super) action: &'a Action,
     pub(super) snaps: &'a [&'a Snap],
 }
 
 impl Graph {
-    /// Adds the operators of an action, that of its start only if it `starts_alone`.
+    /// Adds the operators of an action. The start gets a separate operator only if `starts_alone`.
     pub(super) fn add_action(
         &mut self,
         compiled: &Compiled,
@@ -175,7 +175,7 @@ impl Graph {
         }
     }
 
-    /// Adds every gain of the fluent that a test can ask for.
+    /// Adds every gain of the fluent that a test can require.
     pub(super) fn add_any_gain(&self, fluent: u32, gains: &mut Vec<(u32, Gain)>) {
         for &test in &self.tests_of_fluent[fluent as usize] {
             gains.retain(|(known, _)| *known != test);
@@ -198,12 +198,13 @@ fn may_help(test: &Test, fluent: u32, rate: &Rational) -> bool {
     }
 }
 
-/// The least duration of an action, as far as it does not depend on the state.
+/// Returns the least duration of an action, where it does not depend on the state.
 pub(super) fn least_ticks(compiled: &Compiled, action: &Action) -> Ticks {
     compiled.scale.floor(&action.duration.least).0
 }
 
-/// The longest it may take, likewise; [`NEVER`] if there is no bound.
+/// Returns the greatest duration of an action, where it does not depend on the state; [`NEVER`] if
+/// there is no bound.
 pub(super) fn most_ticks(compiled: &Compiled, action: &Action) -> Ticks {
     let most = action.duration.most.as_ref();
     most.map_or(NEVER, |most| compiled.scale.ceil(most).0)

@@ -1,10 +1,11 @@
-//! What holds only while some action runs, and for whom it holds long enough.
+//! Envelopes: facts that hold only while some action runs, and the actions for which they hold long
+//! enough.
 //!
-//! Where every action that makes a fact true takes it back at its own end, that action is an
-//! *envelope* of all that need the fact throughout (Cushing et al., "When is temporal planning
-//! really temporal?", IJCAI 2007; Coles et al., AAAI 2008). Whoever takes longer than an envelope
-//! can does not fit into it, though the fact is true when it starts. So such a consumer needs, in
-//! the relaxed problem, not the fact alone but the fact for so long.
+//! If every action that adds a fact deletes it at its own end, that action is an *envelope* of all
+//! actions with the fact as over-all condition (Cushing et al., "When is temporal planning really
+//! temporal?", IJCAI 2007; Coles et al., AAAI 2008). An action longer than the maximum duration of
+//! the envelope does not fit into it, although the fact is true when it starts. So in the relaxed
+//! problem, such an action requires the fact for a minimum time, not just the fact.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +16,7 @@ use super::super::super::state::State;
 use super::super::super::time::{NEVER, Ticks};
 use super::actions::{least_ticks, most_ticks};
 
-/// A fact for at least so long.
+/// A fact that holds for at least some time.
 #[derive(Clone, Debug)]
 pub(crate) struct Stay {
     pub(crate) proposition: u32,
@@ -26,7 +27,7 @@ pub(crate) struct Stay {
 }
 
 impl Stay {
-    /// Whether the fact holds, and no action under way is bound to take it back too soon.
+    /// Returns `true` if the fact holds, and no running action must delete it too soon.
     pub(crate) fn holds(&self, state: &State, spans: Option<&Spans>) -> bool {
         if !Literal::new(self.fact, true).holds(&state.facts) {
             return false;
@@ -43,7 +44,7 @@ impl Stay {
     }
 }
 
-/// The stays that some consumer needs.
+/// The stays that some action needs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stays {
     pub(super) list: Vec<Stay>,
@@ -51,7 +52,7 @@ pub(super) struct Stays {
 }
 
 impl Stays {
-    /// Numbers them from `first` on.
+    /// Computes the stays; `first` is the number of the first proposition.
     pub(super) fn of(compiled: &Compiled, first: u32) -> Self {
         let envelopes = envelopes(compiled);
         let mut stays = Self::default();
@@ -84,7 +85,7 @@ impl Stays {
         stays
     }
 
-    /// The needs of an action apart from its preconditions.
+    /// Returns the stays that an action needs, in addition to its preconditions.
     pub(super) fn needs<'a>(
         &'a self,
         compiled: &'a Compiled,
@@ -95,7 +96,7 @@ impl Stays {
         facts.filter_map(move |fact| self.by_need.get(&(fact, least)).copied())
     }
 
-    /// The additions of an action's start apart from its effects.
+    /// Returns the stays that an action's start adds, in addition to its effects.
     pub(super) fn offers<'a>(
         &'a self,
         compiled: &Compiled,
@@ -107,7 +108,7 @@ impl Stays {
     }
 }
 
-/// The facts that an action needs while it runs, and does not begin itself.
+/// Returns the facts of an action's over-all condition that its start does not add.
 fn lasting<'a>(compiled: &'a Compiled, action: &'a Action) -> impl Iterator<Item = u32> + 'a {
     let own = &compiled.snap(action.start).adds;
     let literals = action.over_all.literals.iter().filter(|l| l.truth());
@@ -115,7 +116,7 @@ fn lasting<'a>(compiled: &'a Compiled, action: &'a Action) -> impl Iterator<Item
     facts.filter(move |fact| !own.contains(fact))
 }
 
-/// For each fact the actions during which it holds, if it never becomes true otherwise.
+/// Returns for each fact the actions during which it holds, if no other happening makes it true.
 fn envelopes(compiled: &Compiled) -> Vec<Option<Vec<u32>>> {
     let mut envelopes: Vec<Option<Vec<u32>>> = vec![Some(Vec::new()); compiled.facts.len()];
     let timed = compiled.timed.iter().flat_map(|timed| &timed.adds);
@@ -132,7 +133,7 @@ fn envelopes(compiled: &Compiled) -> Vec<Option<Vec<u32>>> {
                 }
             }
         }
-        // What is under way was started before.
+        // Running actions were started before.
         for &fact in end.iter().flat_map(|end| &end.deletes) {
             if let Some(envelopes) = &mut envelopes[fact as usize] {
                 envelopes.push(number);

@@ -1,14 +1,14 @@
-//! What an action under way rules out for good.
+//! Operators that a running action excludes for good.
 
 use super::super::super::compile::{Compiled, NONE};
 use super::super::super::formula::Literal;
 use super::Graph;
 
 impl Graph {
-    /// For each action the operators that can come neither while it is under way, because they
-    /// need what contradicts its over-all condition, nor afterwards, because they need what its end
-    /// destroys for ever. So who packs a bottle that is still to be filled is seen to have lost
-    /// already at the start.
+    /// Returns for each action the operators that are applicable neither while it is running,
+    /// because they contradict its over-all condition, nor afterwards, because its end permanently
+    /// destroys one of their preconditions. So a dead end is detected at the start of the action:
+    /// for example, if a bottle is packed that must still be filled.
     pub(super) fn find_kept_out(&self, compiled: &Compiled) -> Vec<Vec<u32>> {
         let mut is_achieved = vec![false; self.proposition_count];
         for &effect in &self.effects {

@@ -48,7 +48,8 @@ impl Graph {
         for (snap, delay) in happenings {
             let snap = compiled.snap(snap);
             for effect in effects_of(snap) {
-                // A literal and its negation are neighbours. The last effect on a fact decides.
+                // A literal and its negation have adjacent numbers. The last effect on a fact
+                // decides.
                 effects.retain(|&(known, _)| known / 2 != effect / 2);
                 effects.push((effect, delay));
             }

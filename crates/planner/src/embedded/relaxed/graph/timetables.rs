@@ -1,4 +1,4 @@
-//! Literals that change at fixed times only, and the windows that they leave.
+//! Literals that change at fixed times only, and the resulting windows.
 
 use std::ops::Range;
 
@@ -8,29 +8,30 @@ use super::super::super::time::{NEVER, Ticks};
 use super::actions::{Draft, least_ticks, most_ticks};
 use super::{Graph, Kind, narrow};
 
-/// A literal that changes at fixed times only, and an operator needs.
+/// A literal that changes at fixed times only and that an operator needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Window {
     /// Position in [`Graph::timetable`].
     pub(crate) timetable: u32,
-    /// The operator must begin at least so long after the literal has become true …
+    /// The minimum time from the literal becoming true to the beginning of the operator.
     pub(crate) lead: Ticks,
-    /// … and at least so long before it becomes false.
+    /// The minimum time from the beginning of the operator to the literal becoming false.
     pub(crate) tail: Ticks,
 }
 
 impl Graph {
-    /// Whether the literal changes at fixed times only.
+    /// Returns `true` if the literal changes at fixed times only.
     pub(crate) fn has_timetable(&self, literal: Literal) -> bool {
         self.timetable_of[literal.index()] != NONE
     }
 
-    /// Takes the literal of a timetable to be true at all times; returns when it was.
+    /// Assumes that the literal of a timetable is always true. Returns the intervals in which it
+    /// holds.
     pub(crate) fn forget_timetable(&mut self, number: usize) -> Vec<(Ticks, Ticks)> {
         std::mem::replace(&mut self.timetable[number], vec![(-NEVER, NEVER)])
     }
 
-    /// The literal of a timetable.
+    /// Returns the literal of a timetable.
     pub(crate) fn timetable_literal(&self, number: usize) -> Option<Literal> {
         let number = narrow(number);
         let place = self
@@ -40,7 +41,7 @@ impl Graph {
         Some(Literal(narrow(place)))
     }
 
-    /// When the literal holds, if it changes at fixed times only.
+    /// Returns the intervals in which the literal holds, if it changes at fixed times only.
     pub(crate) fn spans_of(&self, literal: Literal) -> Option<&[(Ticks, Ticks)]> {
         let number = self.timetable_of[literal.index()];
         let spans = self.timetable.get(number as usize)?;
@@ -95,7 +96,7 @@ impl Graph {
         self.timetable.push(spans);
     }
 
-    /// The windows in which the operator can begin.
+    /// Adds the windows in which the operator can begin, and returns their range.
     pub(super) fn windows_of(&mut self, compiled: &Compiled, draft: &Draft<'_>) -> Range<usize> {
         let begin = self.windows.len();
         if self.timetable.is_empty() {
@@ -129,7 +130,7 @@ impl Graph {
     }
 }
 
-/// What a happening reads.
+/// Returns the conditions of a happening.
 fn read_by(snap: &Snap) -> (&Formula, &Dates) {
     (&snap.condition, &snap.dates)
 }

@@ -1,4 +1,4 @@
-//! States that are kept, beside the states themselves, on random ways through random problems.
+//! Compares stored states with the original ones, on random paths through random problems.
 
 use proptest::prelude::*;
 
@@ -11,8 +11,8 @@ use crate::embedded::root::root;
 use crate::embedded::state::State;
 use crate::embedded::testing::{choices, compiled};
 
-/// Keeps states of a problem and reads them back in any order. A state comes from any state before it, mostly from
-/// the last one, so that ways are long.
+/// Stores states of a problem and reads them back in any order. A state's parent is any state
+/// before it, mostly the last one, so that paths are long.
 fn keep_and_read(draft: &Draft, picks: &[(prop::sample::Index, prop::sample::Index)]) {
     let task = draft.task();
     let compiled = compiled(&task);

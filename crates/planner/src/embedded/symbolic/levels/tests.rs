@@ -1,4 +1,5 @@
-//! Bounds on expressions over times, beside times that meet the constraints: none of them comes above a bound.
+//! Compares bounds on expressions over times with times that satisfy the constraints: none exceeds
+//! a bound.
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
@@ -9,8 +10,8 @@ use crate::embedded::expressions::{Form, Symbolic};
 use crate::embedded::network::Network;
 use crate::embedded::time::Scale;
 
-/// Actions one after the other: duration bounds, a rate, and whether the level may not exceed its capacity at the
-/// end.
+/// Sequential actions: duration bounds, a rate, and whether the level must not exceed its capacity
+/// at the end.
 type Draft = Vec<(u8, u8, i8, bool)>;
 
 fn drafts() -> impl Strategy<Value = (Draft, Vec<u8>)> {

@@ -1,5 +1,5 @@
-//! Random networks with random demands: times for the few happenings exist exactly when the linear program of
-//! all happenings has a solution, and then they are a part of one.
+//! Compares random networks with random demands: times for the few happenings exist exactly if the
+//! linear program of all happenings has a solution, and then they are part of one.
 
 use elbowroom_model::Task;
 use elbowroom_model::problem::Comparison;
@@ -16,15 +16,16 @@ use crate::embedded::network::{Network, NodeId};
 use crate::embedded::testing::compiled;
 use crate::embedded::time::{NEVER, Ticks};
 
-/// A happening: its earliest time, perhaps its latest one, its predecessors, and the happenings that it comes at most so
-/// long after.
+/// A happening: its earliest time, optionally its latest one, its predecessors, and happenings with
+/// maximum distances.
 #[derive(Clone, Debug)]
 struct DraftNode {
     earliest: Ticks,
     room: Option<Ticks>,
     after: Vec<(usize, Ticks)>,
     before: Option<(usize, Ticks)>,
-    /// The demand from then on: coefficients of happenings, a constant, and a comparison.
+    /// The demand added with this happening: coefficients of happenings, a constant, and a
+    /// comparison.
     demand: Option<DraftDemand>,
 }
 
@@ -78,7 +79,7 @@ fn node(number: usize) -> NodeId {
     NodeId::try_from(number).expect("few")
 }
 
-/// Adds a happening; `None` if the network has no times then.
+/// Adds a happening. Returns `None` if the network then has no solution.
 fn add(network: &mut Network, draft: &DraftNode) -> Option<()> {
     let count = network.node_count();
     let old = |number: usize| (count > 0).then(|| node(number % count.max(1)));
@@ -138,7 +139,7 @@ proptest! {
             let expected = has_solution(&network, &symbolic.demands, &compiled, limit);
             prop_assert_eq!(found.is_some(), expected);
             let Some(found) = found else { return Ok(()) };
-            // With these times, the others still have theirs.
+            // With these times, the other happenings still have feasible times.
             let (mut whole, variables, _) = program(&network, &symbolic.demands, &compiled, None);
             for (node, time) in &found {
                 let variable = variables[usize::from(*node)];

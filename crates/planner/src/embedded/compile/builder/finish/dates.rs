@@ -1,4 +1,4 @@
-//! Which timed initials are calendars.
+//! Selection of the timed initials that form calendars.
 
 use std::collections::BTreeSet;
 
@@ -15,9 +15,9 @@ use crate::embedded::time::Scale;
 use crate::embedded::windows::Windows;
 
 impl Builder<'_> {
-    /// Takes the conditions on calendars out of all happenings, and their timed initials out of
-    /// those to come. `others` are the formulas that must not read a calendar. Returns also
-    /// `true` if all times lie on the grid.
+    /// Removes the conditions on calendars from all happenings, and their timed initials from the
+    /// future ones. `others` are the formulas that must not read a calendar. Also returns `true` if
+    /// all times are on the grid.
     pub(super) fn take_out_calendars<'f>(
         &mut self,
         coming: &mut Coming,
@@ -62,8 +62,8 @@ impl Builder<'_> {
         (calendars, windows, are_exact)
     }
 
-    /// The facts that timed initials change, no action changes, and only conjuncts of conditions of
-    /// actions read.
+    /// Returns the facts that only timed initials change, and that are read only as conjuncts of
+    /// conditions of actions.
     fn calendar_facts<'f>(
         &self,
         coming: &Coming,

@@ -1,15 +1,15 @@
-//! What is learnt from contradictions, and given up again.
+//! Conflict analysis and deletion of learnt clauses.
 
 use super::super::times::NONE;
 use super::{Clause, Reason, Solver};
 
-/// How many learnt clauses there may be in the beginning.
+/// Initial limit on the number of learnt clauses.
 const LEARNT: usize = 2_000;
-/// By how much later conflicts count more.
+/// Increase of the weight of later conflicts.
 const DECAY: f64 = 1.0 / 0.95;
 
 impl Solver {
-    /// The true literals from which a literal follows.
+    /// Adds the true literals that imply a literal.
     fn reasons_of(&self, literal: u32, reasons: &mut Vec<u32>) {
         match self.reasons[literal as usize / 2] {
             Reason::Decision => {}
@@ -30,7 +30,8 @@ impl Solver {
         }
     }
 
-    /// Learns from a contradiction: the first unique implication point. Whether anything is left.
+    /// Learns a clause from a conflict, at the first unique implication point. Returns `false` if
+    /// the problem is contradictory.
     pub(super) fn learn(&mut self, conflict: &[u32]) -> bool {
         let level_of = |levels: &[u32], literal: u32| levels[literal as usize / 2];
         let top = conflict.iter().map(|&l| level_of(&self.levels, l)).max();
@@ -84,7 +85,7 @@ impl Solver {
         true
     }
 
-    /// Leaves out literals of a learnt clause that the others imply (Sörensson & Biere, SAT 2009).
+    /// Removes literals of a learnt clause that the others imply (Sörensson & Biere, SAT 2009).
     fn leave_out_implied(&mut self, learnt: &mut Vec<u32>) {
         let mut reasons = Vec::new();
         let mut place = 1;
@@ -105,7 +106,7 @@ impl Solver {
         }
     }
 
-    /// Goes back to where the learnt clause has a conclusion, and draws it.
+    /// Backtracks to the level at which the learnt clause implies a literal, and assigns it.
     fn take_in(&mut self, mut learnt: Vec<u32>) {
         let level = |literal: u32| self.levels[literal as usize / 2];
         let mut levels: Vec<u32> = learnt.iter().map(|&l| level(l)).collect();
@@ -144,7 +145,8 @@ impl Solver {
         }
     }
 
-    /// Gives up half of the learnt clauses, those with literals from many levels, where there are too many.
+    /// Deletes half of the learnt clauses, those with literals from many levels, if there are too
+    /// many.
     pub(super) fn forget(&mut self) {
         let most = self.learnt.1.max(LEARNT);
         if self.learnt.0 <= most {

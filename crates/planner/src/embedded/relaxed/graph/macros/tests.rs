@@ -1,4 +1,4 @@
-//! Macro-operators beside the steps that they are made of.
+//! Compares macro-operators with the steps that they consist of.
 
 use std::cell::Cell;
 
@@ -24,8 +24,8 @@ fn one_by_one(compiled: &Compiled, state: &State, data: Macro) -> Option<State> 
     stepper.apply(&state, Step::End(u32::try_from(place).expect("few")))
 }
 
-/// Compares the operators of macro-operators with what the steps read and change. Returns the number of
-/// macro-operators that are possible in the state.
+/// Compares the operators of macro-operators with the facts and fluents that the steps read and
+/// change. Returns the number of macro-operators that are applicable in the state.
 fn compare_operators(compiled: &Compiled, graph: &Graph, state: &State) -> usize {
     let mut possible = 0;
     for operator in &graph.operators {
@@ -56,7 +56,8 @@ fn compare_operators(compiled: &Compiled, graph: &Graph, state: &State) -> usize
     possible
 }
 
-/// Looks for actions that are possible only while an envelope runs, by trying all pairs. Returns their number.
+/// Searches for actions that are applicable only while an envelope runs, by trying all pairs.
+/// Returns their number.
 fn find_contents(compiled: &Compiled, state: &State) -> usize {
     let is_plain = |action: &Action| {
         let mut snaps = [action.start, action.end].into_iter();
