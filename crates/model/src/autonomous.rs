@@ -1,36 +1,35 @@
-//! What happens without a plan: processes and events (PDDL+, Fox & Long, JAIR 27, 2006).
+//! Changes without actions: processes and events (PDDL+, Fox & Long, JAIR 27, 2006).
 
 use crate::ground;
 use crate::problem::{Condition, ContinuousEffect, Effect, Variable};
 
-/// A process: numbers change for as long as its condition holds.
+/// A process: changes numbers continuously while its condition holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Process {
     /// The name, in lower case.
     pub name: String,
-    /// The parameters; there is a process for all of their objects.
+    /// The parameters. There is a ground process for each combination of their objects.
     pub parameters: Vec<Variable>,
-    /// When it is at work.
+    /// Condition under which it is active.
     pub condition: Condition,
-    /// Change while it is; unconditional.
+    /// Changes while it is active; unconditional.
     pub effects: Vec<ContinuousEffect>,
 }
 
-/// An event: it happens as soon as its condition holds.
+/// An event: happens as soon as its condition holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
     /// The name, in lower case.
     pub name: String,
-    /// The parameters; there is an event for all of their objects.
+    /// The parameters. There is a ground event for each combination of their objects.
     pub parameters: Vec<Variable>,
-    /// When it happens.
+    /// Condition that triggers it.
     pub condition: Condition,
-    /// Done at once; each one's guard has only `now`.
+    /// Effects. Their guards have only the part `now`.
     pub effects: Vec<Effect>,
 }
 
-/// The processes and events of a task, without variables. Those that static facts rule out are left
-/// out.
+/// Ground processes and events of a task, without those that static facts exclude.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Autonomous {
     /// The processes, in the order of the domain and of the objects.
@@ -44,9 +43,9 @@ pub struct Autonomous {
 pub struct GroundProcess {
     /// `(name arg …)`.
     pub name: String,
-    /// When it is at work.
+    /// Condition under which it is active.
     pub condition: ground::Condition,
-    /// Change while it is.
+    /// Changes while it is active.
     pub effects: Vec<ground::ContinuousEffect>,
 }
 
@@ -55,12 +54,12 @@ pub struct GroundProcess {
 pub struct GroundEvent {
     /// `(name arg …)`.
     pub name: String,
-    /// When it happens, and what it does.
+    /// Its condition and its effects.
     pub snap: ground::SnapAction,
 }
 
 impl Autonomous {
-    /// Whether nothing happens without a plan.
+    /// Returns `true` if there are neither processes nor events.
     pub fn is_empty(&self) -> bool {
         self.processes.is_empty() && self.events.is_empty()
     }

@@ -9,11 +9,11 @@ use crate::problem::{Condition, PreferenceId, SchemaId, Variable};
 
 /// A constraint on the states that a plan goes through, over conditions of type `C`.
 ///
-/// There is one state at each moment: the one after all that happens then. Before anything
-/// happens, the initial state counts, too, and what holds in the end holds for ever.
+/// There is one state at each moment: the state after all happenings of that moment. The initial
+/// state before any happening counts as well, and the final state lasts forever.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Modal<C> {
-    /// `(at end c)`: it holds in the end.
+    /// `(at end c)`: it holds at the end.
     AtEnd(C),
     /// `(always c)`: it holds at every moment.
     Always(C),
@@ -36,7 +36,7 @@ pub enum Modal<C> {
 }
 
 impl<C> Modal<C> {
-    /// As PDDL writes it.
+    /// Returns the PDDL keyword.
     pub fn name(&self) -> &'static str {
         match self {
             Self::AtEnd(_) => "at end",
@@ -52,7 +52,7 @@ impl<C> Modal<C> {
         }
     }
 
-    /// The times between the name and the conditions, in the order in which they are written.
+    /// Returns the times between the name and the conditions, in the order of the PDDL notation.
     pub fn times(&self) -> Vec<&Rational> {
         match self {
             Self::Within(time, _) | Self::AlwaysWithin(time, ..) | Self::HoldAfter(time, _) => {
@@ -63,7 +63,7 @@ impl<C> Modal<C> {
         }
     }
 
-    /// The conditions, in the order in which they are written.
+    /// Returns the conditions, in the order of the PDDL notation.
     pub fn conditions(&self) -> Vec<&C> {
         match self {
             Self::AtEnd(c)
@@ -79,7 +79,7 @@ impl<C> Modal<C> {
         }
     }
 
-    /// The same constraint on other conditions.
+    /// Returns the same constraint on other conditions.
     pub fn map<D>(&self, mut other: impl FnMut(&C) -> D) -> Modal<D> {
         match self {
             Self::AtEnd(c) => Modal::AtEnd(other(c)),
@@ -98,30 +98,30 @@ impl<C> Modal<C> {
     }
 }
 
-/// An entry of `:constraints`, or a preference of the goal, which is one at the end.
+/// An entry of `:constraints`, or a preference of the goal. The latter is a constraint at the end.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Constraint {
-    /// On the course of the plan.
+    /// A constraint on the course of the plan.
     Modal(Modal<Condition>),
     /// All of them.
     And(Vec<Constraint>),
     /// For all objects of the variables' types.
     Forall(Vec<Variable>, Box<Constraint>),
-    /// It need not be kept; each violated instance counts.
+    /// A soft constraint; each violated instance counts.
     Preference(PreferenceId, Box<Constraint>),
 }
 
-/// A preference among an action's conditions: it counts each time that the action is done.
+/// A preference among an action's conditions. It counts for each execution of the action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ActionPreference {
     /// The action.
     pub schema: SchemaId,
-    /// Which preference.
+    /// The preference.
     pub preference: PreferenceId,
-    /// Variables of the enclosing `forall`s, after the action's parameters: one instance for all
-    /// of their objects.
+    /// Variables of the enclosing `forall`s, after the action's parameters. All their objects
+    /// together form a single instance.
     pub variables: Vec<Variable>,
-    /// Read on arrival at the start; of an instantaneous action, at its moment.
+    /// Read on arrival at the start, or at the moment of an instantaneous action.
     pub at_start: Condition,
     /// Read at every moment of the open interval between start and end.
     pub over_all: Condition,
@@ -132,11 +132,11 @@ pub struct ActionPreference {
 /// The constraints of a task, without variables.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Constraints {
-    /// Every valid plan keeps them.
+    /// Constraints that every valid plan satisfies.
     pub hard: Vec<Modal<crate::ground::Condition>>,
-    /// Those that need not be kept.
+    /// Constraints that a plan may violate.
     pub soft: Vec<SoftConstraint>,
-    /// Whether the states before the task's beginning count, and are not known.
+    /// `true` if the constraints depend on earlier states, which are unknown.
     pub(crate) is_past_lost: bool,
     /// `true` if earlier states do not matter: the constraints are deadlines of goals that are not achieved yet ([`Task::with_deadlines`](crate::Task::with_deadlines)).
     pub(crate) begin_now: bool,
@@ -145,31 +145,32 @@ pub struct Constraints {
 /// One instance of a preference among a task's constraints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SoftConstraint {
-    /// Which preference.
+    /// The preference.
     pub preference: PreferenceId,
-    /// It is violated, once, if any of these is.
+    /// It is violated, once, if any of these constraints is violated.
     pub all: Vec<Modal<crate::ground::Condition>>,
 }
 
 impl Constraints {
-    /// Whether the states before the task's beginning count, and are not known: what is left of a
-    /// plan in mid-execution.
+    /// Returns `true` if the constraints depend on earlier states, which are unknown. This is the
+    /// case for the remaining task of a situation during execution.
     pub fn is_past_lost(&self) -> bool {
         self.is_past_lost
     }
 
-    /// Returns whether the constraints apply to the states from any situation on as they do from the beginning:
-    /// no state before it counts.
+    /// Returns `true` if the constraints apply from any situation on as they do from the initial
+    /// state: earlier states do not count.
     pub fn begin_now(&self) -> bool {
         self.begin_now
     }
 
-    /// Whether there are none.
+    /// Returns `true` if there are no constraints.
     pub fn is_empty(&self) -> bool {
         self.hard.is_empty() && self.soft.is_empty()
     }
 
-    /// Returns the constraints that remain in mid-execution at this time, on a clock that reads 0 then.
+    /// Returns the constraints that remain at `time` during execution. Their times are relative to
+    /// `time`.
     pub(crate) fn from(&self, time: &Rational) -> Self {
         let mut rest = self.clone();
         if !self.begin_now {

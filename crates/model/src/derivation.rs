@@ -1,7 +1,8 @@
 //! Derived facts: the stratified least fixpoint of their rules.
 //!
-//! Facts that rest on each other form a stratum; a stratum is settled after those it rests on, in
-//! time linear in the size of its rules, and without recursion along chains of rules.
+//! Facts that depend on each other form a stratum. A stratum is evaluated after those that it
+//! depends on, in time linear in the size of its rules, and without recursion along chains of
+//! rules.
 
 mod circuit;
 mod rules;
@@ -16,19 +17,19 @@ use crate::problem::Comparison;
 pub use rules::{GroundRule, Rules};
 use strata::Strata;
 
-/// A moment at which conditions are read. A fact or a comparison may say nothing, for the reason
-/// given as `F`.
+/// A moment at which conditions are read. A fact or a comparison may be undefined, for the reason
+/// `F`.
 pub trait Moment<F> {
-    /// Whether a fact is true.
+    /// Returns the truth value of a fact.
     ///
     /// # Errors
-    /// When that cannot be said.
+    /// The fact is undefined.
     fn fact(&self, fact: FactId) -> Result<bool, F>;
 
-    /// Whether `left comparison right`.
+    /// Returns the truth value of `left comparison right`.
     ///
     /// # Errors
-    /// When that cannot be said.
+    /// The comparison is undefined.
     fn compare(
         &self,
         comparison: Comparison,
@@ -37,11 +38,11 @@ pub trait Moment<F> {
     ) -> Result<bool, F>;
 }
 
-/// Whether the condition holds. A part that says nothing does not matter where the other parts
-/// decide: `(or (p) (> (undefined) 0))` holds if `(p)` does.
+/// Returns `true` if the condition holds. An undefined part is ignored if the other parts decide:
+/// `(or (p) (> (undefined) 0))` holds if `(p)` does.
 ///
 /// # Errors
-/// The first fault, when the other parts do not decide.
+/// The first fault, if the other parts do not decide.
 pub fn holds<F>(condition: &Condition, moment: &dyn Moment<F>) -> Result<bool, F> {
     match condition {
         Condition::Fact(fact) => moment.fact(*fact),
@@ -52,7 +53,8 @@ pub fn holds<F>(condition: &Condition, moment: &dyn Moment<F>) -> Result<bool, F
     }
 }
 
-/// `decisive` if one part is, its opposite if no part is, else the first fault.
+/// Returns `decisive` if one part has that value, its opposite if no part has it, else the first
+/// fault.
 fn decided_by<'a, F>(
     parts: impl IntoIterator<Item = &'a Condition>,
     moment: &dyn Moment<F>,
@@ -69,12 +71,12 @@ fn decided_by<'a, F>(
     fault.map_or(Ok(!decisive), Err)
 }
 
-/// The rules of a task, sorted so that what a rule negates is settled before the rule is used.
+/// Rules of a task, sorted so that a negated fact is evaluated before the rules that use it.
 ///
-/// It is that of a moment: rules of facts that are mentioned later are not among them.
+/// This is a snapshot: it does not contain rules of facts that are mentioned later.
 #[derive(Clone, Debug, Default)]
 pub struct Derivation {
-    /// `None` if there are no rules, so that nothing is shared then.
+    /// `None` if there are no rules.
     sorted: Option<Arc<Sorted>>,
 }
 
@@ -85,7 +87,7 @@ struct Sorted {
 }
 
 impl Derivation {
-    /// `None` if a derived fact depends on its own negation.
+    /// Returns `None` if a derived fact depends on its own negation.
     pub(crate) fn of(rules: &Arc<Rules>) -> Option<Self> {
         if rules.is_empty() {
             return Some(Self::default());
@@ -105,13 +107,13 @@ impl Derivation {
         sorted.map_or(&[], |sorted| sorted.rules.of(fact))
     }
 
-    /// Whether rules define the fact.
+    /// Returns `true` if rules define the fact.
     pub fn defines(&self, fact: FactId) -> bool {
         let sorted = self.sorted.as_ref();
         sorted.is_some_and(|sorted| sorted.rules.define(fact))
     }
 
-    /// Whether rules define any fact that the condition reads.
+    /// Returns `true` if rules define any fact that the condition reads.
     pub fn is_read_by(&self, condition: &Condition) -> bool {
         let mut is_read = false;
         if self.sorted.is_some() {
@@ -127,10 +129,10 @@ impl Derivation {
         }
     }
 
-    /// The truth of derived facts when basic facts and numbers are as `basic` says.
+    /// Computes the derived facts, with basic facts and numbers from `basic`.
     ///
-    /// In each stratum comes first what certainly holds, then what rests on something that says
-    /// nothing; all else is false.
+    /// In each stratum, first the facts that certainly hold are found, then those that depend on an
+    /// undefined part. All others are false.
     pub fn derive<F: Clone>(&self, basic: &dyn Moment<F>) -> Derived<F> {
         let mut derived = Derived {
             holding: Vec::new(),
@@ -156,7 +158,7 @@ impl Derivation {
         derived
     }
 
-    /// A moment with its derived facts.
+    /// Returns the moment `basic` with its derived facts.
     pub fn on_top_of<'b, F: Clone>(
         &'b self,
         basic: &'b dyn Moment<F>,
@@ -170,7 +172,7 @@ impl Derivation {
     }
 }
 
-/// The truth of derived facts at one moment.
+/// Truth values of derived facts at one moment.
 #[derive(Clone, Debug)]
 pub struct Derived<F> {
     /// By position in the task's table.
@@ -179,10 +181,10 @@ pub struct Derived<F> {
 }
 
 impl<F: Clone> Derived<F> {
-    /// Whether a derived fact holds.
+    /// Returns `true` if a derived fact holds.
     ///
     /// # Errors
-    /// When that rests on something that says nothing.
+    /// The fact depends on an undefined part.
     pub fn truth(&self, fact: FactId) -> Result<bool, F> {
         match self.unclear.get(&fact) {
             Some(fault) => Err(fault.clone()),

@@ -11,16 +11,16 @@ use crate::task::Task;
 use crate::terms::resolve;
 
 impl Task {
-    /// The condition as PDDL writes it: `(and (at r a) (>= (charge r) 5))`.
+    /// Returns the condition in PDDL notation: `(and (at r a) (>= (charge r) 5))`.
     pub fn describe_condition(&self, condition: &Condition) -> String {
         let mut text = String::new();
         self.write_condition(condition, &mut text);
         text
     }
 
-    /// A conjunct of an action's condition, or of the goal (`None`), as PDDL writes it, equalities
-    /// of objects included: `(not (= a a))`. Instantiation decides these, so a ground condition has
-    /// only their truth, and their names come from the domain.
+    /// Returns a conjunct of an action's condition, or of the goal (`None`), in PDDL notation,
+    /// including equalities of objects: `(not (= a a))`. Instantiation evaluates equalities, so a
+    /// ground condition contains only their truth values; their text comes from the domain.
     pub fn describe_condition_of(&self, action: Option<&Action>, conjunct: &Condition) -> String {
         let problem = self.problem();
         let lifted: Vec<&problem::Condition> = match action {
@@ -45,7 +45,7 @@ impl Task {
         written.unwrap_or_else(|| self.describe_condition(conjunct))
     }
 
-    /// The text of the conjunct of `lifted` whose ground form is `wanted`.
+    /// Returns the text of the conjunct of `lifted` whose ground form is `wanted`.
     fn written(
         &self,
         lifted: &problem::Condition,
@@ -73,7 +73,7 @@ impl Task {
         self.grounding(|grounder| grounder.ground_condition(lifted, binding))
     }
 
-    /// The binding with objects for these variables appended, in each possible way.
+    /// Returns all extensions of the binding with objects for these variables.
     fn bindings(&self, variables: &[Variable], binding: &mut Vec<ObjectId>) -> Vec<Vec<ObjectId>> {
         let mut bindings = Vec::new();
         self.grounding(|grounder| {
@@ -121,14 +121,14 @@ impl Task {
         text.push(')');
     }
 
-    /// The expression as PDDL writes it: `(* (rate r) ?duration)`.
+    /// Returns the expression in PDDL notation: `(* (rate r) ?duration)`.
     pub fn describe_expression(&self, expression: &Expression) -> String {
         let mut text = String::new();
         self.write_expression(expression, &mut text);
         text
     }
 
-    /// The constraint as PDDL writes it: `(within 10 (at r a))`.
+    /// Returns the constraint in PDDL notation: `(within 10 (at r a))`.
     pub fn describe_modal(&self, modal: &Modal<Condition>) -> String {
         let mut text = format!("({}", modal.name());
         for time in modal.times() {
@@ -210,7 +210,8 @@ impl Task {
         text.push(')');
     }
 
-    /// The name of a number left open, or its number where only its action knows the name.
+    /// Returns the name of an open number, or its position if the name is only available in its
+    /// action's schema.
     pub(crate) fn describe_unknown(&self, unknown: Unknown) -> String {
         match unknown {
             Unknown::Domain(position) => self
@@ -236,7 +237,7 @@ fn is_partly_decided(condition: &Condition) -> bool {
     }
 }
 
-/// The number as a decimal where that is exact and short, else as a fraction.
+/// Returns the number as a decimal if that is exact and short, else as a fraction.
 pub(crate) fn decimal(value: &Rational) -> String {
     let text = value.to_decimal(12);
     match text.parse::<Rational>() {

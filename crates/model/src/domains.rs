@@ -1,4 +1,4 @@
-//! Which objects a variable ranges over.
+//! Ranges of variables.
 
 use std::borrow::Cow;
 
@@ -18,7 +18,7 @@ impl Domains {
         Self { by_type }
     }
 
-    /// The objects of any of the types, in order of declaration.
+    /// Returns the objects of any of the types, in order of declaration.
     pub(crate) fn objects(&self, types: &[TypeId]) -> Cow<'_, [ObjectId]> {
         match types {
             [] => Cow::Borrowed(&[]),

@@ -1,4 +1,4 @@
-//! Numeric expressions, over lifted or ground fluents, and how their values are compared.
+//! Numeric expressions over lifted or ground fluents, and comparisons of their values.
 
 use elbowroom_num::Rational;
 
@@ -21,7 +21,7 @@ pub enum Comparison {
 }
 
 impl Comparison {
-    /// Whether `left self right`.
+    /// Returns `true` if `left self right` holds.
     pub fn holds(self, left: &Rational, right: &Rational) -> bool {
         match self {
             Self::Less => left < right,
@@ -32,7 +32,7 @@ impl Comparison {
         }
     }
 
-    /// As PDDL writes it.
+    /// Returns the PDDL symbol.
     pub fn symbol(self) -> &'static str {
         match self {
             Self::Less => "<",
@@ -56,7 +56,8 @@ pub enum Expression<F> {
     Duration,
     /// `total-time`; metrics only.
     TotalTime,
-    /// `(is-violated name)`: how many instances of a preference the plan violates; metrics only.
+    /// `(is-violated name)`: number of instances of a preference that the plan violates; metrics
+    /// only.
     Violations(PreferenceId),
     /// A `:synth-parameters` name: an unknown number.
     Unknown(Unknown),
@@ -73,7 +74,7 @@ pub enum Expression<F> {
 }
 
 impl<F> Expression<F> {
-    /// The value, or `None` where a leaf has none or a division is by zero.
+    /// Returns the value, or `None` if a leaf has none or a divisor is zero.
     pub fn evaluate(&self, leaf: &mut impl FnMut(&Self) -> Option<Rational>) -> Option<Rational> {
         Some(match self {
             Self::Constant(value) => value.clone(),
@@ -126,7 +127,7 @@ impl<F> Expression<F> {
         }
     }
 
-    /// The same over other fluents.
+    /// Returns the same expression over other fluents.
     pub fn map_fluents<G>(&self, other: &mut impl FnMut(&F) -> G) -> Expression<G> {
         let mut boxed = |part: &Self| Box::new(part.map_fluents(other));
         match self {
@@ -150,7 +151,7 @@ impl<F> Expression<F> {
 }
 
 impl<F: Clone> Expression<F> {
-    /// The same expression with each leaf for which `replace` gives something replaced by it.
+    /// Returns the expression with leaves replaced where `replace` returns `Some`.
     #[must_use]
     pub fn map_leaves(&self, replace: &mut impl FnMut(&Self) -> Option<Self>) -> Self {
         match self {

@@ -1,6 +1,6 @@
 //! Conditions, expressions, effects and actions without variables.
 //!
-//! Facts and fluents are numbers here; [`Task`](crate::Task) knows their names.
+//! Facts and fluents are numbers; [`Task`](crate::Task) maps them to names.
 
 use std::sync::Arc;
 
@@ -17,18 +17,18 @@ pub struct FactId(pub u32);
 pub struct FluentId(pub u32);
 
 impl FactId {
-    /// No task numbers a fact so high: from here on, ids are free for whoever needs facts of their
-    /// own beside a task's.
+    /// First id that no task assigns. Components that need additional facts of their own can use
+    /// ids from here on.
     pub const FIRST_FREE: Self = Self(1 << 31);
 
-    /// The position in the table.
+    /// Returns the position in the table.
     pub fn index(self) -> usize {
         self.0 as usize
     }
 }
 
 impl FluentId {
-    /// The position in the table.
+    /// Returns the position in the table.
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -55,12 +55,13 @@ impl Condition {
     /// The condition that never holds.
     pub const FALSE: Self = Self::Or(Vec::new());
 
-    /// Whether this is the empty conjunction.
+    /// Returns `true` if this is the empty conjunction.
     pub fn is_trivial(&self) -> bool {
         matches!(self, Self::And(parts) if parts.is_empty())
     }
 
-    /// The conjuncts, with nested conjunctions flattened: what one checks, and blames, one by one.
+    /// Returns the conjuncts, with nested conjunctions flattened. The validator checks and reports
+    /// each conjunct separately.
     pub fn conjuncts(&self) -> Vec<&Self> {
         match self {
             Self::And(parts) => parts.iter().flat_map(Self::conjuncts).collect(),
@@ -109,7 +110,7 @@ impl Condition {
         self.visit_expressions(&mut |expression| expression.visit_fluents(visit));
     }
 
-    /// The same condition with `replace` applied to every leaf of its expressions.
+    /// Returns the condition with `replace` applied to every leaf of its expressions.
     #[must_use]
     pub fn map_leaves(&self, replace: &mut impl FnMut(&Expression) -> Option<Expression>) -> Self {
         match self {
@@ -132,7 +133,7 @@ pub type Expression = crate::expression::Expression<FluentId>;
 /// A ground effect with the condition it depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
-    /// When it happens at all.
+    /// Condition of the effect.
     pub guard: Guard,
     /// The change.
     pub change: Change,
@@ -157,7 +158,7 @@ impl Guard {
         now: Condition::TRUE,
     };
 
-    /// Whether the effect is unconditional.
+    /// Returns `true` if the effect is unconditional.
     pub fn is_trivial(&self) -> bool {
         self.at_start.is_trivial() && self.over_all.is_trivial() && self.now.is_trivial()
     }
@@ -174,9 +175,9 @@ pub enum Change {
     Update {
         /// The assignment operator.
         operator: UpdateOperator,
-        /// Which fluent.
+        /// The fluent.
         fluent: FluentId,
-        /// By or to how much; reads the state on arrival.
+        /// Operand of the update; reads the state on arrival.
         value: Expression,
     },
 }
@@ -184,18 +185,18 @@ pub enum Change {
 /// A snap action: a start, an end, or an instantaneous action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SnapAction {
-    /// Needed on arrival.
+    /// Condition on arrival.
     pub condition: Condition,
-    /// Done then.
+    /// Effects.
     pub effects: Vec<Effect>,
 }
 
 /// A ground action: a schema with its arguments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Action {
-    /// Where it comes from.
+    /// The schema.
     pub schema: SchemaId,
-    /// With which arguments.
+    /// The arguments.
     pub arguments: Vec<ObjectId>,
     /// `(name arg …)`.
     pub name: String,
@@ -215,26 +216,27 @@ pub enum Body {
 /// The conditions and effects of a durative action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DurativeBody {
-    /// All must hold; none means that any duration `>= 0` will do.
+    /// Constraints on the duration. All have to hold; without any, all durations `>= 0` are
+    /// allowed.
     pub duration: Vec<DurationConstraint>,
-    /// Its start. Shared, as copies of an action that differ in its duration alone are.
+    /// Start. Shared between copies of an action that differ only in their durations.
     pub start: Arc<SnapAction>,
-    /// Needed at every moment of the open interval between start and end.
+    /// Condition at every moment of the open interval between start and end.
     pub over_all: Condition,
-    /// Its end.
+    /// End.
     pub end: Arc<SnapAction>,
-    /// Change while it runs.
+    /// Continuous changes while the action runs.
     pub continuous: Vec<ContinuousEffect>,
-    /// Whether this is the rest of an action that began before time 0 ([`RunningAction::rest`]). Its start is time 0 then,
-    /// and nobody chooses another.
+    /// `true` for the rest of an action that began before time 0 ([`RunningAction::rest`]). Its
+    /// start is then fixed at time 0.
     ///
     /// [`RunningAction::rest`]: crate::RunningAction::rest
     pub is_under_way: bool,
 }
 
 impl DurativeBody {
-    /// Returns `true` unless a constant bound excludes a duration of 0. With that duration no moment lies
-    /// between start and end, so the over-all condition is vacuous.
+    /// Returns `true` unless a constant bound excludes a duration of 0. With that duration, there
+    /// is no moment between start and end, so the over-all condition is vacuous.
     pub fn may_take_no_time(&self) -> bool {
         self.duration
             .iter()
@@ -248,27 +250,27 @@ impl DurativeBody {
 /// `?duration comparison bound`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DurationConstraint {
-    /// How they compare.
+    /// Comparison operator.
     pub comparison: Comparison,
     /// The bound.
     pub bound: Expression,
-    /// Whether the bound reads the state on arrival at the end rather than the start.
+    /// `true` if the bound reads the state on arrival at the end, not at the start.
     pub at_end: bool,
 }
 
 /// While the action runs, `d fluent / dt` has the term `rate`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContinuousEffect {
-    /// When it happens at all.
+    /// Condition of the effect.
     pub guard: Guard,
-    /// Which fluent.
+    /// The fluent.
     pub fluent: FluentId,
     /// Change per unit of time, sign included.
     pub rate: Expression,
 }
 
 impl Action {
-    /// The durative part, if it takes time.
+    /// Returns the durative part, or `None` for an instantaneous action.
     pub fn durative(&self) -> Option<&DurativeBody> {
         match &self.body {
             Body::Durative(body) => Some(body),
@@ -276,8 +278,8 @@ impl Action {
         }
     }
 
-    /// The same action with each leaf for which `replace` gives something replaced by it, in
-    /// every expression: conditions, guards, effects, rates and duration constraints.
+    /// Returns the action with leaves replaced where `replace` returns `Some`, in all expressions:
+    /// conditions, guards, effects, rates and duration constraints.
     #[must_use]
     pub fn map_leaves(&self, replace: &mut impl FnMut(&Expression) -> Option<Expression>) -> Self {
         let body = match &self.body {

@@ -1,4 +1,4 @@
-//! From lifted to ground: variables replaced by objects, quantifiers expanded.
+//! Grounding: replaces variables by objects and expands quantifiers.
 
 mod autonomous;
 mod constraints;
@@ -22,11 +22,11 @@ use crate::terms::{resolve, with_arguments};
 
 /// Knowledge of static conditions, so that quantifiers need not be expanded in full.
 pub(crate) trait Foreknowledge {
-    /// The truth of a condition that is the same in every state; `None` for all others.
+    /// Returns the truth value of a condition if it is the same in every state, else `None`.
     fn truth(&self, condition: &Condition, binding: &[ObjectId]) -> Option<bool>;
 }
 
-/// Nothing is known beforehand.
+/// No knowledge.
 pub(crate) struct Nothing;
 
 impl Foreknowledge for Nothing {
@@ -35,7 +35,7 @@ impl Foreknowledge for Nothing {
     }
 }
 
-/// Makes things ground, and enters the facts and fluents in them into a task's table.
+/// Grounds conditions, effects and actions, and enters their facts and fluents into a task's table.
 pub(crate) struct Grounder<'a> {
     problem: &'a Problem,
     domains: &'a Domains,
@@ -47,7 +47,8 @@ pub(crate) struct Grounder<'a> {
 }
 
 impl<'a> Grounder<'a> {
-    /// `rules_of_predicate` has, for each predicate, the positions of its rules in the problem.
+    /// Creates a grounder. `rules_of_predicate` holds, for each predicate, the positions of its
+    /// rules in the problem.
     pub(crate) fn new(
         problem: &'a Problem,
         domains: &'a Domains,
@@ -64,7 +65,7 @@ impl<'a> Grounder<'a> {
         }
     }
 
-    /// The number of a fact. With a derived fact, its rules enter the table.
+    /// Returns the number of a fact. The rules of a new derived fact enter the table.
     pub(crate) fn fact(&mut self, predicate: PredicateId, arguments: &[ObjectId]) -> FactId {
         let (fact, is_new) = self.table.fact(predicate, arguments);
         if is_new && self.problem.predicates[predicate.index()].is_derived {
@@ -74,13 +75,13 @@ impl<'a> Grounder<'a> {
         fact
     }
 
-    /// The number of a fluent.
+    /// Returns the number of a fluent.
     pub(crate) fn fluent(&mut self, function: FunctionId, arguments: &[ObjectId]) -> FluentId {
         self.table.fluent(function, arguments)
     }
 
-    /// Grounds the rules of the derived facts met. Rules mention further derived facts; these wait
-    /// for their turn, so that a long chain of rules is no deep recursion.
+    /// Grounds the rules of waiting derived facts. Rules may mention further derived facts; these
+    /// are queued, so that a long chain of rules causes no deep recursion.
     fn ground_waiting_rules(&mut self) {
         if std::mem::replace(&mut self.is_grounding_rules, true) {
             return;
@@ -91,8 +92,8 @@ impl<'a> Grounder<'a> {
         self.is_grounding_rules = false;
     }
 
-    /// The ground action of a schema with these arguments, which must fit. Quantified conditions
-    /// and effects are expanded only as far as they are not decided by what is known.
+    /// Returns the ground action of a schema with these arguments, which must fit. Quantified
+    /// conditions and effects are expanded only where `known` does not decide them.
     pub(crate) fn action(
         &mut self,
         schema: SchemaId,
@@ -217,7 +218,7 @@ impl<'a> Grounder<'a> {
         }
     }
 
-    /// The ground form of a condition, with variables bound to `binding` by position.
+    /// Returns the ground form of a condition, with variables bound to `binding` by position.
     pub(crate) fn ground_condition(
         &mut self,
         condition: &Condition,
@@ -226,7 +227,7 @@ impl<'a> Grounder<'a> {
         self.expand(condition, binding, &Nothing)
     }
 
-    /// As [`Self::ground_condition`], with `known` as for [`Self::action`].
+    /// Like [`Self::ground_condition`], with `known` as for [`Self::action`].
     fn expand(
         &mut self,
         condition: &Condition,
@@ -305,7 +306,7 @@ impl<'a> Grounder<'a> {
         })
     }
 
-    /// Calls `action` once for each way to append objects for `variables` to the binding.
+    /// Calls `action` once for each extension of the binding by objects for `variables`.
     pub(crate) fn for_all(
         &mut self,
         variables: &[Variable],
@@ -324,7 +325,7 @@ impl<'a> Grounder<'a> {
         }
     }
 
-    /// Adds the rules whose head is `fact`, and, through their bodies, all they depend on.
+    /// Adds the rules whose head is `fact`, and all rules that they depend on.
     fn ground_rules(&mut self, fact: FactId) {
         let (predicate, arguments) = self.table.atom(fact).clone();
         let problem = self.problem;
@@ -343,7 +344,8 @@ impl<'a> Grounder<'a> {
         self.table.rules_mut().add(fact, bodies);
     }
 
-    /// The timed initials by time, those of one time together in the order of the file.
+    /// Returns the timed initials by time. Those of one time form a group, in the order of the
+    /// file.
     pub(crate) fn ground_timed(&mut self) -> Vec<TimedHappening> {
         let problem = self.problem;
         let mut by_time: BTreeMap<Rational, Vec<ground::Change>> = BTreeMap::new();

@@ -1,7 +1,7 @@
-//! A quick hash for short keys of small numbers.
+//! A fast hash for short keys of small numbers.
 //!
-//! Grounding hashes millions of atoms; the standard hash would take a third of its time. Order
-//! never depends on hashes here, as all tables keep insertion order.
+//! Grounding hashes millions of atoms; the standard hash would take a third of its time. The
+//! iteration order never depends on hashes, because all tables keep insertion order.
 
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -12,7 +12,7 @@ pub(crate) type Map<K, V> = IndexMap<K, V, BuildHasherDefault<MixHasher>>;
 /// A set in insertion order.
 pub(crate) type Set<K> = IndexSet<K, BuildHasherDefault<MixHasher>>;
 
-/// Rotates, mixes in, multiplies: the scheme that Firefox and the Rust compiler use.
+/// Rotate, mix in, multiply: the scheme of Firefox and the Rust compiler.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct MixHasher(u64);
 
@@ -46,7 +46,7 @@ impl Hasher for MixHasher {
     }
 
     fn finish(&self) -> u64 {
-        // Tables take their position from the low bits, where a product mixes least.
+        // Tables use the low bits, which a product mixes least.
         self.0.rotate_left(26)
     }
 }

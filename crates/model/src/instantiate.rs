@@ -1,11 +1,11 @@
-//! Actions by schema and arguments.
+//! Instantiation of actions by schema and arguments.
 
 use crate::ground;
 use crate::grounder::Nothing;
 use crate::problem::{ObjectId, SchemaId};
 use crate::task::Task;
 
-/// An action cannot be instantiated as asked.
+/// Error in the instantiation of an action.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InstantiateError {
     /// The number of arguments is wrong.
@@ -13,9 +13,9 @@ pub enum InstantiateError {
     ArgumentCount {
         /// The action's name.
         action: String,
-        /// How many it takes.
+        /// Expected number.
         expected: usize,
-        /// How many were given.
+        /// Given number.
         found: usize,
     },
     /// An argument is not of the parameter's type.
@@ -25,17 +25,17 @@ pub enum InstantiateError {
         action: String,
         /// The parameter.
         variable: String,
-        /// The object given.
+        /// The given object.
         object: String,
-        /// The type asked for.
+        /// The expected type.
         expected: String,
     },
 }
 
 impl Task {
-    /// The ground action of a schema with these arguments.
+    /// Returns the ground action of a schema with these arguments.
     ///
-    /// Nothing is simplified away, so that a diagnosis can name each condition as written.
+    /// Nothing is simplified, so that a diagnosis can report each condition as written.
     ///
     /// # Errors
     /// When number or types of the arguments do not fit the schema.

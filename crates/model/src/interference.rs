@@ -1,4 +1,4 @@
-//! Which happenings interfere: the no-moving-targets rule.
+//! Interference of happenings: the no-moving-targets rule.
 
 use std::collections::BTreeSet;
 
@@ -6,12 +6,12 @@ use crate::ground::{Action, Body, Change, Condition, Expression, FactId, FluentI
 use crate::state::TimedHappening;
 use crate::task::Task;
 
-/// The facts and fluents that a happening reads and writes.
+/// Facts and fluents that a happening reads and writes.
 ///
-/// Two happenings [interfere](Footprint::interferes_with) when it matters which comes first, or
-/// when PDDL 2.1 says that it might (Fox & Long 2003, definition 12). Conditions of conditional
-/// effects count as read and their effects as written whether or not they come about. Over-all
-/// conditions are not part of any happening and do not count.
+/// Two happenings [interfere](Footprint::interferes_with) if their order matters, or if PDDL 2.1
+/// treats them so (Fox & Long 2003, definition 12). Conditions of conditional effects count as
+/// read, and their effects as written, even if they do not take place. Over-all conditions are not
+/// part of any happening and do not count.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Footprint {
     /// Facts in conditions, positive or negative; a derived fact counts as all basic facts that
@@ -30,7 +30,7 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// The footprint of an instantaneous action, or of a durative action's start.
+    /// Returns the footprint of an instantaneous action, or of a durative action's start.
     pub fn of_start(task: &Task, action: &Action) -> Self {
         let mut footprint = Self::default();
         match &action.body {
@@ -40,7 +40,7 @@ impl Footprint {
                 for constraint in body.duration.iter().filter(|constraint| !constraint.at_end) {
                     footprint.include_expression(&constraint.bound);
                 }
-                // What an end effect's guard says of the start is read at the start.
+                // The start reads the part of an end effect's guard that refers to the start.
                 for effect in &body.end.effects {
                     footprint.include_condition(task, &effect.guard.at_start);
                 }
@@ -54,7 +54,7 @@ impl Footprint {
         footprint
     }
 
-    /// The footprint of a durative action's end; empty for an instantaneous action.
+    /// Returns the footprint of a durative action's end; empty for an instantaneous action.
     pub fn of_end(task: &Task, action: &Action) -> Self {
         let mut footprint = Self::default();
         if let Body::Durative(body) = &action.body {
@@ -69,7 +69,7 @@ impl Footprint {
         footprint
     }
 
-    /// The footprint of timed initials.
+    /// Returns the footprint of timed initials.
     pub fn of_timed(timed: &TimedHappening) -> Self {
         let mut footprint = Self::default();
         for change in &timed.changes {
@@ -78,14 +78,14 @@ impl Footprint {
         footprint
     }
 
-    /// The footprint of an event.
+    /// Returns the footprint of an event.
     pub fn of_snap(task: &Task, snap: &SnapAction) -> Self {
         let mut footprint = Self::default();
         footprint.include_snap(task, snap);
         footprint
     }
 
-    /// The footprint of a condition alone: what it reads.
+    /// Returns the footprint of a condition, which only reads.
     pub fn of_condition(task: &Task, condition: &Condition) -> Self {
         let mut footprint = Self::default();
         footprint.include_condition(task, condition);
@@ -102,7 +102,7 @@ impl Footprint {
         written.insert(fact);
     }
 
-    /// Adds all that another happening reads and writes.
+    /// Adds the footprint of another happening.
     pub fn include(&mut self, other: Self) {
         self.reads.extend(other.reads);
         self.adds.extend(other.adds);
@@ -112,24 +112,25 @@ impl Footprint {
         self.assigns.extend(other.assigns);
     }
 
-    /// Whether the two must not happen at the same time.
+    /// Returns `true` if the two happenings must not happen at the same time.
     pub fn interferes_with(&self, other: &Self) -> bool {
         self.disturbs(other) || other.disturbs(self)
     }
 
-    /// Whether this writes what `other` reads, or writes the opposite of what `other` writes.
+    /// Returns `true` if this happening writes a fact or fluent that `other` reads, or contradicts
+    /// its writes.
     fn disturbs(&self, other: &Self) -> bool {
         self.writes_what_is_read_by(other) || self.contradicts(other)
     }
 
-    /// Whether this writes the opposite of what `other` writes.
+    /// Returns `true` if this happening contradicts a write of `other`.
     fn contradicts(&self, other: &Self) -> bool {
         !self.adds.is_disjoint(&other.deletes)
             || !self.assigns.is_disjoint(&other.assigns)
             || !self.assigns.is_disjoint(&other.shifts)
     }
 
-    /// Whether this writes anything that `other` reads.
+    /// Returns `true` if this happening writes a fact or fluent that `other` reads.
     pub fn writes_what_is_read_by(&self, other: &Self) -> bool {
         let touches = |facts: &BTreeSet<FactId>| !facts.is_disjoint(&other.reads);
         let moves = |fluents: &BTreeSet<FluentId>| !fluents.is_disjoint(&other.reads_fluents);
@@ -211,7 +212,8 @@ impl Task {
         }
     }
 
-    /// The facts that a condition mentions and everything their rules mention, transitively.
+    /// Returns the facts that a condition mentions and all facts that their rules mention,
+    /// transitively.
     fn closure(&self, condition: &Condition) -> BTreeSet<FactId> {
         let rules = self.rules();
         let mut reached = BTreeSet::new();

@@ -1,24 +1,24 @@
 //! The semantics of temporal planning: problems, ground actions, states, time-triggered plans, and
-//! the validator (the *judge*).
+//! the validator.
 //!
-//! In: a [`Problem`] as `elbowroom-pddl` lowers it from text (or as a program builds it).
-//! Out: ground actions, states, and verdicts.
+//! Input: a [`Problem`], lowered from text by `elbowroom-pddl` or built by a program. Output:
+//! ground actions, states, and verdicts.
 //!
-//! The way through the crate:
+//! Main parts of the crate:
 //!
 //! 1. [`problem`]: the lifted problem, names resolved to ids, types, schemas, timed initials.
 //! 2. [`ground`]: conditions, expressions, effects and actions without variables.
 //! 3. [`Task`]: a problem with its table of ground facts and fluents; instantiates schemas on
 //!    demand ([`Task::instantiate`]).
-//! 4. [`TimeTriggeredPlan`]: actions with start times and durations, exactly as a planner says.
-//! 5. [`Situation`]: the same problem in mid-execution, with actions under way.
-//! 6. [`validate()`], [`validate_from()`]: the judge. It decides by the semantics of PDDL 2.1 alone
-//!    and shares no code with networks, encodings or solvers, because their results are tested with
-//!    it.
+//! 4. [`TimeTriggeredPlan`]: actions with start times and durations, as planners print them.
+//! 5. [`Situation`]: a state during the execution of a plan, with running actions.
+//! 6. [`validate()`], [`validate_from()`]: the validator. It decides by the semantics of PDDL 2.1
+//!    alone and shares no code with networks, encodings or solvers, because their results are
+//!    tested with it.
 //!
-//! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning
-//! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2, and the processes and
-//! events of PDDL+ ([`autonomous`]).
+//! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning Domains",
+//! JAIR 20 (2003), with the timed initial literals of PDDL 2.2, and the processes and events of
+//! PDDL+ ([`autonomous`]).
 //!
 //! ```
 //! use elbowroom_model::problem::{Body, Condition, Schema};

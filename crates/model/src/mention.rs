@@ -1,13 +1,13 @@
-//! Facts and fluents by name, as somebody who watches the world gives them.
+//! Look-up of facts and fluents by name, as in reports about the world.
 
 use crate::ground::{FactId, FluentId};
 use crate::problem::{ObjectId, Problem, Variable};
 use crate::task::Task;
 
 impl Task {
-    /// The fact that `(predicate object …)` names, or `(= (function object …) object)` for a function whose values
-    /// are objects, in any letter case. `None` if the problem has no such predicate or objects, or their types do not
-    /// fit.
+    /// Returns the fact with the name `(predicate object …)`, or `(= (function object …) object)`
+    /// for a function whose values are objects, in any letter case. Returns `None` if the problem
+    /// has no such predicate or objects, or their types do not fit.
     pub fn fact_named(&self, name: &str) -> Option<FactId> {
         let equation = equation(name);
         let (name, objects) = words(equation.as_deref().unwrap_or(name), &self.problem)?;
@@ -20,7 +20,7 @@ impl Task {
             .then(|| self.grounding(|grounder| grounder.fact(predicate, &objects)))
     }
 
-    /// The fluent that `(function object …)` names, in the same way.
+    /// Returns the fluent with the name `(function object …)`, in the same way.
     pub fn fluent_named(&self, name: &str) -> Option<FluentId> {
         let (name, objects) = words(name, &self.problem)?;
         let function = self.problem.function(&name)?;
@@ -38,7 +38,7 @@ fn equation(name: &str) -> Option<String> {
     Some(format!("{application} {value}"))
 }
 
-/// The first word, and the objects that the others name.
+/// Returns the first word, and the objects with the other names.
 fn words(name: &str, problem: &Problem) -> Option<(String, Vec<ObjectId>)> {
     let name = name.trim().trim_matches(['(', ')']).to_ascii_lowercase();
     let mut words = name.split_whitespace();
@@ -60,7 +60,7 @@ mod tests {
     use super::Task;
     use crate::problem::{Object, Predicate, PredicateId, Problem, Type, TypeId, Variable};
 
-    /// A predicate of two objects, and a hundred objects; nothing holds.
+    /// Returns a task with a predicate of two objects, and a hundred objects; no fact holds.
     fn task() -> Task {
         let thing = |name: &str| Variable {
             name: name.to_owned(),

@@ -12,24 +12,24 @@ use crate::problem::{ObjectId, SchemaId};
 /// Actions with start times and durations.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TimeTriggeredPlan {
-    /// The steps, not necessarily sorted by time. Of a plan for what is left to do, the first ones
-    /// are those that are under way ([`Situation`](crate::Situation)).
+    /// The steps, not necessarily sorted by time. The first steps of a remaining plan continue the
+    /// running actions ([`Situation`](crate::Situation)).
     pub steps: Vec<Step>,
 }
 
 /// One action of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
-    /// When it starts, or happens.
+    /// Start time.
     pub start: Rational,
-    /// The action, which a plan may have many times.
+    /// The action. A plan may contain it several times.
     pub action: Arc<Action>,
     /// The duration; `None` exactly for instantaneous actions.
     pub duration: Option<Rational>,
 }
 
 impl Step {
-    /// The steps in order of start; those that start together stay as they are.
+    /// Returns the steps sorted by start. The sort is stable.
     pub fn by_start(steps: &[Self]) -> Vec<&Self> {
         let mut steps: Vec<&Self> = steps.iter().collect();
         steps.sort_by(|one, other| one.start.cmp(&other.start));
@@ -49,7 +49,7 @@ impl Step {
             .then_with(|| self.duration.cmp(&other.duration))
     }
 
-    /// The end time; its start, for an instantaneous action.
+    /// Returns the end time; the start time for an instantaneous action.
     pub fn end(&self) -> Rational {
         match &self.duration {
             Some(duration) => &self.start + duration,
@@ -59,20 +59,20 @@ impl Step {
 }
 
 impl TimeTriggeredPlan {
-    /// The steps in order of start, by name and duration where they start together: the order in
-    /// which a file lists those says nothing.
+    /// Returns the plan with its steps in order of start, then by name and duration. The order in
+    /// which a file lists simultaneous steps has no meaning.
     #[must_use]
     pub fn in_order(mut self) -> Self {
         self.steps.sort_by(Step::order);
         self
     }
 
-    /// Returns two steps of one ground action that overlap, by position, or `None` if no action overlaps
-    /// itself.
+    /// Returns two steps of one ground action that overlap, by position, or `None` if no action
+    /// overlaps itself.
     ///
-    /// Two steps overlap if each of them starts before the other one has ended. One that starts when the
-    /// other one ends does not overlap it, and neither does an instantaneous action. Of all such pairs, the
-    /// one is returned whose later step starts first.
+    /// Two steps overlap if each of them starts before the other one has ended. One that starts
+    /// when the other one ends does not overlap it, and neither does an instantaneous action. If
+    /// there are several such pairs, the result is the one whose later step starts first.
     pub fn self_overlap(&self) -> Option<[usize; 2]> {
         let mut order: Vec<usize> = (0..self.steps.len()).collect();
         order.sort_by(|&one, &other| self.steps[one].start.cmp(&self.steps[other].start));
@@ -96,7 +96,7 @@ impl TimeTriggeredPlan {
         None
     }
 
-    /// The time of the last happening of the plan's actions; 0 for an empty plan.
+    /// Returns the time of the last happening of the plan's actions; 0 for an empty plan.
     pub fn makespan(&self) -> Rational {
         self.steps.iter().map(Step::end).max().unwrap_or_default()
     }

@@ -1,4 +1,4 @@
-//! The lifted problem: what a domain and a problem file say, with names resolved to ids.
+//! The lifted problem: contents of a domain and a problem file, with names resolved to ids.
 //!
 //! Variables are numbered by position: an action's parameters come first, then the variables of
 //! each enclosing quantifier, outermost first. A [`Term::Variable`] is an index into that list.
@@ -19,7 +19,7 @@ macro_rules! id {
         pub struct $name(pub u32);
 
         impl $name {
-            /// The position in the list.
+            /// Returns the position in the list.
             pub fn index(self) -> usize {
                 self.0 as usize
             }
@@ -74,27 +74,27 @@ pub struct Problem {
     pub types: Vec<Type>,
     /// The domain's constants, then the problem's objects.
     pub objects: Vec<Object>,
-    /// How many of the objects are the domain's constants.
+    /// Number of constants of the domain among the objects.
     pub constants: usize,
     /// Basic and derived predicates. `=` is not among them, see [`Condition::Equal`].
     pub predicates: Vec<Predicate>,
-    /// Those of the predicates that stand for functions whose values are objects (PDDL 3.1): the
-    /// last argument is the value.
+    /// Predicates that represent functions whose values are objects (PDDL 3.1). The last argument
+    /// is the value.
     pub object_functions: Vec<PredicateId>,
     /// Numeric functions.
     pub functions: Vec<Function>,
     /// Instantaneous and durative actions.
     pub schemas: Vec<Schema>,
-    /// For actions with `:control` parameters, which of their unknowns these are: numbers that a
-    /// plan chooses, one for each instance.
+    /// By action: the positions of its `:control` parameters among its unknowns. A plan chooses
+    /// these numbers, one for each instance.
     pub controls: BTreeMap<SchemaId, Vec<u32>>,
-    /// Change that goes on while a condition holds (PDDL+).
+    /// Processes: continuous changes while a condition holds (PDDL+).
     pub processes: Vec<Process>,
-    /// What happens as soon as a condition holds (PDDL+).
+    /// Events: they happen as soon as a condition holds (PDDL+).
     pub events: Vec<Event>,
     /// The rules of derived predicates; several may share a head.
     pub rules: Vec<Rule>,
-    /// `:synth-parameters` of the domain: one unknown each, for the whole domain.
+    /// `:synth-parameters` of the domain. Each is one unknown for the whole domain.
     pub unknowns: Vec<String>,
     /// The facts that hold at time 0.
     pub initial_facts: Vec<(PredicateId, Vec<ObjectId>)>,
@@ -104,16 +104,16 @@ pub struct Problem {
     pub timed: Vec<TimedInitial>,
     /// The goal condition.
     pub goal: Condition,
-    /// The names of all preferences; what has no name is called `anonymous`.
+    /// Names of all preferences. Those without a name are called `anonymous`.
     pub preferences: Vec<String>,
     /// Constraints on the course of the plan: the domain's, then the goal's preferences, then the
     /// problem's.
     pub constraints: Vec<Constraint>,
-    /// How many of the constraints are the domain's.
+    /// Number of constraints of the domain among the constraints.
     pub domain_constraints: usize,
     /// The preferences among the conditions of actions.
     pub action_preferences: Vec<ActionPreference>,
-    /// The metric to optimize. It has no bearing on validity.
+    /// The metric to optimize. It has no influence on validity.
     pub metric: Option<Metric>,
 }
 
@@ -151,7 +151,7 @@ pub struct Predicate {
     pub name: String,
     /// Argument types.
     pub parameters: Vec<Variable>,
-    /// Whether rules define it, so that no effect may.
+    /// `true` if rules define it. Effects must not change it then.
     pub is_derived: bool,
 }
 
@@ -164,7 +164,7 @@ pub struct Function {
     pub parameters: Vec<Variable>,
 }
 
-/// A variable or an object where an argument stands.
+/// An argument: a variable or an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Term {
     /// See the module's documentation for the numbering.
@@ -178,7 +178,7 @@ pub enum Term {
 pub struct Atom {
     /// The predicate.
     pub predicate: PredicateId,
-    /// As many as the predicate has parameters.
+    /// The arguments, one for each parameter of the predicate.
     pub arguments: Vec<Term>,
 }
 
@@ -187,7 +187,7 @@ pub struct Atom {
 pub struct Fluent {
     /// The function.
     pub function: FunctionId,
-    /// As many as the function has parameters.
+    /// The arguments, one for each parameter of the function.
     pub arguments: Vec<Term>,
 }
 
@@ -216,7 +216,7 @@ impl Condition {
     /// The condition that always holds.
     pub const TRUE: Self = Self::And(Vec::new());
 
-    /// Whether this is the empty conjunction.
+    /// Returns `true` if this is the empty conjunction.
     pub fn is_trivial(&self) -> bool {
         matches!(self, Self::And(parts) if parts.is_empty())
     }
@@ -238,7 +238,7 @@ pub struct Schema {
     pub name: String,
     /// The parameters.
     pub parameters: Vec<Variable>,
-    /// `:synth-parameters` of the action: one unknown per instance.
+    /// `:synth-parameters` of the action. Each is one unknown per instance.
     pub unknowns: Vec<String>,
     /// Its conditions and effects.
     pub body: Body,
@@ -249,26 +249,27 @@ pub struct Schema {
 pub enum Body {
     /// `:action`
     Instantaneous {
-        /// Needed on arrival.
+        /// Condition on arrival.
         condition: Condition,
-        /// Done at once.
+        /// Effects.
         effects: Vec<Effect>,
     },
     /// `:durative-action`
     Durative {
-        /// All must hold; none means that any duration `>= 0` will do.
+        /// Constraints on the duration. All have to hold; without any, all durations `>= 0` are
+        /// allowed.
         duration: Vec<DurationConstraint>,
-        /// Needed on arrival at the start.
+        /// Condition on arrival at the start.
         at_start: Condition,
-        /// Needed at every moment of the open interval between start and end.
+        /// Condition at every moment of the open interval between start and end.
         over_all: Condition,
-        /// Needed on arrival at the end.
+        /// Condition on arrival at the end.
         at_end: Condition,
-        /// Done at the start; each one's guard has only `now`.
+        /// Effects at the start. Their guards have only the part `now`.
         start_effects: Vec<Effect>,
-        /// Done at the end.
+        /// Effects at the end.
         end_effects: Vec<Effect>,
-        /// Change while the action runs.
+        /// Continuous changes while the action runs.
         continuous: Vec<ContinuousEffect>,
     },
 }
@@ -276,20 +277,20 @@ pub enum Body {
 /// `?duration comparison bound`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DurationConstraint {
-    /// How they compare; `=`, `<=` or `>=`.
+    /// Comparison operator: `=`, `<=` or `>=`.
     pub comparison: Comparison,
     /// The bound; may depend on fluents.
     pub bound: Expression,
-    /// Whether the bound reads the state on arrival at the end (`at end`) rather than the start.
+    /// `true` if the bound reads the state on arrival at the end (`at end`), not at the start.
     pub at_end: bool,
 }
 
-/// One effect, with the quantifiers and conditions it stands under.
+/// An effect with its quantifiers and conditions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
     /// Variables of the enclosing `forall`s: the effect happens for all of their objects.
     pub variables: Vec<Variable>,
-    /// When it happens at all.
+    /// Condition of the effect.
     pub guard: Guard,
     /// The change.
     pub change: Change,
@@ -318,9 +319,9 @@ pub enum Change {
     Update {
         /// The assignment operator.
         operator: UpdateOperator,
-        /// Which fluent.
+        /// The fluent.
         fluent: Fluent,
-        /// By or to how much.
+        /// Operand of the update.
         value: Expression,
     },
 }
@@ -341,7 +342,7 @@ pub enum UpdateOperator {
 }
 
 impl UpdateOperator {
-    /// As PDDL writes it.
+    /// Returns the PDDL keyword.
     pub fn name(self) -> &'static str {
         match self {
             Self::Assign => "assign",
@@ -352,8 +353,8 @@ impl UpdateOperator {
         }
     }
 
-    /// Whether two such updates of one fluent may happen at the same time: only increases and
-    /// decreases commute.
+    /// Returns `true` if two such updates of one fluent may happen at the same time: only increases
+    /// and decreases commute.
     pub fn is_additive(self) -> bool {
         matches!(self, Self::Increase | Self::Decrease)
     }
@@ -365,9 +366,9 @@ impl UpdateOperator {
 pub struct ContinuousEffect {
     /// Variables of the enclosing `forall`s.
     pub variables: Vec<Variable>,
-    /// When it happens at all; only `at_start` and `over_all` can be non-trivial.
+    /// Condition of the effect; only `at_start` and `over_all` can be non-trivial.
     pub guard: Guard,
-    /// Which fluent.
+    /// The fluent.
     pub fluent: Fluent,
     /// Change per unit of time, sign included.
     pub rate: Expression,
@@ -380,14 +381,14 @@ pub struct Rule {
     pub predicate: PredicateId,
     /// The head's arguments.
     pub parameters: Vec<Variable>,
-    /// When it holds.
+    /// Condition under which it holds.
     pub body: Condition,
 }
 
 /// A timed initial literal or fluent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedInitial {
-    /// When it happens, `> 0`.
+    /// Time of the change, `> 0`.
     pub time: Rational,
     /// The change; ground, never an increase.
     pub change: TimedChange,
@@ -407,16 +408,16 @@ pub enum TimedChange {
 /// The problem's metric.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Metric {
-    /// Whether more is better.
+    /// `true` if greater values are better.
     pub maximize: bool,
     /// The expression to optimize.
     pub expression: Expression,
 }
 
 impl Problem {
-    /// Whether `sub` is `of` or one of its descendants.
+    /// Returns `true` if `sub` is `of` or one of its descendants.
     pub fn is_subtype(&self, sub: TypeId, of: TypeId) -> bool {
-        // Type graphs are acyclic (the reader sees to it), so this ends.
+        // The reader guarantees that type graphs are acyclic, so this terminates.
         sub == of
             || of == TypeId::OBJECT
             || self.types[sub.index()]
@@ -425,9 +426,9 @@ impl Problem {
                 .any(|&parent| self.is_subtype(parent, of))
     }
 
-    /// Whether `object` may stand where one of `types` is asked for.
+    /// Returns `true` if `object` has one of `types`.
     ///
-    /// An object declared `either a b` counts as both, as VAL has it.
+    /// An object declared as `either a b` counts as both, as in VAL.
     pub fn has_type(&self, object: ObjectId, types: &[TypeId]) -> bool {
         self.objects[object.index()]
             .types
@@ -435,14 +436,14 @@ impl Problem {
             .any(|&own| types.iter().any(|&asked| self.is_subtype(own, asked)))
     }
 
-    /// The objects that a variable ranges over, in order of declaration.
+    /// Returns the objects in the range of a variable, in order of declaration.
     pub fn objects_of<'a>(&'a self, types: &'a [TypeId]) -> impl Iterator<Item = ObjectId> + 'a {
         (0..self.objects.len())
             .map(ObjectId::from)
             .filter(move |&o| self.has_type(o, types))
     }
 
-    /// The object of that name, whatever its case.
+    /// Returns the object with that name, ignoring case.
     pub fn object(&self, name: &str) -> Option<ObjectId> {
         self.objects
             .iter()
@@ -450,7 +451,7 @@ impl Problem {
             .map(ObjectId::from)
     }
 
-    /// The schema of that name, whatever its case.
+    /// Returns the schema with that name, ignoring case.
     pub fn schema(&self, name: &str) -> Option<SchemaId> {
         self.schemas
             .iter()
@@ -458,7 +459,7 @@ impl Problem {
             .map(SchemaId::from)
     }
 
-    /// The predicate of that name, whatever its case.
+    /// Returns the predicate with that name, ignoring case.
     pub fn predicate(&self, name: &str) -> Option<PredicateId> {
         self.predicates
             .iter()
@@ -466,7 +467,7 @@ impl Problem {
             .map(PredicateId::from)
     }
 
-    /// The function of that name, whatever its case.
+    /// Returns the function with that name, ignoring case.
     pub fn function(&self, name: &str) -> Option<FunctionId> {
         self.functions
             .iter()
@@ -474,7 +475,8 @@ impl Problem {
             .map(FunctionId::from)
     }
 
-    /// A fact as PDDL writes it: `(name arg …)`, or `(= (name arg …) value)` of an object function.
+    /// Returns a fact in PDDL notation: `(name arg …)`, or `(= (name arg …) value)` for an object
+    /// function.
     pub fn apply_predicate(&self, predicate: PredicateId, arguments: &[ObjectId]) -> String {
         let name = &self.predicates[predicate.index()].name;
         match arguments.split_last() {
@@ -486,7 +488,7 @@ impl Problem {
         }
     }
 
-    /// `(name arg …)` as PDDL writes it.
+    /// Returns `(name arg …)`.
     pub fn apply_name(&self, name: &str, arguments: &[ObjectId]) -> String {
         let mut text = format!("({name}");
         for argument in arguments {

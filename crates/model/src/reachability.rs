@@ -1,23 +1,22 @@
 //! Grounding by reachability: the ground actions that can occur in a plan when deletions are
 //! ignored.
 //!
-//! In: a [`Task`]. Out: a [`Grounding`], with every action that some valid plan contains, and
+//! Input: a [`Task`]. Output: a [`Grounding`] with every action that some valid plan contains, and
 //! usually few others.
 //!
-//! An instantaneous action is reached when its condition is possible; a durative action starts
-//! when its condition at start and its duration are, and is reached when the conditions over all
-//! and at end are possible too, which may take what its own start or other actions bring about.
-//! The condition over all need not be possible if the duration may be 0.
-//! A condition is possible when each fact that it reads has the truth value asked for at some
-//! time, by the initial state, timed initials or reached actions; comparisons of numbers that
-//! nothing reached changes are evaluated, others count as possible. An action that can start but
-//! never end occurs in no valid plan, so what its start brought about is taken back, and all is
-//! done again without it.
+//! An instantaneous action is reached when its condition is possible. A durative action starts when
+//! its condition at start and its duration are possible. It is reached when the conditions over all
+//! and at end are possible as well; its own start effects or other actions may make them so. The
+//! over-all condition need not be possible if the duration may be 0. A condition is possible when
+//! each fact that it reads has the required truth value at some time, by the initial state, timed
+//! initials or reached actions. Comparisons of numbers that no reached action changes are
+//! evaluated; others count as possible. An action that can start but never end occurs in no valid
+//! plan. Its start effects are removed, and the computation is repeated without it.
 //!
-//! Instances are found by joining the atoms of conditions with the facts reached so far, as a
-//! Datalog engine does (Helmert, "Concise finite-domain representations for PDDL planning tasks",
-//! AIJ 173, 2009, section 6), one reached fact after the other; what cannot be joined, such as
-//! negations, universal quantifiers and numbers, is tested for each binding.
+//! Instances are found by joining the atoms of conditions with the facts reached so far, as in a
+//! Datalog engine (Helmert, "Concise finite-domain representations for PDDL planning tasks", AIJ
+//! 173, 2009, section 6), one reached fact after the other. Conditions that cannot be joined, such
+//! as negations, universal quantifiers and comparisons of numbers, are tested for each binding.
 
 mod constants;
 mod effects;
@@ -49,19 +48,20 @@ use event::Symbol;
 use fixpoint::{Arguments, Reachable, fixpoint};
 use relaxation::Relaxation;
 
-/// The number of steps that lie between two questions whether to go on.
+/// Number of steps between two calls of the caller's `goes_on`.
 const STEPS_PER_QUESTION: u64 = 8192;
 
-/// The number of actions made between two such questions.
+/// Number of created actions between two such calls.
 const ACTIONS_PER_QUESTION: usize = 32;
 
 /// Limits of grounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// The most ground actions.
+    /// Largest number of ground actions.
     pub action_limit: usize,
-    /// The most matches of an atom with a fact, tries of an effect and the like: bounds the time
-    /// where few of many combinations are possible. Some ten million take a second.
+    /// Largest number of steps: matches of an atom with a fact, tries of an effect and the like. It
+    /// limits the time when few of many combinations are possible. About ten million steps take a
+    /// second.
     pub step_limit: u64,
 }
 
@@ -77,17 +77,17 @@ impl Default for Settings {
 /// The result of grounding.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// All that can be reached was found.
+    /// The complete result.
     Complete(Grounding),
-    /// One of the [`Settings`]' limits was reached, or [`ground_while`] was told to stop.
+    /// One of the limits of [`Settings`] was reached, or the caller of [`ground_while`] stopped it.
     LimitReached,
 }
 
 /// The reachable ground actions and facts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grounding {
-    /// The actions, by schema and arguments, without conditions that hold at all times and without
-    /// conditional effects that never happen.
+    /// Actions, by schema and arguments, without conditions that always hold and without
+    /// conditional effects that never take place.
     pub actions: Vec<Action>,
     /// The facts that are true at some time, derived ones included.
     pub facts: BTreeSet<FactId>,
@@ -97,13 +97,13 @@ pub struct Grounding {
     pub goal: Condition,
     /// The conjuncts of the goal, as written, that no plan can make true.
     pub unreachable_goals: Vec<Condition>,
-    /// How many steps it took; see [`Settings::step_limit`].
+    /// Number of steps; see [`Settings::step_limit`].
     pub steps: u64,
 }
 
 impl Grounding {
-    /// The schema and the arguments of each action, schema by schema in the domain's order, and in
-    /// the order of the objects.
+    /// Returns the schema and the arguments of each action, schema by schema in the domain's order,
+    /// and in the order of the objects.
     pub fn instances(&self) -> Vec<(SchemaId, Vec<ObjectId>)> {
         let actions = self.actions.iter();
         let mut instances: Vec<_> = actions
@@ -114,14 +114,14 @@ impl Grounding {
     }
 }
 
-/// Finds all ground actions that can be reached, and enters the facts and fluents that they
-/// mention into the task's table.
+/// Finds all reachable ground actions, and enters the facts and fluents that they mention into the
+/// task's table.
 pub fn ground(task: &Task, settings: &Settings) -> Answer {
     ground_while(task, settings, &mut || true)
 }
 
-/// The same as [`ground`], as long as `goes_on` says so: it is asked every few thousand steps,
-/// which is about every millisecond, and not again once it has said no.
+/// Like [`ground`], but stops when `goes_on` returns `false`. It is called every few thousand
+/// steps, about once per millisecond, and not again after it has returned `false`.
 pub fn ground_while(task: &Task, settings: &Settings, goes_on: &mut dyn FnMut() -> bool) -> Answer {
     let (problem, domains) = (task.with_autonomous_changes(), task.domains.clone());
     let mut steps = 0;
@@ -176,7 +176,7 @@ pub fn ground_while(task: &Task, settings: &Settings, goes_on: &mut dyn FnMut() 
     })
 }
 
-/// The fixpoint in which all that starts can also end.
+/// Returns the fixpoint without instances that can start but not end.
 fn reach<'a>(
     problem: &'a Problem,
     domains: &'a Domains,
@@ -225,7 +225,8 @@ fn enter_facts(task: &Task, relaxation: &Relaxation) -> BTreeSet<FactId> {
     })
 }
 
-/// The reached instances as actions, by schema and arguments; `None` if told to stop.
+/// Returns the reached instances as actions, by schema and arguments; `None` if the caller stopped
+/// it.
 fn actions(
     task: &Task,
     reachable: &Reachable,

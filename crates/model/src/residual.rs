@@ -1,4 +1,4 @@
-//! What is left of a task in mid-execution, as a task of its own.
+//! Remaining task of a situation during execution, as a task of its own.
 
 use std::sync::Arc;
 
@@ -14,13 +14,14 @@ use crate::state::TimedHappening;
 use crate::task::Task;
 
 impl Situation {
-    /// The rest of `task`, with a clock of its own that reads 0 at [`Situation::time`].
+    /// Returns the remaining task, with a clock that reads 0 at [`Situation::time`].
     ///
-    /// It begins in the situation's state, and its timed initials are those to come, moved. Facts
-    /// and fluents keep their numbers. What is running is no part of it; a plan takes that along,
-    /// see [`Situation::rest_of_plan`]. [`Task::problem`] still is the whole problem: its initial
-    /// facts and times are those of the beginning. Constraints on the course of the whole plan, other than
-    /// [deadlines](Task::with_deadlines), cannot be judged from here: the validator says so.
+    /// Its initial state is the situation's state, and its timed initials are the pending ones,
+    /// shifted. Facts and fluents keep their numbers. Running actions are not part of it; a plan
+    /// contains their remaining parts, see [`Situation::rest_of_plan`]. [`Task::problem`] is still
+    /// the original problem, with its initial facts and times. Constraints on the course of the
+    /// whole plan, other than [deadlines](Task::with_deadlines), cannot be evaluated from here; the
+    /// validator reports this.
     #[must_use]
     pub fn rest_of_task(&self, task: &Task) -> Task {
         let to_come = |timed: &&TimedHappening| timed.time > self.time;
@@ -37,10 +38,10 @@ impl Situation {
         rest
     }
 
-    /// A plan from here as a plan of [`Situation::rest_of_task`].
+    /// Converts a plan from here to a plan of [`Situation::rest_of_task`].
     ///
-    /// Each running action becomes one that starts at 0, needs and changes nothing then, takes
-    /// what is left of its duration, and ends as the running one does.
+    /// Each running action becomes an action that starts at 0, without conditions or effects at its
+    /// start, with the remaining duration and the same end.
     #[must_use]
     pub fn rest_of_plan(&self, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
         let continued = self
@@ -66,7 +67,7 @@ impl Situation {
 }
 
 impl RunningAction {
-    /// The rest of the action at `now`, as an action.
+    /// Returns the remaining part of the action at `now`, as an action.
     #[must_use]
     pub fn rest(&self, now: &Rational) -> Action {
         let elapsed = now - &self.start;
@@ -98,7 +99,7 @@ impl RunningAction {
     }
 }
 
-/// The rest of the possible durations, as duration constraints.
+/// Returns the remaining possible durations, as duration constraints.
 fn bounds(possible: &Interval, elapsed: &Rational) -> Vec<DurationConstraint> {
     let bound = |end: &End, closed, open| {
         let comparison = match end {

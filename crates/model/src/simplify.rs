@@ -1,4 +1,5 @@
-//! Conditions, expressions and actions without the parts that are the same in every state.
+//! Simplification of conditions, expressions and actions: removes parts that are the same in every
+//! state.
 
 use std::sync::Arc;
 
@@ -10,22 +11,22 @@ use crate::ground::{
 
 /// Access to facts and values that are the same in every state.
 pub trait Constants {
-    /// The fact's truth, if it never changes.
+    /// Returns the fact's truth value, if it never changes.
     fn truth(&mut self, fact: FactId) -> Option<bool>;
 
-    /// The fluent's value, if it has one and never changes.
+    /// Returns the fluent's value, if it has one and never changes.
     fn value(&mut self, fluent: FluentId) -> Option<Rational>;
 }
 
 impl Condition {
-    /// Whether this is the empty disjunction.
+    /// Returns `true` if this is the empty disjunction.
     pub fn is_contradiction(&self) -> bool {
         matches!(self, Self::Or(parts) if parts.is_empty())
     }
 
-    /// An equivalent condition in which nothing constant is left: [`Condition::TRUE`],
-    /// [`Condition::FALSE`], or one that contains neither. Nested conjunctions and disjunctions
-    /// are flattened.
+    /// Returns an equivalent condition without constant parts: [`Condition::TRUE`],
+    /// [`Condition::FALSE`], or a condition that contains neither. Nested conjunctions and
+    /// disjunctions are flattened.
     #[must_use]
     pub fn simplified(self, constants: &mut impl Constants) -> Self {
         match self {
@@ -71,19 +72,19 @@ impl Condition {
         }
     }
 
-    /// [`Condition::TRUE`] or [`Condition::FALSE`].
+    /// Returns [`Condition::TRUE`] or [`Condition::FALSE`].
     pub(crate) fn always(truth: bool) -> Self {
         if truth { Self::TRUE } else { Self::FALSE }
     }
 }
 
-/// The only part, if there is just one.
+/// Returns the only part, if there is exactly one.
 fn only(parts: &mut Vec<Condition>) -> Option<Condition> {
     if parts.len() == 1 { parts.pop() } else { None }
 }
 
 impl Expression {
-    /// The same expression with constant parts evaluated, except where they have no value.
+    /// Returns the expression with constant parts evaluated, except those without a value.
     #[must_use]
     pub fn simplified(self, constants: &mut impl Constants) -> Self {
         let mut each = |parts: Vec<Self>| -> Vec<Self> {
@@ -118,7 +119,7 @@ impl Expression {
         }
     }
 
-    /// The value, if no leaf but numbers occurs; looks at the operands only, not below them.
+    /// Returns the value if all operands are numbers. Does not descend into the operands.
     fn evaluate_constants(&self) -> Option<Rational> {
         let is_constant = |part: &Self| matches!(part, Self::Constant(_));
         let are_constant = match self {
@@ -138,8 +139,8 @@ impl Expression {
 }
 
 impl Action {
-    /// The same action with conditions and expressions simplified, and without the conditional
-    /// effects that never happen.
+    /// Returns the action with conditions and expressions simplified, and without conditional
+    /// effects that never take place.
     #[must_use]
     pub fn simplified(mut self, constants: &mut impl Constants) -> Self {
         match &mut self.body {

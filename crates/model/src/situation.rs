@@ -1,4 +1,4 @@
-//! A problem in mid-execution.
+//! State of a problem during execution.
 
 use std::sync::Arc;
 
@@ -10,41 +10,42 @@ use crate::problem::{Problem, TimedChange, TimedInitial};
 use crate::state::State;
 use crate::task::Task;
 
-/// A state at one moment, with the actions that are running.
+/// A state at one moment, with the running actions.
 ///
-/// Times are those of the task's own clock: its timed initials up to and including
-/// [`Situation::time`] have happened, the later ones are to come.
+/// Times refer to the task's own clock: its timed initials up to and including [`Situation::time`]
+/// have happened, the later ones are pending.
 ///
 /// A plan from here is a [`TimeTriggeredPlan`] whose first steps continue the running actions, in
-/// their order, each with its own start (in the past) and a duration chosen among those still
-/// possible; all further steps start at [`Situation::time`] or later. Whoever makes the situation
-/// sees to it that `time` is far enough from the last happening for anything to be done at `time`.
+/// their order, each with its own start (in the past) and one of the durations that are still
+/// possible. All further steps start at [`Situation::time`] or later. The creator of the situation
+/// has to ensure that `time` is far enough from the last happening, so that actions can start at
+/// `time`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Situation {
-    /// Now.
+    /// Present time.
     pub time: Rational,
-    /// The present state, after all that has happened.
+    /// Present state, after all happenings so far.
     pub state: State,
-    /// The actions that have started and not ended.
+    /// Actions that have started and not ended.
     pub running: Vec<RunningAction>,
 }
 
-/// A durative action under way.
+/// A running durative action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningAction {
-    /// What is being done. Its guards have been decided as far as they could be: effects that
-    /// will not take place are left out, and so is `Guard::at_start`.
+    /// The action. Guards that are already known have been evaluated: effects that will not take
+    /// place are left out, and so is `Guard::at_start`.
     pub action: Arc<Action>,
-    /// The time at which it started; not after [`Situation::time`].
+    /// Start time; not after [`Situation::time`].
     pub start: Rational,
-    /// The durations it may turn out to have had, counted from its start. Those that would have
-    /// it end before [`Situation::time`] are no longer possible, whatever stands here.
+    /// Possible durations, counted from its start. Those that would have ended it before
+    /// [`Situation::time`] are no longer possible, even if the interval contains them.
     pub duration: Interval,
 }
 
 impl Situation {
-    /// A task's beginning: time 0, nothing running. Timed initials at time 0, if there are any,
-    /// are to come.
+    /// Returns the initial situation of a task: time 0, no running actions. Timed initials at time
+    /// 0 are pending.
     pub fn initial(task: &Task) -> Self {
         Self {
             time: Rational::ZERO,
@@ -55,12 +56,12 @@ impl Situation {
 }
 
 impl Task {
-    /// A task for finding out what can be reached from a situation, with the same facts and
-    /// fluents under the same numbers: [`ground`](crate::reachability::ground) finds the actions
-    /// that some plan from there can start.
+    /// Returns a task for reachability analysis from a situation, with the same facts and fluents
+    /// under the same numbers: [`ground`](crate::reachability::ground) finds the actions that some
+    /// plan from there can start.
     ///
-    /// It begins with the situation's state. In its [`Task::problem`], though not in
-    /// [`Task::timed`], what the running actions may do is listed among the timed initials.
+    /// Its initial state is the situation's state. The possible effects of running actions are
+    /// among the timed initials of its [`Task::problem`], though not of [`Task::timed`].
     #[must_use]
     pub fn beginning_at(&self, situation: &Situation) -> Self {
         let mut problem = (*self.problem).clone();
@@ -99,8 +100,8 @@ impl Task {
         task
     }
 
-    /// The problem for questions of what can be reached: what processes and events may do is listed
-    /// among the timed initials.
+    /// Returns the problem for reachability analysis: the possible effects of processes and events
+    /// are among the timed initials.
     pub(crate) fn with_autonomous_changes(&self) -> Arc<Problem> {
         let autonomous = self.autonomous();
         if autonomous.is_empty() {
@@ -135,7 +136,7 @@ impl Task {
         }
     }
 
-    /// Stands for any change of a fluent: whether it changes is all that reachability asks.
+    /// Represents any change of a fluent: reachability depends only on the fact that it changes.
     fn some_value_of(&self, fluent: FluentId) -> TimedChange {
         let (function, arguments) = self.application(fluent);
         TimedChange::Assign(function, arguments, Rational::ZERO)
@@ -143,7 +144,7 @@ impl Task {
 }
 
 impl RunningAction {
-    /// The action as a step of a plan, with the duration it will have had.
+    /// Returns the action as a step of a plan with this duration.
     pub fn step(&self, duration: Rational) -> Step {
         Step {
             start: self.start.clone(),
@@ -152,19 +153,19 @@ impl RunningAction {
         }
     }
 
-    /// Whether it may still turn out to have had this duration.
+    /// Returns `true` if this duration is still possible at `now`.
     pub fn may_last(&self, duration: &Rational, now: &Rational) -> bool {
         self.duration.contains(duration) && &self.start + duration >= *now
     }
 
-    /// Whether a step continues this action, apart from its duration.
+    /// Returns `true` if a step continues this action, with any duration.
     pub(crate) fn is_continued_by(&self, step: &Step) -> bool {
         step.start == self.start && step.action == self.action
     }
 }
 
 impl TimeTriggeredPlan {
-    /// The steps that a plan from `situation` adds to what is running.
+    /// Returns the steps that a plan from `situation` adds to the running actions.
     pub fn new_steps(&self, situation: &Situation) -> &[Step] {
         self.steps.get(situation.running.len()..).unwrap_or(&[])
     }

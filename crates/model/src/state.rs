@@ -1,4 +1,4 @@
-//! What holds at one moment, and what the problem lets happen at others.
+//! State at one moment, and timed initials at later ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,14 +11,14 @@ use crate::ground::{Change, FactId, FluentId};
 pub struct State {
     /// The true facts, except derived ones.
     pub facts: BTreeSet<FactId>,
-    /// The defined fluents' values.
+    /// Values of the defined fluents.
     pub values: BTreeMap<FluentId, Rational>,
 }
 
 /// All timed initials of one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedHappening {
-    /// When they happen.
+    /// Their time.
     pub time: Rational,
     /// The changes: additions, deletions and assignments of constants.
     pub changes: Vec<Change>,

@@ -1,4 +1,4 @@
-//! The table of ground facts and fluents: which number means which.
+//! Table of ground facts and fluents, which maps numbers to atoms.
 
 use std::sync::{Arc, OnceLock};
 
@@ -9,17 +9,16 @@ use crate::ground::{FactId, FluentId};
 use crate::hash::Set;
 use crate::problem::{FunctionId, ObjectId, PredicateId};
 
-/// The facts and fluents met so far, numbered in the order in which they were met, and the rules
-/// of the derived facts among them.
+/// The facts and fluents mentioned so far, numbered in the order of their first mention, and the
+/// rules of the derived facts among them.
 ///
-/// It only grows: a number never changes its meaning.
+/// The table only grows: a number never changes its meaning.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
     facts: Set<(PredicateId, Vec<ObjectId>)>,
     fluents: Set<(FunctionId, Vec<ObjectId>)>,
     rules: Arc<Rules>,
-    /// How derived facts follow from basic ones, once something has asked for it; inside, `None`
-    /// if one depends on its own negation.
+    /// Sorted rules, computed on demand; inside, `None` if a fact depends on its own negation.
     derivation: OnceLock<Option<Derivation>>,
 }
 
@@ -32,7 +31,7 @@ impl Table {
         self.fluents.len()
     }
 
-    /// The number of a fact, if it has one.
+    /// Returns the number of a fact, if it has one.
     pub(crate) fn find_fact(
         &self,
         predicate: PredicateId,
@@ -42,7 +41,7 @@ impl Table {
         index.map(|index| FactId(narrow(index)))
     }
 
-    /// The number of a fluent, if it has one.
+    /// Returns the number of a fluent, if it has one.
     pub(crate) fn find_fluent(
         &self,
         function: FunctionId,
@@ -52,7 +51,7 @@ impl Table {
         index.map(|index| FluentId(narrow(index)))
     }
 
-    /// The number of a fact, and whether it is new.
+    /// Returns the number of a fact, and `true` if it is new.
     pub(crate) fn fact(
         &mut self,
         predicate: PredicateId,
@@ -65,7 +64,7 @@ impl Table {
         (FactId(narrow(index)), true)
     }
 
-    /// The number of a fluent.
+    /// Returns the number of a fluent.
     pub(crate) fn fluent(&mut self, function: FunctionId, arguments: &[ObjectId]) -> FluentId {
         if let Some(fluent) = self.find_fluent(function, arguments) {
             return fluent;
@@ -74,37 +73,37 @@ impl Table {
         FluentId(narrow(index))
     }
 
-    /// The predicate and the objects of a fact.
+    /// Returns the predicate and the objects of a fact.
     pub(crate) fn atom(&self, fact: FactId) -> &(PredicateId, Vec<ObjectId>) {
         let atom = self.facts.get_index(fact.index());
         atom.expect("a fact of this table")
     }
 
-    /// The function and the objects of a fluent.
+    /// Returns the function and the objects of a fluent.
     pub(crate) fn application(&self, fluent: FluentId) -> &(FunctionId, Vec<ObjectId>) {
         let application = self.fluents.get_index(fluent.index());
         application.expect("a fluent of this table")
     }
 
-    /// The rules of all derived facts in the table.
+    /// Returns the rules of all derived facts in the table.
     pub(crate) fn rules(&self) -> &Arc<Rules> {
         &self.rules
     }
 
-    /// The rules, to be added to.
+    /// Returns the rules for additions. Invalidates the sorted rules.
     pub(crate) fn rules_mut(&mut self) -> &mut Rules {
         self.derivation.take();
         Arc::make_mut(&mut self.rules)
     }
 
-    /// How derived facts follow from basic ones; `None` if one depends on its own negation.
+    /// Returns the sorted rules of derived facts; `None` if a fact depends on its own negation.
     pub(crate) fn derivation(&self) -> Option<Derivation> {
         let derivation = self.derivation.get_or_init(|| Derivation::of(&self.rules));
         derivation.clone()
     }
 }
 
-/// A symbol with its arguments, to look up in a table without a vector of its own.
+/// A symbol with its arguments, for look-ups without an allocation.
 #[derive(Hash)]
 struct Key<'a, S>(S, &'a [ObjectId]);
 
@@ -114,7 +113,8 @@ impl<S: PartialEq> Equivalent<(S, Vec<ObjectId>)> for Key<'_, S> {
     }
 }
 
-/// The upper half of the numbers is left to those who need facts of their own.
+/// Converts a position to a number. The upper half of the numbers is reserved for components that
+/// need additional facts.
 fn narrow(index: usize) -> u32 {
     let number = u32::try_from(index).ok();
     let number = number.filter(|&number| number < FactId::FIRST_FREE.0);

@@ -18,14 +18,14 @@ use crate::table::Table;
 const CONTROLS: &str = "control parameters (`:control`)";
 const CONSTRAINTS: &str = "trajectory constraints (`:constraints`)";
 
-/// A problem, and the ground facts and fluents met so far.
+/// A problem, and the ground facts and fluents mentioned so far.
 ///
-/// Facts and fluents enter a table when something mentions them, so that a plan can be judged
-/// without grounding the whole problem. The table only grows, and clones share it, as do
+/// Facts and fluents enter a table on first mention, so that a plan can be validated without
+/// grounding the whole problem. The table only grows, and clones share it, as do
 /// [`Task::beginning_at`] and [`Situation::rest_of_task`](crate::Situation::rest_of_task): a fact
-/// has one number in all of them, whoever mentions it first. Numbers follow the order of first
-/// mention; where threads mention facts in no fixed order, each needs a table of its own
-/// ([`Task::with_own_table`]) for results to be the same each time.
+/// has the same number in all of them. Numbers follow the order of first mention. If threads
+/// mention facts in no fixed order, each thread needs a table of its own ([`Task::with_own_table`])
+/// for reproducible results.
 #[derive(Clone, Debug)]
 pub struct Task {
     pub(crate) problem: Arc<Problem>,
@@ -42,14 +42,15 @@ pub struct Task {
 }
 
 impl Task {
-    /// The task of a problem: its initial state, timed happenings and goal, made ground; ε is
+    /// Creates the task of a problem: its initial state, timed happenings and goal are ground; ε is
     /// 0.001.
     pub fn new(problem: impl Into<Arc<Problem>>) -> Self {
         Self::of(&problem.into(), Arc::default())
     }
 
-    /// The task of a problem that extends this task's: with the same objects, and with further predicates, functions
-    /// and actions after its own. Facts and fluents keep their numbers.
+    /// Creates the task of a problem that extends this task's: it has the same objects, and further
+    /// predicates, functions and actions after the existing ones. Facts and fluents keep their
+    /// numbers.
     #[must_use]
     pub fn extended(&self, problem: impl Into<Arc<Problem>>) -> Self {
         Self::of(&problem.into(), Arc::clone(&self.table)).with_epsilon(self.epsilon.clone())
@@ -88,58 +89,59 @@ impl Task {
         task
     }
 
-    /// The lifted problem.
+    /// Returns the lifted problem.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
 
-    /// The default of the least separation of interfering happenings (ε).
+    /// Returns the default of the least separation of interfering happenings (ε).
     pub fn default_epsilon() -> Rational {
         Rational::new(1, 1000)
     }
 
-    /// The same task with another least separation of interfering happenings (ε); positive, in the
-    /// problem's unit of time.
+    /// Returns the task with another least separation of interfering happenings (ε); positive, in
+    /// the problem's unit of time.
     #[must_use]
     pub fn with_epsilon(mut self, epsilon: Rational) -> Self {
         self.epsilon = epsilon;
         self
     }
 
-    /// The least separation of interfering happenings (ε), in the problem's unit of time. All that
-    /// reasons about plans of this task goes by it: the judge, orders, envelopes, planners, runs.
+    /// Returns the least separation of interfering happenings (ε), in the problem's unit of time.
+    /// The validator, orders, envelopes, planners and runs all use this value for plans of the
+    /// task.
     pub fn epsilon(&self) -> &Rational {
         &self.epsilon
     }
 
-    /// The state at time 0.
+    /// Returns the state at time 0.
     pub fn initial(&self) -> &State {
         &self.initial
     }
 
-    /// The timed initials, one entry per time, by time.
+    /// Returns the timed initials, one entry per time, sorted by time.
     pub fn timed(&self) -> &[TimedHappening] {
         &self.timed
     }
 
-    /// The goal condition.
+    /// Returns the goal condition.
     pub fn goal(&self) -> &Condition {
         &self.goal
     }
 
-    /// The constraints on the course of a plan, and the preferences about it, those of the goal
-    /// among them.
+    /// Returns the constraints on the course of a plan and the preferences about it, including
+    /// those of the goal.
     pub fn constraints(&self) -> &Constraints {
         &self.constraints
     }
 
-    /// The processes and events, which happen without a plan.
+    /// Returns the processes and events.
     pub fn autonomous(&self) -> &Autonomous {
         &self.autonomous
     }
 
-    /// The part of the problem, if there is one, that nobody heeds but the judge, and envelopes as
-    /// far as they say so. All who find, change or carry out plans must refuse it.
+    /// Returns a feature of the problem that only the validator supports, and envelopes to a
+    /// documented extent. Components that find, change or execute plans must reject it.
     pub fn left_to_the_judge(&self) -> Option<&'static str> {
         if !self.autonomous.is_empty() {
             return Some("processes and events (PDDL+)");
@@ -147,8 +149,9 @@ impl Task {
         (!self.problem.controls.is_empty()).then_some(CONTROLS)
     }
 
-    /// The part of the problem, if there is one, that decides whether a plan is valid and that
-    /// only the judge heeds, or networks and planners too. Those who do not must refuse it.
+    /// Returns a feature of the problem that affects the validity of plans and that only the
+    /// validator supports, or only the validator, networks and planners. All other components must
+    /// reject it.
     pub fn only_judged(&self) -> Option<&'static str> {
         if let Some(feature) = self.left_to_the_judge() {
             return Some(feature);
@@ -156,9 +159,9 @@ impl Task {
         (!self.constraints.hard.is_empty()).then_some(CONSTRAINTS)
     }
 
-    /// The part of the problem, if there is one, that decides whether a plan is valid and that the
-    /// boxes of a network given as such do not heed. Where there are processes and events, they heed
-    /// constraints, too, as far as they say so.
+    /// Returns a feature of the problem that affects the validity of plans and that the boxes of a
+    /// given network do not respect. With processes and events, they respect constraints to a
+    /// documented extent.
     pub fn beyond_boxes(&self) -> Option<&'static str> {
         if !self.problem.controls.is_empty() {
             return Some(CONTROLS);
@@ -167,7 +170,7 @@ impl Task {
         (!are_heeded).then_some(CONSTRAINTS)
     }
 
-    /// The same task with another goal. Facts and fluents keep their numbers.
+    /// Returns the task with another goal. Facts and fluents keep their numbers.
     #[must_use]
     pub fn with_goal(&self, goal: problem::Condition) -> Self {
         let mut task = self.clone();
@@ -178,9 +181,10 @@ impl Task {
         task
     }
 
-    /// The same task with deadlines, on its clock: each condition holds at some moment between the beginning
-    /// of a plan and the deadline. Unlike for constraints of the problem, states before the plan do not matter.
-    /// Returns `None` if the task has constraints or preferences of its own.
+    /// Returns the task with deadlines, on its clock: each condition holds at some moment between
+    /// the beginning of a plan and the deadline. Unlike for constraints of the problem, states
+    /// before the plan do not matter. Returns `None` if the task has constraints or preferences of
+    /// its own.
     #[must_use]
     pub fn with_deadlines<'c>(
         &self,
@@ -196,7 +200,8 @@ impl Task {
         Some(self.with_ground_deadlines(deadlines.map(|(deadline, it)| (deadline, ground(it)))))
     }
 
-    /// The same task with these deadlines in place of its constraints, as [`Task::with_deadlines`].
+    /// Returns the task with these deadlines in place of its constraints, as in
+    /// [`Task::with_deadlines`].
     #[must_use]
     pub fn with_ground_deadlines(
         &self,
@@ -216,7 +221,7 @@ impl Task {
         }
     }
 
-    /// The deadlines of [`Task::with_deadlines`], in their order, each with its condition.
+    /// Returns the deadlines of [`Task::with_deadlines`], in their order, each with its condition.
     pub fn deadlines(&self) -> impl Iterator<Item = (&Rational, &Condition)> {
         let hard = self
             .constraints
@@ -229,8 +234,8 @@ impl Task {
         })
     }
 
-    /// The same task with each timed initial in an entry of its own in [`timed`](Self::timed), so that
-    /// those of one time can be told apart.
+    /// Returns the task with a separate entry for each timed initial in [`timed`](Self::timed),
+    /// also for those at the same time.
     #[must_use]
     pub fn with_timed_apart(&self) -> Self {
         let mut task = self.clone();
@@ -244,9 +249,9 @@ impl Task {
         task
     }
 
-    /// The same task with its timed initials at other times, by their position in
+    /// Returns the task with its timed initials at other times, by their position in
     /// [`timed`](Self::timed), and with other initial values of some fluents. The lifted
-    /// [`problem`](Self::problem) stays as it is.
+    /// [`problem`](Self::problem) does not change.
     #[must_use]
     pub fn with_numbers(
         &self,
@@ -268,8 +273,8 @@ impl Task {
         task
     }
 
-    /// The same task with a table of its own, in which what is mentioned from now on gets numbers
-    /// that mean nothing elsewhere.
+    /// Returns the task with a table of its own. Numbers of facts and fluents that are mentioned
+    /// from now on are not valid for other tasks.
     #[must_use]
     pub fn with_own_table(&self) -> Self {
         Self {
@@ -278,13 +283,14 @@ impl Task {
         }
     }
 
-    /// The table. Nothing that may want it, too, may be called while it is held.
+    /// Returns the table, locked. While the lock is held, no function that locks the table may be
+    /// called.
     pub(crate) fn table(&self) -> RwLockReadGuard<'_, Table> {
-        // Whoever panicked has at most left out what it was about to add.
+        // A thread that panicked may at most have omitted its addition, so the table is consistent.
         self.table.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Grounds something, which may enter facts and fluents into the table. The table is held
+    /// Calls `ground`, which may enter facts and fluents into the table. The table is locked
     /// meanwhile.
     pub(crate) fn grounding<T>(&self, ground: impl FnOnce(&mut Grounder<'_>) -> T) -> T {
         let mut table = self.table.write().unwrap_or_else(PoisonError::into_inner);
@@ -297,12 +303,13 @@ impl Task {
         ))
     }
 
-    /// The rules of all derived facts in the table, closed under what their bodies mention.
+    /// Returns the rules of all derived facts in the table, closed under the facts that their
+    /// bodies mention.
     pub fn rules(&self) -> Arc<Rules> {
         Arc::clone(self.table().rules())
     }
 
-    /// How derived facts follow from basic ones; `None` if one depends on its own negation.
+    /// Returns the sorted rules of derived facts; `None` if a fact depends on its own negation.
     pub fn derivation(&self) -> Option<Derivation> {
         if self.problem.rules.is_empty() {
             return Some(Derivation::default());
@@ -310,9 +317,9 @@ impl Task {
         self.table().derivation()
     }
 
-    /// Whether rules define the fact.
+    /// Returns `true` if rules define the fact.
     pub fn is_derived(&self, fact: FactId) -> bool {
-        // Most problems have no rules, and this is asked often.
+        // Fast path: most problems have no rules.
         if self.problem.rules.is_empty() {
             return false;
         }
@@ -320,24 +327,24 @@ impl Task {
         self.problem.predicates[predicate.index()].is_derived
     }
 
-    /// The number of facts that are in the table.
+    /// Returns the number of facts in the table.
     pub fn fact_count(&self) -> usize {
         self.table().fact_count()
     }
 
-    /// The number of fluents that are in the table.
+    /// Returns the number of fluents in the table.
     pub fn fluent_count(&self) -> usize {
         self.table().fluent_count()
     }
 
-    /// `(predicate object …)`.
+    /// Returns `(predicate object …)`.
     pub fn fact_name(&self, fact: FactId) -> String {
         let table = self.table();
         let (predicate, arguments) = table.atom(fact);
         self.problem.apply_predicate(*predicate, arguments)
     }
 
-    /// `(function object …)`.
+    /// Returns `(function object …)`.
     pub fn fluent_name(&self, fluent: FluentId) -> String {
         let table = self.table();
         let (function, arguments) = table.application(fluent);
@@ -345,32 +352,32 @@ impl Task {
             .apply_name(&self.problem.functions[function.index()].name, arguments)
     }
 
-    /// The function whose value for some objects the fluent is.
+    /// Returns the function of a fluent.
     pub fn function_of(&self, fluent: FluentId) -> FunctionId {
         self.table().application(fluent).0
     }
 
-    /// The predicate and the objects of a fact.
+    /// Returns the predicate and the objects of a fact.
     pub fn atom(&self, fact: FactId) -> (PredicateId, Vec<ObjectId>) {
         self.table().atom(fact).clone()
     }
 
-    /// The function and the objects of a fluent.
+    /// Returns the function and the objects of a fluent.
     pub fn application(&self, fluent: FluentId) -> (FunctionId, Vec<ObjectId>) {
         self.table().application(fluent).clone()
     }
 
-    /// The fluent in the table, if something has mentioned it.
+    /// Returns the fluent, if it is in the table.
     pub fn find_fluent(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<FluentId> {
         self.table().find_fluent(function, arguments)
     }
 
-    /// The fact in the table, if something has mentioned it.
+    /// Returns the fact, if it is in the table.
     pub fn find_fact(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<FactId> {
         self.table().find_fact(predicate, arguments)
     }
 
-    /// `(name arg …)` of an action.
+    /// Returns `(name arg …)` of an action.
     pub fn action_name(&self, schema: SchemaId, arguments: &[ObjectId]) -> String {
         self.problem
             .apply_name(&self.problem.schemas[schema.index()].name, arguments)

@@ -1,8 +1,8 @@
-//! Terms under a binding of their variables.
+//! Evaluation of terms under a binding of variables.
 
 use crate::problem::{ObjectId, Term};
 
-/// The object that a term stands for.
+/// Returns the object that a term denotes.
 pub(crate) fn resolve(term: Term, binding: &[ObjectId]) -> ObjectId {
     match term {
         Term::Variable(position) => binding[position],
@@ -10,13 +10,13 @@ pub(crate) fn resolve(term: Term, binding: &[ObjectId]) -> ObjectId {
     }
 }
 
-/// Calls `action` with the objects that the terms stand for.
+/// Calls `action` with the objects that the terms denote.
 pub(crate) fn with_arguments<R>(
     terms: &[Term],
     binding: &[ObjectId],
     action: impl FnOnce(&[ObjectId]) -> R,
 ) -> R {
-    // Nearly all predicates are this short; then nothing is allocated.
+    // Most predicates have at most six arguments; these need no allocation.
     let mut short = [ObjectId(0); 6];
     if let Some(short) = short.get_mut(..terms.len()) {
         for (place, &term) in short.iter_mut().zip(terms) {

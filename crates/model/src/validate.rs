@@ -1,28 +1,30 @@
-//! The judge: whether a time-triggered plan is valid, and if not, why not.
+//! The validator: decides whether a time-triggered plan is valid, and reports the first violation.
 //!
-//! The definition is PDDL 2.1's (Fox & Long 2003), with timed initial literals and fluents,
-//! derived facts, and continuous effects whose values are polynomials in time. All arithmetic is
-//! exact. Nothing is shared with networks, encodings or solvers: every claim that the rest of the
-//! project makes about a plan can be attacked with this module alone.
+//! The definition is PDDL 2.1's (Fox & Long 2003), with timed initial literals and fluents, derived
+//! facts, and continuous effects whose values are polynomials in time. All arithmetic is exact. The
+//! module shares no code with networks, encodings or solvers, so it can check every claim that the
+//! rest of the project makes about a plan.
 //!
-//! - All that happens at one time forms a *group*. The conditions of its happenings, the guards
-//!   of conditional effects and the values of effects read the same state: the one on arrival,
-//!   after continuous change and before any effect of the group. Deletions come before additions.
+//! - All happenings at one time form a *group*. The conditions of its happenings, the guards of
+//!   conditional effects and the values of effects read the same state: the one on arrival, after
+//!   continuous change and before any effect of the group. Deletions come before additions.
 //! - Over-all conditions hold at every moment strictly between start and end. At the time of a
 //!   happening group in between, the state after the group counts.
-//! - Happenings that interfere ([`Footprint`](crate::Footprint)) are at least
-//!   [`Task::epsilon`] apart. Timed initials take part, but not against each other.
-//! - Constraints on the course ([`Modal`](crate::Modal)) are judged when the plan is over, against
-//!   the state at each moment: the one after all that happens then, and the initial state before.
-//! - Processes and events (PDDL+) need no plan. An event happens as soon as its condition holds:
-//!   after the group, or the event, that makes it true, and before the group that happens at that
-//!   time; a process is at work whenever its condition holds. An event happens once at a moment.
+//! - Happenings that interfere ([`Footprint`](crate::Footprint)) are at least [`Task::epsilon`]
+//!   apart. This includes timed initials, but two of these may be closer to each other.
+//! - Constraints on the course ([`Modal`](crate::Modal)) are evaluated at the end of the plan. The
+//!   state at a moment is the one after all happenings of the moment; the initial state counts as
+//!   well.
+//! - Processes and events (PDDL+) happen without actions of the plan. An event happens as soon as
+//!   its condition holds: after the group, or the event, that makes it true, and before the group
+//!   at that time. A process is active whenever its condition holds. An event happens once at a
+//!   moment.
 //! - Preferences never make a plan invalid; [`Report::preferences`] lists those it violates.
-//! - The goal holds in the end: after the last happening of the plan's actions, and after all timed
-//!   initials, unless [`Settings::counts_later_timed`] says otherwise.
+//! - The goal holds at the end: after the last happening of the plan's actions, and after all timed
+//!   initials, unless [`Settings::counts_later_timed`] is `false`.
 //!
-//! A part of a condition that says nothing (it reads a fluent without a value, divides by zero)
-//! is a violation, unless the other parts decide whatever it would say.
+//! An undefined part of a condition (it reads a fluent without a value, or divides by zero) is a
+//! violation, unless the other parts decide the condition.
 //!
 //! ```
 //! use elbowroom_model::validate::{Settings, Verdict, validate};
@@ -84,8 +86,8 @@ use crate::task::Task;
 )]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Whether interfering happenings must be [`Task::epsilon`] apart. If not, they only must not
-    /// fall into one group, which is what VAL asks for.
+    /// `true` if interfering happenings must be [`Task::epsilon`] apart. Otherwise, they only must
+    /// not be in the same group, as in VAL.
     pub needs_separation: bool,
     /// VAL's `-t`. Happenings no more than a tenth of it after the first of their group belong to
     /// that group, and happen at its time; durations may miss their bounds by it, strict bounds
@@ -95,10 +97,10 @@ pub struct Settings {
     /// the slack. Under `not` it makes the condition harder to satisfy. Over-all conditions have no
     /// slack. VAL uses 0.0001 for each `-t`.
     pub slack: Rational,
-    /// Whether timed initials after the last happening of the plan's actions count, so that the
-    /// goal holds after all of them. That is the meaning in the field (VAL, unified-planning and
-    /// Tamer agree), and what networks, envelopes, planner and executors rely on. Without it, the
-    /// goal is read after the last happening of the plan's actions.
+    /// `true` if timed initials after the last happening of the plan's actions count, so that the
+    /// goal has to hold after all of them. This is the usual meaning (VAL, unified-planning and
+    /// Tamer agree), and networks, envelopes, planner and executors rely on it. Otherwise, the goal
+    /// is read after the last happening of the plan's actions.
     pub counts_later_timed: bool,
     /// Allows happenings of one time to change facts and numbers that others of that time read. All conditions
     /// read the state before. Contradictory writes are refused by
@@ -111,8 +113,8 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// As exact as can be: tolerance 0, interfering happenings ε apart, the goal after all timed
-    /// initials.
+    /// Returns the strictest settings: tolerance 0, interfering happenings ε apart, the goal after
+    /// all timed initials.
     fn default() -> Self {
         Self {
             needs_separation: true,
@@ -126,7 +128,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The settings that correspond to VAL's `-t tolerance`.
+    /// Returns the settings that correspond to VAL's `-t tolerance`.
     pub fn like_val(tolerance: Rational) -> Self {
         Self {
             needs_separation: false,
@@ -136,8 +138,9 @@ impl Settings {
         }
     }
 
-    /// What unified-planning does with a problem without an ε: what happens at one time reads the
-    /// state before, nothing needs to be apart, and no two steps write the same fact at one time.
+    /// Returns the settings of unified-planning for a problem without an ε: simultaneous happenings
+    /// read the state before, no separation is needed, and no two steps write the same fact at one
+    /// time.
     pub fn like_unified_planning() -> Self {
         Self {
             needs_separation: false,
@@ -152,12 +155,12 @@ impl Settings {
         later - first <= self.group_width()
     }
 
-    /// How much later than the first of its group a happening can be.
+    /// Returns the largest time between the first and the last happening of a group.
     fn group_width(&self) -> Rational {
         &self.tolerance / Rational::from(10)
     }
 
-    /// Whether a duration satisfies a bound.
+    /// Returns `true` if a duration satisfies a bound.
     fn allows(&self, comparison: Comparison, duration: &Rational, bound: &Rational) -> bool {
         let gap = (duration - bound).abs();
         comparison.holds(duration, bound)
@@ -168,24 +171,24 @@ impl Settings {
     }
 }
 
-/// The answer.
+/// Result of the validation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
-    /// The plan works.
+    /// The plan is valid.
     Valid(Report),
-    /// The plan does not work; this is the first thing that is wrong.
+    /// The plan is invalid; this is the first violation.
     Invalid(Violation),
-    /// The judge cannot tell.
+    /// The validator cannot decide.
     Undecided(Undecided),
 }
 
 impl Verdict {
-    /// Whether the plan works.
+    /// Returns `true` if the plan is valid.
     pub fn is_valid(&self) -> bool {
         matches!(self, Self::Valid(_))
     }
 
-    /// The violation, if the plan is invalid.
+    /// Returns the violation, if the plan is invalid.
     pub fn violation(&self) -> Option<&Violation> {
         match self {
             Self::Invalid(violation) => Some(violation),
@@ -194,27 +197,27 @@ impl Verdict {
     }
 }
 
-/// The final state of a valid plan, and its margins.
+/// Final state of a valid plan, and its margins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// The time of the last happening of the plan's actions.
+    /// Time of the last happening of the plan's actions.
     pub makespan: Rational,
-    /// The state in the end, in which the goal holds. Derived facts are not listed.
+    /// Final state, without derived facts. The goal holds in it.
     pub state: State,
-    /// For each comparison that some action, or the goal, needs by itself (not as part of a
-    /// disjunction), how close it came to failing: by step, the goal's last.
+    /// Margins of all comparisons that an action, or the goal, needs by itself (not as part of a
+    /// disjunction), sorted by step; the goal's come last.
     pub margins: Vec<Margin>,
-    /// What the plan violates of the preferences.
+    /// Violated preferences.
     pub preferences: Preferences,
 }
 
-/// Judges a plan. The plan's actions must have been instantiated from this task.
+/// Validates a plan. The plan's actions must have been instantiated from this task.
 pub fn validate(task: &Task, plan: &TimeTriggeredPlan, settings: &Settings) -> Verdict {
     judge(task, None, plan, settings)
 }
 
-/// Judges a plan that goes on from `situation`: see [`Situation`] for what such a plan looks like.
-/// What happened before is not judged.
+/// Validates a plan that continues from `situation`; see [`Situation`] for the form of such a plan.
+/// Earlier happenings are not checked.
 pub fn validate_from(
     task: &Task,
     situation: &Situation,
@@ -231,7 +234,7 @@ fn judge(
     settings: &Settings,
 ) -> Verdict {
     let running = situation.map_or(0, |situation| situation.running.len());
-    // What it mentions must be in the table before derived facts are looked at.
+    // All facts that the preferences mention must be in the table before the rules are read.
     let preferences = preferences::OfActions::of(task, plan, running);
     let Some(derivation) = task.derivation() else {
         return Verdict::Undecided(Undecided {
@@ -276,7 +279,7 @@ fn judge(
     }
 }
 
-/// The first step whose times make no sense by themselves, or do not continue what is running.
+/// Returns the first step with invalid times, or that does not continue the running action.
 fn malformed_step(situation: Option<&Situation>, plan: &TimeTriggeredPlan) -> Option<Violation> {
     let running = situation.map_or(&[][..], |situation| &situation.running);
     let earliest = situation.map_or(Rational::ZERO, |situation| situation.time.clone());

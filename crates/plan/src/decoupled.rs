@@ -7,8 +7,8 @@ use crate::valuation::{ParameterId, Valuation};
 
 /// An interval for each parameter, by position (ρ in paper 1, definition 3).
 ///
-/// As a type it is only a box. That the plan is guaranteed to work in all of it is what
-/// `elbowroom-envelope` establishes.
+/// The type only represents a box. `elbowroom-envelope` establishes that the plan is guaranteed to
+/// work for all values in it.
 #[doc(alias = "DRE")]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DecoupledEnvelope {
@@ -17,15 +17,15 @@ pub struct DecoupledEnvelope {
 }
 
 impl DecoupledEnvelope {
-    /// The box with these intervals for the plan's parameters, by position; `None` if there are not
-    /// as many. Open ends become closed ones.
+    /// Creates the box with these intervals for the plan's parameters, by position. Returns `None`
+    /// if the number of intervals differs. Open ends become closed ones.
     pub fn new(plan: &ParametrizedPlan, intervals: Vec<Interval>) -> Option<Self> {
         let fits = intervals.len() == plan.parameters.len();
         let intervals = intervals.into_iter().map(closed).collect();
         fits.then_some(Self { intervals })
     }
 
-    /// The box of all values that the plan's parameters can take at all.
+    /// Returns the box of all values in the ranges of the plan's parameters.
     pub fn ranges(plan: &ParametrizedPlan) -> Self {
         let ranges = plan.parameters.iter().map(|own| closed(own.range.clone()));
         Self {
@@ -33,37 +33,38 @@ impl DecoupledEnvelope {
         }
     }
 
-    /// The box that holds one valuation only.
+    /// Returns the box that contains a single valuation.
     pub fn point(valuation: &Valuation) -> Self {
         Self {
             intervals: valuation.iter().cloned().map(Interval::point).collect(),
         }
     }
 
-    /// Whether it holds one valuation only.
+    /// Returns `true` if the box contains a single valuation.
     pub fn is_point(&self) -> bool {
         let mut intervals = self.intervals.iter();
         intervals.all(|own| own.lower.value().is_some() && own.lower.value() == own.upper.value())
     }
 
-    /// One interval for each parameter, by position; ends are closed or infinite.
+    /// Returns the intervals, one for each parameter, by position. Their ends are closed or
+    /// infinite.
     pub fn intervals(&self) -> &[Interval] {
         &self.intervals
     }
 
-    /// The interval of a parameter.
+    /// Returns the interval of a parameter.
     pub fn interval(&self, id: ParameterId) -> &Interval {
         &self.intervals[id.index()]
     }
 
-    /// The same box with another interval for that parameter. Open ends become closed ones.
+    /// Returns the box with another interval for the parameter. Open ends become closed ones.
     #[must_use]
     pub fn with_interval(mut self, id: ParameterId, interval: Interval) -> Self {
         self.intervals[id.index()] = closed(interval);
         self
     }
 
-    /// Moves an end so that it reaches that far ([`BoxEnd::reach`]); `None` is infinitely far.
+    /// Sets the reach of an end ([`BoxEnd::reach`]); `None` is infinite.
     pub fn set_reach(&mut self, end: BoxEnd, reach: Option<Rational>) {
         let interval = &mut self.intervals[end.parameter.index()];
         match end.side {
@@ -74,7 +75,7 @@ impl DecoupledEnvelope {
         }
     }
 
-    /// Whether the valuation lies in the box.
+    /// Returns `true` if the box contains the valuation.
     pub fn contains(&self, valuation: &Valuation) -> bool {
         self.intervals
             .iter()
@@ -82,7 +83,7 @@ impl DecoupledEnvelope {
             .all(|(interval, value)| interval.contains(value))
     }
 
-    /// The valuation in this box (not empty) that is closest to another one.
+    /// Returns the valuation in this non-empty box that is closest to another one.
     #[must_use]
     pub fn nearest(&self, valuation: &Valuation) -> Valuation {
         let clamped = |(interval, value): (&Interval, &Rational)| {
@@ -99,7 +100,7 @@ impl DecoupledEnvelope {
         self.intervals.iter().zip(valuation).map(clamped).collect()
     }
 
-    /// Whether every valuation of `other` lies in this box (`other` not empty).
+    /// Returns `true` if the box contains every valuation of `other`, which must not be empty.
     pub fn includes(&self, other: &Self) -> bool {
         self.intervals
             .iter()
@@ -108,7 +109,7 @@ impl DecoupledEnvelope {
     }
 }
 
-/// The interval with its ends, where it has any.
+/// Returns the interval with its finite ends closed.
 fn closed(interval: Interval) -> Interval {
     let closed = |end| match end {
         End::Open(value) => End::Closed(value),
@@ -125,24 +126,25 @@ fn closed(interval: Interval) -> Interval {
 pub struct BoxEnd {
     /// The parameter.
     pub parameter: ParameterId,
-    /// Which end.
+    /// The end.
     pub side: Side,
 }
 
 impl BoxEnd {
-    /// All ends of boxes with that many parameters: lower and upper, parameter by parameter.
+    /// Returns all ends of boxes with that many parameters: lower and upper, parameter by
+    /// parameter.
     pub fn all(parameters: usize) -> impl Iterator<Item = Self> {
         (0..parameters)
             .map(ParameterId::from)
             .flat_map(|parameter| Side::BOTH.map(|side| Self { parameter, side }))
     }
 
-    /// How far out the end lies: see [`Side::reach`].
+    /// Returns the reach of the end; see [`Side::reach`].
     pub fn reach(self, envelope: &DecoupledEnvelope) -> Option<Rational> {
         self.side.reach(envelope.interval(self.parameter))
     }
 
-    /// The same box with this end moved.
+    /// Returns the box with this end moved.
     pub fn with_reach(
         self,
         envelope: &DecoupledEnvelope,

@@ -1,37 +1,38 @@
-//! From a plan with fixed times to one that leaves as much room as is easy: [`deorder`].
+//! Conversion of a plan with fixed times to a flexible plan: [`deorder`].
 //!
 //! Also called *lifting to a partial order*, and in `ROSPlan` the ESTEREL transformation.
 //!
-//! What makes the result sound is that whatever a happening reads was written by the same
-//! happenings as in the original plan:
+//! The result is sound because everything that a happening reads was written by the same happenings
+//! as in the original plan:
 //!
-//! - Interfering happenings keep their order, at least ε apart. Timed initials take part, so
+//! - Interfering happenings keep their order, at least ε apart. This includes timed initials, so
 //!   deadlines become constraints.
-//! - A happening that writes what an over-all condition reads stays on its side of the action's
-//!   start and of its end, unless all it does is to make a fact as the condition needs it. What an
-//!   over-all condition sees is the open interval between them, so falling together with start or
-//!   end does no harm: at the start, the write comes first, as a condition over the interval sees
-//!   only what is true after the start; at the end it comes last.
+//! - A happening that writes facts or fluents of an over-all condition stays on its side of the
+//!   action's start and of its end, unless its only effect is to establish a fact as the condition
+//!   needs it. An over-all condition is read in the open interval between them, so the writer may
+//!   be simultaneous with start or end: at the start, the write counts as earlier, because the
+//!   condition only reads the states after the start; at the end, it counts as later.
 //! - Rates of continuous effects are treated like over-all conditions. So are over-all conditions
-//!   of conditional effects, but what came between start and end stays strictly between, as such
-//!   a condition must not become true either.
-//! - The goal is read in the end, after all timed initials too, so it needs no constraint of its
-//!   own: what writes a fact or fluent last does so in every schedule.
-//! - What changes the facts that a constraint on the plan's course reads keeps its order, and
-//!   bounds on the times of such changes are bounds between happenings.
-//! - Instances of one ground action that do not overlap in the plan do not overlap in any schedule. No
-//!   condition needs this; planners and performers do.
-//! - A duration obeys its domain rather than the planner's number; where the domain's bounds
-//!   depend on values that depend on the schedule, it stays as it was.
+//!   of conditional effects. But a writer that was between start and end stays strictly between,
+//!   because such a condition must not become true either.
+//! - The goal is read at the end, after all timed initials, so it needs no constraint of its own:
+//!   the last writer of a fact or fluent is the last one in every schedule.
+//! - Happenings that change facts of a constraint on the plan's course keep their order. Bounds on
+//!   the times of such changes become bounds between happenings.
+//! - Instances of one ground action that do not overlap in the plan do not overlap in any schedule.
+//!   No condition needs this, but planners and performers do.
+//! - A duration is limited by the domain instead of the planner's number. If the domain's bounds
+//!   depend on values that depend on the schedule, the duration is fixed at the planner's number.
 //!
-//! That is not all that there is to it. Conditions on numbers that change continuously, or by amounts that
-//! depend on durations, can still fail in some schedules. So can over-all conditions that see several changes
-//! between start and end: of a fact that takes over from another one (`(or (a) (b))`), or an increase before a
-//! decrease, whose order nothing else keeps. [`pin_until_sound`] is for those, and
-//! [`keeps_all_that_is_read`] says of which plans it is known that there are none. On the other hand, whether what
-//! increases or decreases a number must stay on its side of an action depends on the numbers: such
-//! constraints have a reason of their own ([`Reason::Side`](crate::Reason::Side)), and are given
-//! up there as far as nothing needs them.
+//! This is not sufficient in all cases. Conditions on numbers that change continuously, or by
+//! amounts that depend on durations, can still fail in some schedules. So can over-all conditions
+//! that read several changes between start and end, if no other constraint keeps their order: of a
+//! fact that replaces another one (`(or (a) (b))`), or an increase before a decrease.
+//! [`pin_until_sound`] handles these plans, and [`keeps_all_that_is_read`] recognises plans without
+//! such conditions. On the other hand, it depends on the numbers whether a happening that increases
+//! or decreases a number must stay on its side of an action. Such constraints have a reason of
+//! their own ([`Reason::Side`](crate::Reason::Side)), and [`pin_until_sound`] drops those that are
+//! not needed.
 
 mod course;
 pub(crate) mod durations;
@@ -55,28 +56,29 @@ use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Stn
 use crate::valuation::Valuation;
 use order::{Order, Timeline};
 
-/// A plan with room, and a schedule of it: the original one, if it is one.
+/// A flexible plan, and a schedule of it: the original one, if that satisfies the constraints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deordered {
-    /// The plan; its instances are labelled `n0`, `n1`, … in order of their start.
+    /// The plan. Its instances are labelled `n0`, `n1`, … in order of their start.
     pub plan: StnPlan,
     /// For each step of the original plan, its instance.
     pub instances: Vec<InstanceId>,
-    /// The times of the original plan. Where they do not satisfy the constraints, because they
-    /// were rounded, times close to them that do.
+    /// The times of the original plan. If they do not satisfy the constraints, because they were
+    /// rounded, times close to them that do.
     pub nominal: Schedule,
 }
 
-/// A plan cannot be deordered, because it is not valid, or because what makes it so is not heeded.
+/// Reason why a plan cannot be deordered: it is not valid, or the problem has an unsupported
+/// feature.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DeorderError {
-    /// The plan does not keep a constraint on its course.
+    /// The plan violates a constraint on its course.
     #[error("the plan does not keep the constraint {constraint}")]
     Broken {
-        /// As PDDL writes it.
+        /// The constraint in PDDL notation.
         constraint: String,
     },
-    /// Orders and bounds do not respect this part of the problem.
+    /// Orders and bounds do not support this feature of the problem.
     #[error("no network can be made of the plan: networks do not respect {feature} yet")]
     Unsupported {
         /// The feature.
@@ -85,14 +87,14 @@ pub enum DeorderError {
     /// Two interfering happenings have no order.
     #[error("{first} and {second} interfere, but both happen at {time}")]
     Simultaneous {
-        /// The one.
+        /// The first happening.
         first: String,
-        /// The other.
+        /// The second happening.
         second: String,
-        /// The time.
+        /// Their time.
         time: String,
     },
-    /// No times satisfy the constraints that keep the plan's order.
+    /// No schedule satisfies the constraints that keep the plan's order.
     #[error(
         "the order of the plan leaves no schedule: between {}, interfering happenings cannot all \
          be {epsilon} apart",
@@ -106,12 +108,12 @@ pub enum DeorderError {
     },
 }
 
-/// Finds out which of a valid plan's happenings need to keep their order.
+/// Determines which happenings of a valid plan need to keep their order.
 ///
 /// # Errors
-/// When the plan is not valid, as far as that shows here; ask the judge first. When the problem
-/// has constraints that orders and bounds do not respect: on numbers, on derived facts, on what
-/// conditional effects change. When the problem has processes or events, or numbers that the plan
+/// The plan is found to be invalid (not all mistakes are found, so validate it first), the problem
+/// has constraints that orders and bounds do not support (on numbers, on derived facts, or on facts
+/// that conditional effects change), or it has processes or events, or numbers that the plan
 /// chooses.
 pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, DeorderError> {
     if let Some(feature) = task.left_to_the_judge() {
@@ -120,11 +122,11 @@ pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, Deord
     deorder_the_plan_alone(task, plan)
 }
 
-/// [`deorder`] as if there were no processes and events, nor, if there are, constraints on the course:
-/// all that may need more than the constraints of the result keep.
+/// Like [`deorder`], but ignores processes and events, and, if there are any, constraints on the
+/// course. These may need more than the constraints of the result.
 ///
 /// # Errors
-/// As for [`deorder`], but for these.
+/// As for [`deorder`], except for these features.
 pub fn deorder_the_plan_alone(
     task: &Task,
     plan: &TimeTriggeredPlan,
@@ -171,8 +173,8 @@ pub fn deorder_the_plan_alone(
     })
 }
 
-/// The durations that the domain allows each step of a plan, where the order of the plan decides
-/// them; `None` where they depend on the times.
+/// Returns the durations that the domain allows for each step of a plan, if the order of the plan
+/// determines them; `None` if they depend on the times.
 pub fn allowed_durations(task: &Task, plan: &TimeTriggeredPlan) -> Vec<Option<Interval>> {
     let Labelled {
         plan,
@@ -184,12 +186,12 @@ pub fn allowed_durations(task: &Task, plan: &TimeTriggeredPlan) -> Vec<Option<In
     own.collect()
 }
 
-/// A plan in which nothing is ordered yet.
+/// A plan without any order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unordered {
-    /// The plan; its instances are labelled `n0`, `n1`, … in order of their start. Its constraints
-    /// are the times of the timed initials, and the durations that the domain allows; where these
-    /// depend on what changes in the course of the plan, only that they are not negative.
+    /// The plan. Its instances are labelled `n0`, `n1`, … in order of their start. Its constraints
+    /// are the times of the timed initials, and the durations that the domain allows. If these
+    /// depend on values that change during the plan, durations are only non-negative.
     pub plan: StnPlan,
     /// For each step of the original plan, its instance.
     pub instances: Vec<InstanceId>,
@@ -197,8 +199,8 @@ pub struct Unordered {
     pub times: Schedule,
 }
 
-/// The actions and the timed initials of a plan, valid or not, before any order is read off its
-/// times.
+/// Returns the actions and the timed initials of a plan, valid or not, without the order that its
+/// times imply.
 pub fn unordered(task: &Task, plan: &TimeTriggeredPlan) -> Unordered {
     let Labelled {
         mut plan,
@@ -222,11 +224,11 @@ pub(crate) struct Labelled {
     pub(crate) plan: StnPlan,
     /// For each step of the original, its instance.
     pub(crate) instances: Vec<InstanceId>,
-    /// The time that each node has in the original.
+    /// Time of each node in the original plan.
     pub(crate) times: Schedule,
 }
 
-/// The plan without order; instances are numbered by start.
+/// Returns the plan without order; instances are numbered by start.
 pub(crate) fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> Labelled {
     let mut order: Vec<usize> = (0..plan.steps.len()).collect();
     order.sort_by(|&a, &b| plan.steps[a].start.cmp(&plan.steps[b].start));
@@ -261,8 +263,8 @@ pub(crate) fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> Labelled {
     }
 }
 
-/// The original times, or the earliest that start nothing sooner than the original does, as far
-/// as that is possible.
+/// Returns the original times, or the earliest ones where actions start no sooner than in the
+/// original plan, as far as possible.
 fn nominal(
     task: &Task,
     plan: &StnPlan,
@@ -293,14 +295,14 @@ fn nominal(
         if matches!(what, Node::Start(_) | Node::Instant(_)) {
             let time = original[network_node(node)].clone();
             let start = elbowroom_stn::Constraint::at_least(zero, network_node(node), time);
-            // If it cannot start so late, something else will have to give way.
+            // If this start is not possible, another constraint takes precedence.
             let _ = network.add(start);
         }
     }
     Ok(network.earliest_schedule(zero).into())
 }
 
-/// Whether a constraint without parameters holds at these times.
+/// Returns `true` if a constraint without parameters holds at these times.
 fn holds(constraint: &Constraint, times: &Schedule) -> bool {
     let difference = &times[constraint.to] - &times[constraint.from];
     let is_within = |bound: &Bound, is_outside: fn(&Rational, &Rational) -> bool| match bound {

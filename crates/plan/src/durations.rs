@@ -1,4 +1,4 @@
-//! Which durations a domain allows.
+//! Durations that a domain allows.
 
 use std::sync::Arc;
 
@@ -8,8 +8,8 @@ use elbowroom_model::ground::{
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::{End, Interval, Rational};
 
-/// The durations that all these constraints allow, or `None` where `value` knows no value for
-/// something that a bound mentions.
+/// Returns the durations that all these constraints allow, or `None` if `value` returns no value
+/// for an expression in a bound.
 pub(crate) fn allowed<'a>(
     constraints: impl IntoIterator<Item = &'a DurationConstraint>,
     value: &mut impl FnMut(&Expression) -> Option<Rational>,
@@ -36,9 +36,9 @@ pub(crate) fn allowed<'a>(
     Some(allowed)
 }
 
-/// The action with the bounds on its duration that its conditions set, such as `(at start (>= ?duration 5))`, among
-/// those of the domain. Of conditions over all, only comparisons with numbers count. They are too strict for the
-/// duration 0, for which such conditions are vacuous.
+/// Returns the action with the bounds on its duration from its conditions, such as `(at start (>=
+/// ?duration 5))`, added to those of the domain. Of over-all conditions, only comparisons with
+/// numbers count. They are too strict for the duration 0, for which such conditions are vacuous.
 #[must_use]
 pub fn with_bounds_of_conditions(action: &Arc<Action>) -> Arc<Action> {
     let mut action = Arc::clone(action);
@@ -51,7 +51,7 @@ pub fn with_bounds_of_conditions(action: &Arc<Action>) -> Arc<Action> {
     action
 }
 
-/// The bounds on the duration that conditions set.
+/// Returns the bounds on the duration from conditions.
 fn of_conditions(body: &DurativeBody) -> Vec<DurationConstraint> {
     let of = |condition: &Condition, at_end: bool| {
         let conjuncts = condition.conjuncts().into_iter();
@@ -65,7 +65,8 @@ fn of_conditions(body: &DurativeBody) -> Vec<DurationConstraint> {
     bounds
 }
 
-/// The condition as a bound on the duration, if it compares the duration with something else.
+/// Returns the condition as a bound on the duration, if it compares the duration with an
+/// expression.
 fn bound(condition: &Condition, at_end: bool) -> Option<DurationConstraint> {
     let (comparison, left, right) = match condition {
         Condition::Compare(comparison, left, right) => (*comparison, left, right),
@@ -91,7 +92,7 @@ fn bound(condition: &Condition, at_end: bool) -> Option<DurationConstraint> {
     })
 }
 
-/// The comparison that holds where this one does not.
+/// Returns the comparison that holds when this one does not.
 fn negated(comparison: Comparison) -> Option<Comparison> {
     match comparison {
         Comparison::Equal => None,
@@ -102,7 +103,7 @@ fn negated(comparison: Comparison) -> Option<Comparison> {
     }
 }
 
-/// The same comparison with its sides exchanged.
+/// Returns the same comparison with its sides exchanged.
 fn mirrored(comparison: Comparison) -> Comparison {
     match comparison {
         Comparison::Equal => Comparison::Equal,

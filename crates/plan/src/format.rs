@@ -1,6 +1,6 @@
 //! STN plan files (`.stn`): [`read()`] and [`write()`].
 //!
-//! One item, ended by `;`, is a parameter, an action instance or a constraint; a `#` begins a
+//! Each item is a parameter, an action instance or a constraint, and ends with `;`. A `#` begins a
 //! comment. The order of items is free.
 //!
 //! ```text
@@ -12,16 +12,16 @@
 //! ```
 //!
 //! Time points are `.zero`, `LABEL.start`, `LABEL.end`, and `LABEL` for instantaneous actions.
-//! Names of actions and objects compare without case, labels and parameters with it.
+//! Names of actions and objects ignore case, labels and parameters do not.
 //!
-//! What a parameter stands for follows from its use. As both bounds of `X.end - X.start` it is
-//! the duration of `X`, which the domain's duration constraints then no longer bind. Named like
-//! one of the domain's `:synth-parameters` (`?s`), or like an action's for one of its instances
-//! (`n0.?r`), it is that number. Anything else is a bound between two time points.
+//! The kind of a parameter follows from its use. If it is both bounds of `X.end - X.start`, it is
+//! the duration of `X`, and the domain's duration constraints no longer apply. If it has the name
+//! of one of the domain's `:synth-parameters` (`?s`), or of an action's for one of its instances
+//! (`n0.?r`), it is that number. Any other parameter is a bound between two time points.
 //!
-//! Without `default`, the nominal value of a duration is what the domain fixes it to, if it does;
-//! that of a bound is what the difference is in the earliest schedule. Open numbers of the domain
-//! need a `default`.
+//! Without `default`, the nominal value of a duration is the one that the domain fixes, if it does.
+//! The nominal value of a bound is the difference in the earliest schedule. Open numbers of the
+//! domain need a `default`.
 //!
 //! Without `lb` and `ub`, durations and open numbers keep their sign, and other bounds have no
 //! limits.
@@ -45,8 +45,8 @@ use crate::parameter::ParametrizedPlan;
 /// Reads an STN plan file: a text, or any bytes, which must be UTF-8 outside of comments.
 ///
 /// # Errors
-/// All mistakes found, those of syntax and those of names that the task does not know. And when the
-/// problem has what the boxes of networks do not respect ([`Task::beyond_boxes`]).
+/// All mistakes found, in syntax and in names that the task does not have. Also a feature of the
+/// problem that the boxes of networks do not support ([`Task::beyond_boxes`]).
 pub fn read(source: impl Into<Source>, task: &Task) -> Result<ParametrizedPlan, Diagnostics> {
     let source = source.into();
     let (file, mut mistakes) = syntax::parse(&source);
@@ -55,11 +55,11 @@ pub fn read(source: impl Into<Source>, task: &Task) -> Result<ParametrizedPlan, 
         mistakes.error(0..0, message);
     }
     let plan = resolve::resolve(&file, task, &mut mistakes);
-    // A reader that gives up has noted why.
+    // `resolve` records a mistake before it returns `None`.
     mistakes.finish(plan).map(|(plan, _warnings)| plan)
 }
 
-/// `(did you mean …)`, or nothing.
+/// Returns `did you mean …`, if there is a similar name.
 fn did_you_mean(nearest: Option<&str>) -> Option<String> {
     nearest.map(|name| format!("did you mean `{name}`?"))
 }

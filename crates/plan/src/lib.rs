@@ -1,8 +1,8 @@
 //! Flexible plans: STN plans, their parameters, and boxes of parameter values.
 //!
-//! In: a task and a time-triggered plan, or an STN plan file. Out: STN plans and their parameters.
-//! The values of the parameters for which such a plan works are computed by the crate
-//! `elbowroom-envelope`.
+//! Input: a task and a time-triggered plan, or an STN plan file. Output: STN plans and their
+//! parameters. The crate `elbowroom-envelope` computes the parameter values for which such a plan
+//! works.
 //!
 //! - [`StnPlan`]: action instances, time points, and bounds on their differences.
 //! - [`Parameter`], [`ParametrizedPlan`]: the uncertain quantities of a plan.

@@ -1,4 +1,4 @@
-//! From a plan to its temporal network, and from a schedule back to a plan with fixed times.
+//! Conversions of a plan to its temporal network, and of a schedule to a plan with fixed times.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::valuation::{ParameterId, Valuation};
 
 /// A time for each node of an [`StnPlan`], by position.
 ///
-/// A [`Valuation`] is another type, so that neither is taken for the other:
+/// A [`Valuation`] is a different type, so the two cannot be confused:
 ///
 /// ```compile_fail
 /// # fn times(plan: &elbowroom_plan::StnPlan, schedule: &elbowroom_plan::Schedule) {
@@ -49,12 +49,12 @@ impl From<Schedule> for elbowroom_stn::Schedule {
     }
 }
 
-/// The node's namesake in [`StnPlan::network`].
+/// Returns the node of [`StnPlan::network`] for a node of the plan.
 pub fn network_node(node: NodeId) -> elbowroom_stn::NodeId {
     elbowroom_stn::NodeId(node.0)
 }
 
-/// The origin of a constraint of [`StnPlan::network`].
+/// Origin of a constraint of [`StnPlan::network`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// A node comes at 0 or later.
@@ -66,12 +66,12 @@ pub enum Origin {
 }
 
 impl StnPlan {
-    /// The plan as a network, when the parameters have these values. Nodes keep their positions.
+    /// Returns the plan's network for these values of the parameters. Nodes keep their positions.
     pub fn network(&self, valuation: &Valuation) -> Network {
         self.network_with_origins(valuation).0
     }
 
-    /// The same, with where each of the network's constraints comes from, by
+    /// Like [`Self::network`], with the origin of each of the network's constraints, by
     /// [`ConstraintId`](elbowroom_stn::ConstraintId).
     pub fn network_with_origins(&self, valuation: &Valuation) -> (Network, Vec<Origin>) {
         let mut network = Network::with_nodes(self.nodes.len());
@@ -99,7 +99,7 @@ impl StnPlan {
         (network, origins)
     }
 
-    /// The plan with these values in place of its parameters.
+    /// Returns the plan with these values in place of its parameters.
     #[must_use]
     pub fn at(&self, valuation: &Valuation) -> Self {
         let actions = self.actions_at(valuation);
@@ -116,8 +116,8 @@ impl StnPlan {
         }
     }
 
-    /// The actions of its instances, with these values in place of its parameters. What is one action in the plan is
-    /// one here.
+    /// Returns the actions of its instances, with these values in place of its parameters.
+    /// Instances that share an action in the plan share one in the result.
     pub fn actions_at(&self, valuation: &Valuation) -> Vec<Arc<Action>> {
         let mut known: BTreeMap<usize, usize> = BTreeMap::new();
         let mut actions: Vec<Arc<Action>> = Vec::with_capacity(self.instances.len());
@@ -133,7 +133,7 @@ impl StnPlan {
         actions
     }
 
-    /// Its constraints, with these values in place of its parameters.
+    /// Returns its constraints, with these values in place of its parameters.
     pub fn constraints_at(&self, valuation: &Valuation) -> Vec<Constraint> {
         let at = |bound: &Bound| match bound {
             Bound::Parameter(id) => Bound::Finite(valuation[*id].clone()),
@@ -149,11 +149,11 @@ impl StnPlan {
         constraints.collect()
     }
 
-    /// What is left of the plan `now`: what has happened stays where it is, and of the rest what
-    /// `waits` for somebody to bring it about comes not before now. Timed initials keep their
-    /// times.
+    /// Returns the plan with constraints for the state of its execution at `now`. Executed nodes
+    /// are fixed at their times. Other nodes for which `waits` is true cannot happen before `now`.
+    /// Timed initials keep their times.
     ///
-    /// The constraints that say so come after the plan's own.
+    /// The additional constraints come after the plan's own.
     #[must_use]
     pub fn remainder<'t>(
         &self,
@@ -180,7 +180,7 @@ impl StnPlan {
         plan
     }
 
-    /// The plan with fixed times that a schedule makes of it, steps in order of start.
+    /// Returns the plan with the fixed times of a schedule. Its steps are in order of start.
     pub fn scheduled(&self, schedule: &Schedule) -> TimeTriggeredPlan {
         let mut steps = Vec::with_capacity(self.instances.len());
         let mut ends = vec![None; self.instances.len()];
@@ -210,7 +210,7 @@ impl StnPlan {
     }
 }
 
-/// The action with these values in place of its parameters; itself if it has none.
+/// Returns the action with these values in place of its parameters; the same action if it has none.
 fn action_at(action: &Arc<Action>, valuation: &Valuation) -> Arc<Action> {
     let mut is_open = false;
     let at = action.map_leaves(&mut |leaf| match leaf {

@@ -1,26 +1,26 @@
-//! What lists of numbers, each of them with an identifier, have in common.
+//! Common operations of lists of numbers that are indexed by identifiers.
 
-/// Gives a list of numbers the operations that its users need. Lists of different kinds stay
-/// different types, and only their own identifiers find anything in them.
+/// Implements the operations of a list of numbers. Lists of different kinds are different types,
+/// and only their own identifiers index them.
 macro_rules! numbers_by_id {
     ($list:ident, $id:ty) => {
         impl $list {
-            /// The numbers, by position.
+            /// Creates a list of numbers, by position.
             pub fn new(numbers: Vec<elbowroom_num::Rational>) -> Self {
                 Self { numbers }
             }
 
-            /// The number of entries.
+            /// Returns the number of entries.
             pub fn len(&self) -> usize {
                 self.numbers.len()
             }
 
-            /// Whether there are none.
+            /// Returns `true` if there are no entries.
             pub fn is_empty(&self) -> bool {
                 self.numbers.is_empty()
             }
 
-            /// The numbers, by position.
+            /// Returns the numbers, by position.
             pub fn iter(&self) -> std::slice::Iter<'_, elbowroom_num::Rational> {
                 self.numbers.iter()
             }

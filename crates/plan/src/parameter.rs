@@ -1,4 +1,4 @@
-//! What is left open in a plan.
+//! Open quantities of a plan.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,26 +11,26 @@ use elbowroom_num::{Interval, Rational};
 use crate::stn_plan::{InstanceId, StnPlan};
 use crate::valuation::{ParameterId, Valuation};
 
-/// A quantity left open (γ in paper 1).
+/// An open quantity (γ in paper 1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// Unique in its plan.
+    /// Its name, unique in its plan.
     pub name: String,
-    /// Which quantity it is.
+    /// The quantity.
     pub kind: ParameterKind,
     /// The value in the original plan (π(γ) in paper 1).
     pub nominal: Rational,
-    /// How strongly a search should favour it (ω in paper 1).
+    /// Weight of the parameter in a search (ω in paper 1).
     pub weight: Rational,
-    /// The values it can take at all; no interval found for it goes beyond.
+    /// Range of its possible values. All computed intervals are inside it.
     pub range: Interval,
 }
 
-/// The quantity that a parameter stands for.
+/// Quantity that a parameter represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {
-    /// The duration of an action instance. The domain's duration constraints no longer bind it,
-    /// and its action in the plan no longer lists them.
+    /// The duration of an action instance. The domain's duration constraints no longer apply to it,
+    /// and its action in the plan no longer contains them.
     Duration(InstanceId),
     /// A constant in an action instance: an effect, a condition, a rate.
     Constant(InstanceId),
@@ -44,25 +44,25 @@ pub enum ParameterKind {
     Bound,
 }
 
-/// An STN plan some of whose numbers are parameters.
+/// An STN plan with parameters in place of some numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParametrizedPlan {
-    /// The plan; its bounds and its actions' expressions may mention parameters.
+    /// The plan. Its bounds and its actions' expressions may mention parameters.
     pub plan: StnPlan,
     /// The parameters.
     pub parameters: Vec<Parameter>,
     /// Initial values that are parameters.
     pub initial: BTreeMap<FluentId, ParameterId>,
-    /// How long those actions are planned to take whose durations are left neither to the world nor
-    /// fixed by the domain: the executor tells them at their start.
+    /// Planned durations of the actions whose durations the executor chooses at their start:
+    /// durations that are neither uncertain nor fixed by the domain.
     pub told: BTreeMap<InstanceId, Rational>,
-    /// The goal: the task's, with the domain's unknowns as parameters.
+    /// The task's goal, with the domain's unknowns as parameters.
     pub goal: Condition,
 }
 
 impl ParameterKind {
-    /// The values such a quantity can take when nobody says otherwise, given its nominal value:
-    /// times spent and amounts consumed keep their sign.
+    /// Returns the default range of such a quantity, given its nominal value: durations and amounts
+    /// keep their sign.
     pub fn natural_range(self, nominal: &Rational) -> Interval {
         match self {
             Self::Bound | Self::Initial(_) => Interval::EVERYTHING,
@@ -75,7 +75,7 @@ impl ParameterKind {
 }
 
 impl ParametrizedPlan {
-    /// A plan in which nothing is left open.
+    /// Creates a plan without open quantities.
     pub fn closed(task: &Task, plan: StnPlan) -> Self {
         Self {
             plan,
@@ -86,8 +86,8 @@ impl ParametrizedPlan {
         }
     }
 
-    /// The instances whose durations are parameters, also where one parameter is the duration of
-    /// several.
+    /// Returns the instances whose durations are parameters, also if one parameter is the duration
+    /// of several.
     pub fn open_durations(&self) -> impl Iterator<Item = (InstanceId, ParameterId)> + '_ {
         let constraints = self.plan.constraints.iter();
         constraints.filter_map(|constraint| {
@@ -113,12 +113,12 @@ impl ParametrizedPlan {
         self
     }
 
-    /// The parameter of that id.
+    /// Returns the parameter with that id.
     pub fn parameter(&self, id: ParameterId) -> &Parameter {
         &self.parameters[id.index()]
     }
 
-    /// The parameter of that name.
+    /// Returns the parameter with that name.
     pub fn find(&self, name: &str) -> Option<ParameterId> {
         self.parameters
             .iter()
@@ -126,7 +126,7 @@ impl ParametrizedPlan {
             .map(ParameterId::from)
     }
 
-    /// The nominal values.
+    /// Returns the nominal values.
     pub fn nominal(&self) -> Valuation {
         self.parameters
             .iter()
@@ -134,9 +134,9 @@ impl ParametrizedPlan {
             .collect()
     }
 
-    /// Whether the plan needs more than facts, one by one: it reads numbers, or throughout an action or a
-    /// conditional effect's, something that several facts decide about. If not, the order that deordering keeps and
-    /// times are all.
+    /// Returns `true` if the plan reads more than single facts: it reads numbers, or over-all
+    /// conditions of an action or of a conditional effect that depend on several facts. Otherwise,
+    /// the orders of deordering and the times are sufficient.
     pub fn reads_more_than_facts(&self, task: &Task) -> bool {
         let reads = |condition: &Condition| {
             let mut reads = false;
@@ -166,8 +166,8 @@ impl ParametrizedPlan {
             })
     }
 
-    /// Whether how long actions take makes a difference to any number: it stands in an expression,
-    /// or something changes continuously.
+    /// Returns `true` if the durations of actions influence a number: an expression contains a
+    /// duration, or a number changes continuously.
     pub fn durations_move_numbers(&self) -> bool {
         let is_duration = |leaf: &Expression| match leaf {
             Expression::Duration => true,
@@ -188,7 +188,7 @@ impl ParametrizedPlan {
         })
     }
 
-    /// The quantity in plain words: `duration of (move a b)`.
+    /// Returns the quantity in words: `duration of (move a b)`.
     pub fn describe(&self, task: &Task, id: ParameterId) -> String {
         let action = |instance: InstanceId| self.plan.instance(instance).action.name.clone();
         match self.parameter(id).kind {

@@ -1,6 +1,6 @@
-//! Which quantities of a plan to leave open: [`VarySpec`] and [`parametrize`].
+//! Selection of the quantities of a plan that become parameters: [`VarySpec`] and [`parametrize`].
 //!
-//! A specification names one quantity, or several alike:
+//! A specification names one quantity, or several of the same kind:
 //!
 //! | specification | leaves open |
 //! | --- | --- |
@@ -13,19 +13,18 @@
 //! | `timed (NAME object …)` | when timed initials change the fact or fluent in any way |
 //! | `?s=VALUE`, `n0.?r=VALUE` | a `:synth-parameters` number, nominally `VALUE` |
 //!
-//! If nothing is specified, all durations are left open. Where the domain gives an interval for a duration, it
-//! can take the values of that interval; otherwise any. Those of actions of which the executor chooses the
-//! durations (`controllable ACTIONS`) are not left open.
+//! Without any specification, all durations are left open. If the domain gives an interval for a
+//! duration, this is its range; otherwise its range is unlimited. Durations that the executor
+//! chooses (`controllable ACTIONS`) are not left open.
 //!
-//! `ACTIONS` is the name of an action (all its instances), a label (that instance), or
-//! `(NAME object …)`: every instance with these arguments, where `_` stands for any object. A
-//! number in effects is the amount of an `increase`, `decrease` or `assign`, or a rate; if there
-//! are several, `VALUE` says which. It is a parameter of each instance, or of all together if
-//! `shared`. `?r=VALUE` sets an action's number in all instances.
+//! `ACTIONS` is the name of an action (all its instances), a label (that instance), or `(NAME
+//! object …)`: every instance with these arguments; `_` matches any object. A number in effects is
+//! the amount of an `increase`, `decrease` or `assign`, or a rate. If there are several, `VALUE`
+//! selects one. There is one parameter for each instance, or a single one for all if `shared`.
+//! `?r=VALUE` sets an action's number in all instances.
 //!
-//! Each may be followed by `weight W` (how strongly a search should favour it) and
-//! `in [LB, UB]` (the values it can take at all). A later specification of the same quantity
-//! overrides weight and range.
+//! Each specification may be followed by `weight W` (the weight in a search) and `in [LB, UB]` (the
+//! range). A later specification of the same quantity overrides weight and range.
 //!
 //! ```
 //! use elbowroom_plan::parametrize::VarySpec;
@@ -52,14 +51,14 @@ use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::StnPlan;
 use opening::Opening;
 
-/// Leaves quantities of a plan open.
+/// Replaces quantities of a plan by parameters.
 ///
-/// Without specifications of quantities, these are all durations but those that
-/// [`Target::Controllable`] names. Numbers that the domain itself leaves open become parameters in
-/// any case. `nominal` is a schedule of the plan; it says how long things take nominally.
+/// Without specifications of quantities, these are all durations except those of
+/// [`Target::Controllable`]. Numbers that the domain itself leaves open always become parameters.
+/// `nominal` is a schedule of the plan. It determines the nominal durations.
 ///
 /// # Errors
-/// When a specification fits nothing, or fits too much, or a nominal value is missing.
+/// When a specification matches nothing, or is ambiguous, or a nominal value is missing.
 pub fn parametrize(
     task: &Task,
     plan: StnPlan,
@@ -83,10 +82,10 @@ pub fn parametrize(
     opening.finish()
 }
 
-/// Leaves more quantities open, of a plan that may have parameters already.
+/// Replaces more quantities by parameters, in a plan that may have parameters already.
 ///
 /// # Errors
-/// As [`parametrize`].
+/// As for [`parametrize`].
 pub fn vary(
     task: &Task,
     plan: ParametrizedPlan,

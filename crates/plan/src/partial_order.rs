@@ -1,17 +1,17 @@
 //! Partially ordered plans whose actions may be skipped and repeated: [`partial_order`].
 //!
-//! What an executor that adapts starts from (Olisipo, TIME 2021, section 2.1; Lima et al. 2020).
+//! Input of the adaptive executor (Olisipo, TIME 2021, section 2.1; Lima et al. 2020).
 //! [`deorder`](crate::deorder::deorder) keeps every order that the plan as a whole needs in order
-//! to work in all schedules; here only two kinds are kept:
+//! to work in all schedules. Here only two kinds are kept:
 //!
-//! - **duration**: how long an action takes;
-//! - **interference**: the later happening would spoil the earlier one, by undoing what that one
-//!   needs or does.
+//! - **duration**: the duration of an action;
+//! - **interference**: the later happening would invalidate the earlier one, by undoing a condition
+//!   or an effect of it.
 //!
-//! *Causal* orders, in which the earlier happening provides what the later one needs, are dropped.
-//! Whoever chooses an order sees from the state whether a condition holds, and if someone else has
-//! provided it, so much the better. Bounds that timed initials put on the plan are not links
-//! either: timed initials are in the list of nodes, and take part in an order like actions.
+//! *Causal* orders, where the earlier happening establishes a condition of the later one, are
+//! dropped. The component that chooses an order reads from the state whether a condition holds; it
+//! may also have been established in another way. Bounds from timed initials are not links either:
+//! timed initials are in the list of nodes, and are part of an order like actions.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -24,19 +24,19 @@ use crate::deorder::{Labelled, durations, labelled};
 use crate::durations::with_bounds_of_conditions;
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, StnPlan};
 
-/// Actions, and the few orderings among their happenings that are kept whatever is skipped.
+/// Actions, and the few orderings among their happenings that are independent of skipped actions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PartialOrderPlan {
-    /// The actions, labelled `n0`, `n1`, … in order of their start.
+    /// Actions, labelled `n0`, `n1`, … in order of their start.
     pub instances: Vec<Instance>,
-    /// For each step of the plan that this was made of, its instance.
+    /// For each step of the original plan, its instance.
     pub instance_of_step: Vec<InstanceId>,
-    /// The planned duration of each instance; `None` for an instantaneous one, or without a plan.
+    /// Planned duration of each instance; `None` for an instantaneous one, or without a plan.
     pub planned: Vec<Option<Rational>>,
     /// [`Node::Zero`], then each instance's start and end, or instant, in order, then the timed
     /// initials in order of time: the nodes of the [`StnPlan`] of the same instances.
     pub nodes: Vec<Node>,
-    /// The orderings; a link means something only where both of its nodes are done.
+    /// Orderings. A link only applies if both of its nodes are executed.
     pub links: Vec<Link>,
 }
 
@@ -51,22 +51,22 @@ pub struct Link {
     pub lower: Rational,
     /// Greatest difference; `None` if there is none.
     pub upper: Option<Rational>,
-    /// Why the link is there.
+    /// Kind of the link.
     pub kind: LinkKind,
 }
 
-/// Why a [`Link`] is there.
+/// Kind of a [`Link`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LinkKind {
     /// `from` and `to` are start and end of one action.
     Duration,
-    /// `to` undoes what `from` needs or does.
+    /// `to` undoes a condition or an effect of `from`.
     Interference,
 }
 
 impl PartialOrderPlan {
-    /// Actions in no order at all, with durations as the domain allows them where that does not
-    /// depend on the state: all that one could do.
+    /// Creates a plan of actions without any order, with the durations that the domain allows if
+    /// these do not depend on the state.
     pub fn unordered(task: &Task, actions: impl IntoIterator<Item = Action>) -> Self {
         let steps = actions.into_iter().map(|action| Step {
             start: Rational::ZERO,
@@ -97,18 +97,19 @@ impl PartialOrderPlan {
         }
     }
 
-    /// The instance of that id.
+    /// Returns the instance with that id.
     pub fn instance(&self, id: InstanceId) -> &Instance {
         &self.instances[id.index()]
     }
 
-    /// All instances with their ids.
+    /// Returns all instances with their ids.
     pub fn instances(&self) -> impl Iterator<Item = (InstanceId, &Instance)> + '_ {
         let numbered = self.instances.iter().enumerate();
         numbered.map(|(index, instance)| (InstanceId::from(index), instance))
     }
 
-    /// The least and the greatest duration of an instance; `(0, 0)` for an instantaneous one.
+    /// Returns the least and the greatest duration of an instance; `(0, 0)` for an instantaneous
+    /// one.
     pub fn duration(&self, id: InstanceId) -> (Rational, Option<Rational>) {
         let is_it = |link: &&Link| {
             link.kind == LinkKind::Duration && self.nodes[link.from.index()] == Node::Start(id)
@@ -119,17 +120,17 @@ impl PartialOrderPlan {
         }
     }
 
-    /// The interference links as pairs of nodes.
+    /// Returns the interference links as pairs of nodes.
     pub fn interference(&self) -> impl Iterator<Item = &Link> + '_ {
         let is_it = |link: &&Link| link.kind == LinkKind::Interference;
         self.links.iter().filter(is_it)
     }
 }
 
-/// The partial order of a valid plan with fixed times.
+/// Returns the partial order of a valid plan with fixed times.
 ///
-/// Durations get the domain's interval, as far as the action's conditions on its duration hold; the plan's own number
-/// where these bounds depend on the schedule.
+/// Durations get the domain's interval, restricted by the action's conditions on its duration, or
+/// the plan's own number if these bounds depend on the schedule.
 pub fn partial_order(task: &Task, plan: &TimeTriggeredPlan) -> PartialOrderPlan {
     let Labelled {
         plan: stn_plan,
@@ -176,7 +177,7 @@ pub fn partial_order(task: &Task, plan: &TimeTriggeredPlan) -> PartialOrderPlan 
     }
 }
 
-/// The plan with the bounds on durations that conditions set among those of the domain.
+/// Returns the plan with the bounds on durations from conditions added to those of the domain.
 fn with_all_bounds(plan: &StnPlan) -> StnPlan {
     let mut plan = plan.clone();
     for instance in &mut plan.instances {
@@ -199,14 +200,14 @@ fn duration_link(constraint: Constraint) -> Link {
     }
 }
 
-/// The conditions and effects of a happening.
+/// Conditions and effects of a happening.
 #[derive(Default)]
 struct Use {
-    /// Facts needed true; basic facts under a derived one are in both sets.
+    /// Facts that must be true; basic facts under a derived one are in both sets.
     needs_true: BTreeSet<FactId>,
     needs_false: BTreeSet<FactId>,
     footprint: Footprint,
-    /// Over-all conditions count with the end.
+    /// Over-all conditions belong to the end.
     throughout: Footprint,
 }
 
@@ -246,7 +247,7 @@ impl Use {
         self.include(task, &snap.condition);
         for Effect { guard, .. } in &snap.effects {
             self.include(task, &guard.now);
-            // An effect that would not have happened must not happen either.
+            // An effect that does not happen in the plan must not happen in another order either.
             self.include(task, &Condition::Not(Box::new(guard.now.clone())));
         }
     }
@@ -281,7 +282,8 @@ impl Use {
         }
     }
 
-    /// Whether this, done after `earlier` in the plan, would spoil it if it were done before.
+    /// Returns `true` if this happening, which comes after `earlier` in the plan, would invalidate
+    /// it if it came before.
     fn spoils(&self, earlier: &Self) -> bool {
         let meet = |a: &BTreeSet<_>, b: &BTreeSet<_>| !a.is_disjoint(b);
         let (own, other) = (&self.footprint, &earlier.footprint);

@@ -1,4 +1,4 @@
-//! The STN plan: time points and bounds on their differences.
+//! STN plans: time points and bounds on their differences.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ impl NodeId {
     /// The start of the plan, time 0; always the first node.
     pub const ZERO: Self = Self(0);
 
-    /// The position in [`StnPlan::nodes`].
+    /// Returns the position in [`StnPlan::nodes`].
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -34,7 +34,7 @@ impl From<usize> for NodeId {
 pub struct InstanceId(pub u32);
 
 impl InstanceId {
-    /// The position in [`StnPlan::instances`].
+    /// Returns the position in [`StnPlan::instances`].
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -61,7 +61,7 @@ pub enum Node {
     Timed(usize),
 }
 
-/// An action of the plan, with the name by which constraints refer to it.
+/// An action of the plan, with its label in constraints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
     /// `n0`, `refuel_2`, …; unique in its plan.
@@ -82,7 +82,7 @@ pub enum Bound {
 }
 
 impl Bound {
-    /// The parameter whose value it is, if it is one's.
+    /// Returns the parameter, if the bound is one.
     pub fn parameter(&self) -> Option<ParameterId> {
         match self {
             Self::Parameter(id) => Some(*id),
@@ -90,7 +90,7 @@ impl Bound {
         }
     }
 
-    /// The limit when the parameters have these values; `None` if there is none.
+    /// Returns the limit for these values of the parameters; `None` if there is none.
     pub fn at(&self, valuation: &Valuation) -> Option<Rational> {
         match self {
             Self::Infinite => None,
@@ -117,37 +117,38 @@ pub struct Constraint {
     pub lower: Bound,
     /// Greatest difference.
     pub upper: Bound,
-    /// Why the constraint is there.
+    /// Reason for the constraint.
     pub reason: Reason,
 }
 
-/// Why a constraint of a plan is there.
+/// Reason for a constraint of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reason {
-    /// An STN plan file says so.
+    /// It is from an STN plan file.
     Given,
     /// The duration of an action, from its domain.
     Duration(InstanceId),
-    /// A timed initial falls at a fixed time.
+    /// The fixed time of timed initials.
     Timed(usize),
     /// The two happenings interfere and keep their order.
     Interference,
     /// Two instances of one ground action do not overlap, and keep their order.
     SelfOverlap,
-    /// One of the happenings writes what an over-all condition of the other's action reads.
+    /// One of the happenings writes a fact or fluent that an over-all condition of the other's
+    /// action reads.
     OverAll,
-    /// The same, where the condition compares numbers and the happening increases or decreases
-    /// one: whether anything needs this depends on the numbers.
+    /// The same for a condition that compares numbers and a happening that increases or decreases
+    /// one. Whether this constraint is needed depends on the numbers.
     Side,
     /// A constraint on the course of the plan keeps turns in their order, or bounds their times.
     Course,
-    /// Kept at, or near, what it is in the original plan, because of numeric conditions.
+    /// Fixed at, or near, the difference in the original plan, because of numeric conditions.
     Pinned,
 }
 
 /// A plan as a simple temporal network: nodes with meanings, and constraints between them.
 ///
-/// Besides the constraints listed, every node is at time 0 or later.
+/// In addition to the listed constraints, every node is at time 0 or later.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StnPlan {
     /// The actions.
@@ -158,7 +159,7 @@ pub struct StnPlan {
     pub constraints: Vec<Constraint>,
 }
 
-/// Where a node stands among the others in [`StnPlan::unconstrained`].
+/// Position of a node in the order of [`StnPlan::unconstrained`].
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Place {
     Zero,
@@ -175,7 +176,8 @@ fn place_of(node: Node) -> Place {
 }
 
 impl StnPlan {
-    /// The plan of these instances without any constraint but those that fix the timed initials.
+    /// Returns the plan of these instances without any constraint except those that fix the timed
+    /// initials.
     ///
     /// Nodes: zero, then each instance's start and end, or instant, in order, then the timed
     /// initials in order of time.
@@ -206,13 +208,13 @@ impl StnPlan {
         }
     }
 
-    /// The instance of that id.
+    /// Returns the instance with that id.
     pub fn instance(&self, id: InstanceId) -> &Instance {
         &self.instances[id.index()]
     }
 
-    /// Takes the domain's duration constraints from the instance, because something else decides
-    /// how long it takes.
+    /// Removes the domain's duration constraints from the instance, because its duration is
+    /// determined in another way.
     pub fn free_duration(&mut self, id: InstanceId) {
         let action = &mut self.instances[id.index()].action;
         if action
@@ -224,9 +226,10 @@ impl StnPlan {
         }
     }
 
-    /// The same for several instances; those that share an action do so afterwards, too.
+    /// Like [`Self::free_duration`], for several instances. Instances that share an action still
+    /// share one afterwards.
     pub(crate) fn free_durations(&mut self, ids: impl IntoIterator<Item = InstanceId>) {
-        // The action as it was is kept, so that nothing else comes to stand in its place.
+        // The map keeps the original actions alive, so that their addresses are not reused.
         let mut freed: BTreeMap<*const Action, [Arc<Action>; 2]> = BTreeMap::new();
         for id in ids {
             let before = Arc::clone(&self.instances[id.index()].action);
@@ -240,19 +243,20 @@ impl StnPlan {
         }
     }
 
-    /// The node at which the instance starts, or happens.
+    /// Returns the node at which the instance starts, or happens.
     pub fn start(&self, id: InstanceId) -> NodeId {
         let is_it = |node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id);
         self.node_where(Place::Instance(id), is_it)
     }
 
-    /// The node at which the instance ends, or happens.
+    /// Returns the node at which the instance ends, or happens.
     pub fn end(&self, id: InstanceId) -> NodeId {
         let is_it = |node| matches!(node, Node::End(i) | Node::Instant(i) if i == id);
         self.node_where(Place::Instance(id), is_it)
     }
 
-    /// The instance whose duration a constraint bounds; `None` if it bounds something else.
+    /// Returns the instance whose duration a constraint bounds; `None` if it bounds another
+    /// difference.
     pub fn duration_of(&self, constraint: &Constraint) -> Option<InstanceId> {
         let node = |id: NodeId| self.nodes[id.index()];
         match (node(constraint.from), node(constraint.to)) {
@@ -261,13 +265,14 @@ impl StnPlan {
         }
     }
 
-    /// The node of a group of timed initials.
+    /// Returns the node of a group of timed initials.
     pub fn timed(&self, index: usize) -> NodeId {
         self.node_where(Place::Timed(index), |node| node == Node::Timed(index))
     }
 
-    /// Nodes mostly stand in the order of [`unconstrained`](Self::unconstrained), in which theirs is
-    /// found by halves; the field is open to others, in which all are looked at.
+    /// Finds a node by binary search, if nodes are in the order of
+    /// [`unconstrained`](Self::unconstrained), as they mostly are. The field is public, so other
+    /// orders are possible; these need a linear search.
     fn node_where(&self, place: Place, is_it: impl Fn(Node) -> bool) -> NodeId {
         let first = self.nodes.partition_point(|&node| place_of(node) < place);
         let mut near = (first..self.nodes.len()).take(2);
@@ -276,7 +281,7 @@ impl StnPlan {
         NodeId::from(index.expect("every instance and timed initial has its nodes"))
     }
 
-    /// All nodes with their meaning.
+    /// Returns all nodes with their meaning.
     pub fn nodes(&self) -> impl Iterator<Item = (NodeId, Node)> + '_ {
         self.nodes
             .iter()
@@ -284,8 +289,8 @@ impl StnPlan {
             .map(|(index, &node)| (NodeId::from(index), node))
     }
 
-    /// How STN plan files call the node: `.zero`, `n0.start`, `n0.end`, `r`. Timed initials, which
-    /// such files do not mention, are `.timed` and their position.
+    /// Returns the name of the node in STN plan files: `.zero`, `n0.start`, `n0.end`, `r`. Timed
+    /// initials, which are not part of such files, are `.timed` and their position.
     pub fn node_label(&self, node: NodeId) -> String {
         match self.nodes[node.index()] {
             Node::Zero => ".zero".to_owned(),
@@ -296,7 +301,7 @@ impl StnPlan {
         }
     }
 
-    /// The node in words: `start of (move a b)`, `(open w) becomes false`.
+    /// Returns the node in words: `start of (move a b)`, `(open w) becomes false`.
     pub fn node_words(&self, task: &Task, node: NodeId) -> String {
         match self.nodes[node.index()] {
             Node::Zero => "the beginning of the plan".to_owned(),
@@ -312,7 +317,7 @@ impl StnPlan {
         }
     }
 
-    /// The reads and writes of the happening at the node.
+    /// Returns the reads and writes of the happening at the node.
     pub fn footprint(&self, task: &Task, node: NodeId) -> Footprint {
         match self.nodes[node.index()] {
             Node::Zero => Footprint::default(),

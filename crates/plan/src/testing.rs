@@ -9,7 +9,7 @@ use elbowroom_model::problem::{
 };
 use elbowroom_num::Rational;
 
-/// The number `text`.
+/// Parses a number.
 pub(crate) fn number(text: &str) -> Rational {
     text.parse().unwrap()
 }
@@ -126,7 +126,7 @@ fn schemas() -> Vec<Schema> {
     ]
 }
 
-/// In PDDL:
+/// Returns the task of this domain and problem:
 ///
 /// ```text
 /// (:synth-parameters ?s)

@@ -1,4 +1,4 @@
-//! A plan's network with what the world decides in it.
+//! Temporal network of a plan with uncontrollable durations.
 
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{ContingentLink, UncertainNetwork};
@@ -10,17 +10,17 @@ use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, StnPlan};
 use crate::valuation::ParameterId;
 
-/// The meaning of a plan's constraint for an executor: a requirement or a contingent link.
+/// Interpretation of a plan's constraint for an executor: a requirement or a contingent link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reading {
-    /// `lower <= to - from <= upper` has to be seen to; `None` is no bound.
+    /// The executor has to satisfy `lower <= to - from <= upper`; `None` is no bound.
     Requirement {
         /// Least difference.
         lower: Option<Rational>,
         /// Greatest difference.
         upper: Option<Rational>,
     },
-    /// The world decides on a difference between `lower` and `upper`, and shows it when `to`
+    /// The world decides the difference between `lower` and `upper`. It is observed when `to`
     /// happens.
     Contingent {
         /// Least difference; not negative.
@@ -28,13 +28,13 @@ pub enum Reading {
         /// Greatest difference; `None` if there is none.
         upper: Option<Rational>,
     },
-    /// Nothing satisfies it: it asks for something that depends on a value which is never known
-    /// and has no limit.
+    /// The constraint cannot be satisfied: it depends on a value that is never observed and has no
+    /// limit.
     Impossible,
 }
 
 impl Reading {
-    /// The difference is that one, and has to be seen to.
+    /// Returns the requirement of exactly this difference.
     pub fn exactly(difference: &Rational) -> Self {
         Self::Requirement {
             lower: Some(difference.clone()),
@@ -43,38 +43,38 @@ impl Reading {
     }
 }
 
-/// A plan's network, and what its parts come from. Nodes keep their positions.
+/// A plan's network, and the origins of its parts. Nodes keep their positions.
 #[derive(Clone, Debug)]
 pub struct PlanNetwork {
     /// The network.
     pub network: UncertainNetwork,
-    /// For each requirement, the plan's constraint that it comes from, by position; `None` if it
-    /// only says that a node comes at 0 or later.
+    /// For each requirement, the position of its constraint in the plan; `None` if it only requires
+    /// that a node is at 0 or later.
     pub requirements: Vec<Option<usize>>,
-    /// For each contingent link, the plan's constraint that it comes from, by position.
+    /// For each contingent link, the position of its constraint in the plan.
     pub links: Vec<usize>,
 }
 
-/// A constraint that nothing satisfies ([`Reading::Impossible`]), by position in the plan.
+/// A constraint that cannot be satisfied ([`Reading::Impossible`]), by position in the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Impossible(pub usize);
 
 impl PlanNetwork {
-    /// The plan's constraint behind a requirement.
+    /// Returns the plan's constraint of a requirement.
     pub fn constraint_of(&self, id: ConstraintId) -> Option<usize> {
         self.requirements.get(id.index()).copied().flatten()
     }
 }
 
 impl StnPlan {
-    /// The plan as a network, each constraint as `reading` says.
+    /// Returns the plan as a network. `reading` interprets each constraint.
     ///
-    /// Contingent are at most the durations of actions and the times of timed initials, each of
-    /// which has one node that the world decides on: a second contingent reading of the same node
-    /// counts as a requirement.
+    /// Only durations of actions and times of timed initials can be contingent. Each has one node
+    /// that the world decides. A second contingent reading of the same node counts as a
+    /// requirement.
     ///
     /// # Errors
-    /// A constraint that nothing satisfies.
+    /// A constraint that cannot be satisfied.
     pub fn uncertain_network(
         &self,
         reading: &dyn Fn(&Constraint) -> Reading,
@@ -133,8 +133,8 @@ impl StnPlan {
         })
     }
 
-    /// Whether a constraint bounds a difference that the world can decide on: the duration of an
-    /// action, or the time of a timed initial.
+    /// Returns `true` if a constraint bounds a difference that the world can decide: the duration
+    /// of an action, or the time of a timed initial.
     pub fn is_up_to_the_world(&self, constraint: &Constraint) -> bool {
         let node = |id: NodeId| self.nodes[id.index()];
         match (node(constraint.from), node(constraint.to)) {
@@ -146,13 +146,13 @@ impl StnPlan {
 }
 
 impl ParametrizedPlan {
-    /// What a constraint means to an executor who knows that each parameter is in its interval,
-    /// tells actions how long to take where that is not left to the world (as long as planned:
-    /// [`told`](Self::told)), and learns the value of a duration when the action ends, of the time
-    /// of a timed initial when that happens, and of any other bound never.
+    /// Returns the interpretation of a constraint for an executor. The executor knows that each
+    /// parameter is in its interval. It commands the planned duration at an action's start if the
+    /// duration is not uncertain ([`told`](Self::told)). It observes the value of a duration when
+    /// the action ends, the time of a timed initial when it happens, and other bounds never.
     ///
-    /// A parameter that bounds several differences may be another value in each, which asks for
-    /// more than need be.
+    /// A parameter that bounds several differences may have a different value in each. This is
+    /// stricter than necessary.
     pub fn reading(&self, constraint: &Constraint, envelope: &DecoupledEnvelope) -> Reading {
         if let Some(planned) = self.told_by(constraint) {
             return Reading::exactly(planned);
@@ -170,7 +170,7 @@ impl ParametrizedPlan {
                 upper: greatest(*lower),
             };
         }
-        // Whatever the value is, the constraint has to hold.
+        // The constraint has to hold for all values.
         let lower = match &constraint.lower {
             Bound::Infinite => None,
             Bound::Finite(value) => Some(value.clone()),
@@ -190,8 +190,8 @@ impl ParametrizedPlan {
         Reading::Requirement { lower, upper }
     }
 
-    /// How long the action is told at its start to take, if that is what the constraint bounds: an
-    /// executor that has told it cannot have it end on an event.
+    /// Returns the duration that the executor commands at the action's start, if the constraint
+    /// bounds this duration. The executor cannot make the end depend on later events.
     pub fn told_by(&self, constraint: &Constraint) -> Option<&Rational> {
         let node = |id: NodeId| self.plan.nodes[id.index()];
         match (node(constraint.from), node(constraint.to)) {
@@ -200,10 +200,11 @@ impl ParametrizedPlan {
         }
     }
 
-    /// The plan's network for an executor who relies on a box: see [`ParametrizedPlan::reading`].
+    /// Returns the plan's network for an executor that relies on a box; see
+    /// [`ParametrizedPlan::reading`].
     ///
     /// # Errors
-    /// A constraint that nothing satisfies in all of the box.
+    /// A constraint that cannot be satisfied for all values in the box.
     pub fn uncertain_network(
         &self,
         envelope: &DecoupledEnvelope,

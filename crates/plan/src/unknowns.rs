@@ -11,19 +11,19 @@ use crate::parameter::ParameterKind;
 use crate::stn_plan::{InstanceId, StnPlan};
 use crate::valuation::ParameterId;
 
-/// One number that a domain leaves open, as a plan meets it.
+/// An open number of a domain, as it occurs in a plan.
 ///
-/// Of the whole domain, or (with an instance) of each instance of an action.
+/// It belongs to the whole domain, or (with an instance) to each instance of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct OpenNumber {
-    /// The instance it belongs to, if it is an action's.
+    /// The instance that it belongs to, if it is an action's.
     pub(crate) instance: Option<InstanceId>,
     /// Its position among the unknowns of the domain or of the instance's schema.
     pub(crate) index: u32,
 }
 
 impl OpenNumber {
-    /// `?s`, or `n0.?r`.
+    /// Returns `?s`, or `n0.?r`.
     pub(crate) fn name(self, task: &Task, plan: &StnPlan) -> String {
         let index = self.index as usize;
         match self.instance {
@@ -36,7 +36,7 @@ impl OpenNumber {
         }
     }
 
-    /// The kind of parameter that stands for it.
+    /// Returns the kind of its parameter.
     pub(crate) fn kind(self) -> ParameterKind {
         match self.instance {
             None => ParameterKind::Domain,
@@ -45,7 +45,8 @@ impl OpenNumber {
     }
 }
 
-/// All open numbers that this plan could meet: the domain's, then those of each instance.
+/// Returns all open numbers that this plan could mention: the domain's, then those of each
+/// instance.
 pub(crate) fn possible(task: &Task, plan: &StnPlan) -> Vec<OpenNumber> {
     let numbered = |instance: Option<InstanceId>, count: usize| {
         let count = u32::try_from(count).expect("fewer than 2^32 unknowns");
@@ -60,7 +61,8 @@ pub(crate) fn possible(task: &Task, plan: &StnPlan) -> Vec<OpenNumber> {
     all
 }
 
-/// The open numbers that the plan's actions or the goal do mention, in the order of [`possible`].
+/// Returns the open numbers that the plan's actions or the goal mention, in the order of
+/// [`possible`].
 pub(crate) fn mentioned(task: &Task, plan: &StnPlan) -> Vec<OpenNumber> {
     let mut found = BTreeSet::new();
     for (position, instance) in plan.instances.iter().enumerate() {
@@ -75,7 +77,7 @@ pub(crate) fn mentioned(task: &Task, plan: &StnPlan) -> Vec<OpenNumber> {
     found.into_iter().collect()
 }
 
-/// Whether a rule of a derived predicate mentions an open number.
+/// Returns `true` if a rule of a derived predicate mentions an open number.
 pub(crate) fn occur_in_rules(task: &Task) -> bool {
     let mut found = false;
     for rule in task.rules().iter() {
@@ -86,7 +88,7 @@ pub(crate) fn occur_in_rules(task: &Task) -> bool {
     found
 }
 
-/// Puts the parameters where the open numbers stand, in the plan's actions and in the goal.
+/// Replaces the open numbers in the plan's actions and in the goal by the parameters.
 pub(crate) fn fill(
     plan: &mut StnPlan,
     goal: &mut Condition,
@@ -111,7 +113,7 @@ pub(crate) fn fill(
     *goal = goal.map_leaves(&mut |leaf| filled(leaf, None));
 }
 
-/// The open number that a leaf of this instance's expressions stands for.
+/// Returns the open number that a leaf of this instance's expressions denotes.
 fn open_number(leaf: &Expression, instance: Option<InstanceId>) -> Option<OpenNumber> {
     match leaf {
         Expression::Unknown(Unknown::Domain(index)) => Some(OpenNumber {
@@ -128,7 +130,7 @@ fn open_number(leaf: &Expression, instance: Option<InstanceId>) -> Option<OpenNu
 
 /// Calls `visit` for each leaf of each expression of the action.
 fn visit_action(action: &Action, visit: &mut impl FnMut(&Expression)) {
-    // Mapping visits every leaf already, wherever it stands; the copy is thrown away.
+    // `map_leaves` visits every leaf; the copy is dropped.
     let _ = action.map_leaves(&mut |leaf| {
         visit(leaf);
         None

@@ -1,4 +1,4 @@
-//! What stands for parameters, and a value for each of them.
+//! Parameters of a plan, and values for them.
 
 use elbowroom_num::Rational;
 
@@ -9,7 +9,8 @@ use crate::numbers::numbers_by_id;
 pub struct ParameterId(pub u32);
 
 impl ParameterId {
-    /// The position in [`ParametrizedPlan::parameters`](crate::ParametrizedPlan::parameters).
+    /// Returns the position in
+    /// [`ParametrizedPlan::parameters`](crate::ParametrizedPlan::parameters).
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -21,7 +22,7 @@ impl From<usize> for ParameterId {
     }
 }
 
-/// A value for each parameter, by position; the default is for a plan that has none.
+/// A value for each parameter, by position. The default is for a plan without parameters.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Valuation {
     numbers: Vec<Rational>,

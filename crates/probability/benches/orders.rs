@@ -1,4 +1,4 @@
-//! How long it takes to find the best order, and to add one happening.
+//! Benchmarks of the search for the best order, and of adding one happening to an order.
 //!
 //! `cargo bench -p elbowroom-probability`
 
@@ -19,8 +19,8 @@ fn main() {
     divan::main();
 }
 
-/// So many lamps to be screwed in, in any order and also at once; some rattle loose more easily
-/// than others, unless they are alike.
+/// Returns a plan that screws in `count` lamps, in any order and also simultaneously. Unless
+/// `are_alike`, the lamps become loose with different probabilities.
 fn lamps(count: usize, are_alike: bool) -> (Model, Circumstances) {
     let domain =
         "(define (domain lamps) (:types lamp) (:predicates (whole ?l - lamp) (lit ?l - lamp))
@@ -42,7 +42,7 @@ fn lamps(count: usize, are_alike: bool) -> (Model, Circumstances) {
         if are_alike {
             continue;
         }
-        // Mixed up, so that no simple rule gives the order.
+        // Different for each lamp and not monotonic, so that no simple rule gives the order.
         let breaks = 0.01 + 0.01 * f64::from(u32::try_from(lamp * 7 % count).unwrap_or(0));
         let dims = 0.01 + 0.005 * f64::from(u32::try_from(lamp * 3 % count).unwrap_or(0));
         let _ = writeln!(
@@ -62,7 +62,7 @@ fn lamps(count: usize, are_alike: bool) -> (Model, Circumstances) {
     model(domain, &problem, &plan, &likelihoods)
 }
 
-/// So many rooms to be cleaned one after the other, with ways between them.
+/// Returns a plan that cleans `count` rooms one after the other and moves between them.
 fn rooms(count: usize) -> (Model, Circumstances) {
     let domain = "(define (domain rooms) (:types room)
         (:predicates (in ?r - room) (open ?r - room) (clean ?r - room))
@@ -147,7 +147,7 @@ fn rooms_in_a_row(bencher: divan::Bencher<'_, '_>, count: usize) {
     first_order(bencher, &model, &initial);
 }
 
-/// The last of twenty happenings pushed, the success probability asked for, and taken back.
+/// Pushes the last of twenty happenings, computes the success probability, and pops the happening.
 #[divan::bench]
 fn one_step(bencher: divan::Bencher<'_, '_>) {
     let (model, initial) = lamps(10, false);
@@ -163,7 +163,7 @@ fn one_step(bencher: divan::Bencher<'_, '_>) {
     });
 }
 
-/// The same without the goal: what one node of the search costs.
+/// Pushes and pops without the goal: the cost of one node of the search.
 #[divan::bench]
 fn one_push_and_pop(bencher: divan::Bencher<'_, '_>) {
     let (model, initial) = lamps(10, false);

@@ -1,17 +1,17 @@
-//! What an order owes its probability to: [`Account`].
+//! Analysis of an order's success probability: [`Account`].
 //!
-//! Three questions about an order whose P(A ∩ G) is known:
+//! It answers three questions about an order with a known P(A ∩ G):
 //!
-//! - *Where is it lost?* [`Loss`]es, each with its place, its reason and its share of all worlds;
-//!   they and P(A ∩ G) add up to 1.
+//! - *Where is probability lost?* [`Loss`]es, each with its position, its cause and its share of
+//!   all worlds. They and P(A ∩ G) add up to 1.
 //! - *What would certainty gain?* P(A ∩ G) of the same order if one action never failed, or one
-//!   fact never changed by itself. These do not add up: where two things must both go well, making
-//!   either certain leaves the other.
+//!   fact never changed by itself. These gains do not add up: if two actions must both succeed,
+//!   making one of them certain does not make the other certain.
 //! - *What would retrying gain?* P(A ∩ G) if failed attempts to start one action did not end the
 //!   order, but were repeated. Each attempt is a step after which facts may change by themselves.
-//!   The same for ends that fail: the action is started again at once, with what the failure left
-//!   behind. The sum over the number of failed attempts is exact but for what is left of it in the
-//!   end.
+//!   The same for ends that fail: the action is started again at once, in the state that the
+//!   failure left behind. The sum over the number of failed attempts is exact except for a
+//!   negligible remainder.
 
 use elbowroom_model::ground::FactId;
 use elbowroom_plan::{InstanceId, Node, NodeId};
@@ -24,56 +24,56 @@ use crate::network::{Happenings, Loss, PrunedNetwork, TooCoupled};
 /// Limit on the number of failed attempts that are counted.
 const MOST_ATTEMPTS: usize = 1000;
 
-/// The rest of a sum is ignored below this.
+/// The remainder of a sum is ignored below this value.
 const NEGLIGIBLE: f64 = 1e-13;
 
-/// Limit on the number of happenings evaluated for one order; for longer ones the gain of retrying
-/// is not given.
+/// Limit on the number of happenings evaluated for one order. For longer orders, the gain of
+/// retrying is not computed.
 const MOST_HAPPENINGS: usize = 4_000_000;
 
-/// The account of an order's probability: where it is lost.
+/// Analysis of an order's success probability.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Account {
     /// P(A).
     pub actions_probability: f64,
     /// P(A ∩ G).
     pub probability: f64,
-    /// In the order of the happenings.
+    /// Losses, in the order of the happenings.
     pub losses: Vec<Loss>,
-    /// The actions that begin in the order, in the order in which they begin.
+    /// Actions that start in the order, sorted by start.
     pub actions: Vec<ActionShare>,
-    /// The facts that may change by themselves and whose changes cost something, the costliest
-    /// first.
+    /// Facts that may change by themselves and whose changes reduce the probability, the largest
+    /// reduction first.
     pub facts: Vec<FactShare>,
 }
 
-/// The part of an action in an order.
+/// Contribution of an action to an order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ActionShare {
-    /// Which action.
+    /// The action.
     pub instance: InstanceId,
     /// P(A ∩ G) if its start, its end and its effects were certain.
     pub if_certain: f64,
-    /// P(A ∩ G) if failed attempts to start it were repeated; `None` where that would take too
-    /// long to calculate.
+    /// P(A ∩ G) if failed attempts to start it were repeated; `None` if the computation would take
+    /// too long.
     pub if_retried: Option<f64>,
-    /// P(A ∩ G) if the action was started again at once whenever its end fails; `None` where its
-    /// end does not fail, where a failure may leave one thing or another behind, or where it would
-    /// take too long to calculate.
+    /// P(A ∩ G) if the action was started again at once whenever its end fails; `None` if its end
+    /// does not fail, if a failure has several possible outcomes, or if the computation would take
+    /// too long.
     pub if_done_again: Option<f64>,
 }
 
-/// The part of a fact in an order.
+/// Contribution of a fact to an order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FactShare {
-    /// Which fact.
+    /// The fact.
     pub fact: FactId,
     /// P(A ∩ G) if it never changed by itself.
     pub if_steady: f64,
 }
 
 impl Account {
-    /// The account of an order.
+    /// Computes the account of an order.
     ///
     /// # Errors
     /// When a condition couples too many uncertain facts.
@@ -128,7 +128,7 @@ impl Account {
     }
 }
 
-/// P(A) and P(A ∩ G).
+/// Returns P(A) and P(A ∩ G).
 fn probabilities(
     model: &Model,
     circumstances: &Circumstances,
@@ -140,7 +140,7 @@ fn probabilities(
     Ok((network.actions_probability(), probability))
 }
 
-/// An order in which attempts are repeated.
+/// An order whose attempts are repeated.
 struct Retries<'a> {
     model: &'a Model,
     circumstances: &'a Circumstances,
@@ -148,7 +148,7 @@ struct Retries<'a> {
 }
 
 impl<'a> Retries<'a> {
-    /// `None` where the order is too long.
+    /// Returns `None` if the order is too long.
     fn of(
         model: &'a Model,
         circumstances: &'a Circumstances,
@@ -161,7 +161,7 @@ impl<'a> Retries<'a> {
             if success >= 1.0 || success <= 0.0 {
                 return 1;
             }
-            // After so many the rest is negligible.
+            // Beyond this number of attempts, the remainder is negligible.
             let enough = NEGLIGIBLE.ln() / (1.0 - success).ln();
             #[allow(
                 clippy::cast_possible_truncation,
@@ -179,7 +179,7 @@ impl<'a> Retries<'a> {
         })
     }
 
-    /// The network with the happenings before a position.
+    /// Returns the network with the happenings before a position.
     fn before(&self, position: usize) -> Result<PrunedNetwork<'a>, TooCoupled> {
         let mut network = PrunedNetwork::new(self.model, self.circumstances)?;
         for (node, is_open) in self.happenings.each().take(position) {
@@ -188,7 +188,7 @@ impl<'a> Retries<'a> {
         Ok(network)
     }
 
-    /// P(A ∩ G) if the attempt at this position is repeated until it succeeds.
+    /// Returns P(A ∩ G) if the attempt at this position is repeated until it succeeds.
     fn at(&self, position: usize) -> Result<f64, TooCoupled> {
         let mut before = self.before(position)?;
         let mut whole = 0.0;
@@ -203,12 +203,12 @@ impl<'a> Retries<'a> {
         Ok(whole)
     }
 
-    /// P(A ∩ G) if the action that starts at this position is started again, as often as its end
-    /// fails.
+    /// Returns P(A ∩ G) if the action that starts at this position is started again whenever its
+    /// end fails.
     fn done_again(&self, instance: InstanceId, start: usize) -> Result<Option<f64>, TooCoupled> {
         let end = self.model.end(instance);
         let can_fail = self.model.event(end).success < 1.0;
-        // With others at the same moment it cannot be started again.
+        // An action that is joined with simultaneous happenings cannot be started again.
         let joined = self.happenings.joined;
         if joined.get(start) == Some(&true) || joined.get(start + 1) == Some(&true) {
             return Ok(None);
@@ -245,7 +245,7 @@ impl<'a> Retries<'a> {
 }
 
 impl Model {
-    /// The same plan in a world in which an action and its effects never fail.
+    /// Returns the same plan in a world where an action and its effects never fail.
     fn with_certain(&self, instance: InstanceId) -> Self {
         let mut model = self.clone();
         for node in [self.start(instance), self.end(instance)] {
@@ -259,8 +259,8 @@ impl Model {
         model
     }
 
-    /// The same plan in a world in which a fact does not change by itself; `None` if it does not
-    /// in any case.
+    /// Returns the same plan in a world where a fact does not change by itself; `None` if it never
+    /// does anyway.
     fn with_steady(&self, fact: FactId) -> Option<Self> {
         let position = self.position(fact).filter(|_| is_fact(fact))?;
         if self.flips[position] == Flip::NEVER && self.rates[position] == Rate::NEVER {

@@ -1,4 +1,4 @@
-//! Everything that can be done in a world without time: [`all_actions`].
+//! Applicable actions of worlds without time: [`all_actions`].
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use elbowroom_num::Rational;
 
 use crate::likelihoods::Likelihoods;
 
-/// The problem is not one for a world without time.
+/// The problem is not supported by worlds without time.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}; without time there are only facts, and unconditional effects on them")]
 pub struct Unsupported {
@@ -18,8 +18,9 @@ pub struct Unsupported {
     pub what: String,
 }
 
-/// All ground actions that can be reached, schema by schema in the domain's order, and in the order
-/// of the objects. Conditions that no action can break are left in: the world can.
+/// Returns all reachable ground actions, schema by schema in the domain's order, and in the order
+/// of the objects. Conditions that no action can violate are kept, because the world may violate
+/// them.
 ///
 /// # Errors
 /// When there are numbers, conditional effects, derived facts or timed initials, or too many
@@ -32,10 +33,12 @@ pub fn all_actions(task: &Task) -> Result<Vec<Action>, Unsupported> {
 /// Limit on the number of facts that may change by themselves.
 const MOST_SPONTANEOUS: usize = 100_000;
 
-/// All ground actions that can be started in the world of the likelihoods, in the same order.
+/// Returns all ground actions that can be started in the world of the likelihoods, in the same
+/// order.
 ///
-/// In contrast to [`all_actions`], the world may also change facts: by failures of actions, and spontaneously. An
-/// action that can start and never end is included as well, because the agent may abandon it after its start.
+/// In contrast to [`all_actions`], the world may also change facts: by failures of actions, and
+/// spontaneously. An action that can start and never end is included as well, because the agent may
+/// abandon it after its start.
 ///
 /// # Errors
 /// As [`all_actions`], and when too many facts may change by themselves.
@@ -54,7 +57,7 @@ pub fn all_actions_under(
             *at_end = problem::Condition::TRUE;
         }
     }
-    // For reachability, a change by the world at any time is the same as a timed initial literal.
+    // For reachability, a change by the world at any time is equivalent to a timed initial literal.
     let mut new = spontaneous(task, likelihoods)?;
     loop {
         let timed = |change| TimedInitial {
@@ -73,7 +76,7 @@ pub fn all_actions_under(
     }
 }
 
-/// Facts that change by themselves with positive probability.
+/// Returns the facts that change by themselves with positive probability.
 fn spontaneous(task: &Task, likelihoods: &Likelihoods) -> Result<Vec<TimedChange>, Unsupported> {
     let problem = task.problem();
     let mut changes = Vec::new();
@@ -131,8 +134,9 @@ fn each_combination(lists: &[Vec<ObjectId>], visit: &mut dyn FnMut(&[ObjectId]) 
     extend(lists, &mut Vec::new(), visit)
 }
 
-/// The actions whose start condition is possible when each fact keeps every truth value that it can ever have:
-/// initially, by the world, or by the start or end of such an action. An end is possible under the same rule.
+/// Returns the actions whose start condition is possible when each fact keeps every truth value
+/// that it can ever have: initially, by the world, or by the start or end of such an action. An end
+/// is possible under the same rule.
 fn startable<'c>(
     task: &Task,
     actions: Vec<Action>,
@@ -148,7 +152,7 @@ fn startable<'c>(
             TimedChange::Delete(predicate, objects) => (task.find_fact(*predicate, objects), false),
             TimedChange::Assign(..) => continue,
         };
-        // A fact without a number is read by none of the actions.
+        // No action reads a fact without a number.
         seen.changed.extend(fact.map(|fact| (fact, truth)));
     }
     let mut starts = vec![false; actions.len()];
@@ -175,7 +179,7 @@ fn startable<'c>(
     actions
 }
 
-/// The truth values that facts can have.
+/// Possible truth values of facts.
 struct Seen<'t> {
     initially: &'t BTreeSet<FactId>,
     changed: BTreeSet<(FactId, bool)>,
@@ -214,7 +218,7 @@ impl Seen<'_> {
     }
 }
 
-/// What failures of these actions may do to facts.
+/// Returns the possible changes of facts by failures of these actions.
 fn left_behind(task: &Task, actions: &[Action], likelihoods: &Likelihoods) -> Vec<TimedChange> {
     let mut left = Vec::new();
     for action in actions {

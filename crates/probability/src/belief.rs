@@ -1,31 +1,31 @@
-//! What is believed of the world: [`Belief`].
+//! Belief about the state of the world: [`Belief`].
 
 use std::collections::BTreeMap;
 
 use elbowroom_model::State;
 use elbowroom_model::ground::FactId;
 
-/// For each fact, how likely it is to hold; facts are believed independently of each other.
+/// Probability of each fact; the facts are independent of each other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Belief {
-    /// Facts not listed are false for certain.
+    /// Facts that are not listed are certainly false.
     probabilities: BTreeMap<FactId, f64>,
 }
 
 impl Belief {
-    /// Everything is known.
+    /// Creates a belief that is certain about a state.
     pub fn certain(state: &State) -> Self {
         Self {
             probabilities: state.facts.iter().map(|&fact| (fact, 1.0)).collect(),
         }
     }
 
-    /// The probability that the fact holds.
+    /// Returns the probability that the fact holds.
     pub fn probability(&self, fact: FactId) -> f64 {
         self.probabilities.get(&fact).copied().unwrap_or(0.0)
     }
 
-    /// Sets how likely the fact is to hold, a number in [0, 1]; what is outside is brought in.
+    /// Sets the probability that the fact holds, clamped to [0, 1].
     pub fn set(&mut self, fact: FactId, probability: f64) {
         let probability = if probability.is_nan() {
             0.0
@@ -40,7 +40,7 @@ impl Belief {
         }
     }
 
-    /// The facts that may hold, with their probabilities.
+    /// Returns the facts that may hold, with their probabilities.
     pub fn iter(&self) -> impl Iterator<Item = (FactId, f64)> + '_ {
         self.probabilities.iter().map(|(&fact, &p)| (fact, p))
     }

@@ -1,4 +1,4 @@
-//! Where a plan stands: [`Circumstances`].
+//! State of a plan's execution: [`Circumstances`].
 
 use std::collections::BTreeMap;
 
@@ -11,39 +11,40 @@ use crate::belief::Belief;
 use crate::likelihoods::Likelihoods;
 use crate::model::Value;
 
-/// The state from which an order is searched for.
+/// State for which an order is searched.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Circumstances {
-    /// Now, by the clock of the task's timed initials. Those up to and including now have
-    /// happened, and are in the belief.
+    /// Present time, on the clock of the task's timed initials. Those up to and including this time
+    /// have happened, and are in the belief.
     pub now: Rational,
-    /// Layer 0.
+    /// The belief: layer 0.
     pub belief: Belief,
-    /// The fluents' values.
+    /// Values of fluents.
     pub values: BTreeMap<FluentId, Rational>,
-    /// The plan's actions that have started and not ended, in order of their start.
+    /// Actions of the plan that have started and not ended, sorted by start.
     pub running: Vec<Running>,
-    /// Happenings of the plan less than ε ago, in order of time: what interferes with one of them
-    /// has to wait.
+    /// Happenings of the plan less than ε ago, sorted by time. A happening that interferes with one
+    /// of them has to wait.
     pub recent: Vec<(NodeId, Rational)>,
 }
 
-/// An action of a plan under way.
+/// A running action of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Running {
-    /// Which one.
+    /// The action.
     pub instance: InstanceId,
-    /// The time at which it started; not after [`Circumstances::now`].
+    /// Its start time; not after [`Circumstances::now`].
     pub start: Rational,
 }
 
 impl Circumstances {
-    /// The beginning: time 0, nothing running, everything known.
+    /// Returns the initial circumstances: time 0, nothing running, a certain belief.
     pub fn initial(task: &Task) -> Self {
         Self::observed(Rational::ZERO, task.initial())
     }
 
-    /// The beginning, where initial facts are as likely as the likelihoods say.
+    /// Returns the initial circumstances, with the initial facts' probabilities from the
+    /// likelihoods.
     pub fn believed(task: &Task, likelihoods: &Likelihoods) -> Self {
         let mut initial = Self::initial(task);
         for (fact, probability) in likelihoods.believed(task) {
@@ -52,7 +53,7 @@ impl Circumstances {
         initial
     }
 
-    /// Everything is known, and nothing is running.
+    /// Returns circumstances with a certain belief and without running actions.
     pub fn observed(now: Rational, state: &State) -> Self {
         Self {
             now,
@@ -63,7 +64,7 @@ impl Circumstances {
         }
     }
 
-    /// The value of a leaf of an expression.
+    /// Returns the value of a leaf of an expression.
     pub(crate) fn value(&self, leaf: &Expression) -> Value {
         match leaf {
             Expression::Fluent(fluent) => self.values.get(fluent).into(),
@@ -71,7 +72,7 @@ impl Circumstances {
         }
     }
 
-    /// Whether the instance is under way.
+    /// Returns `true` if the instance is running.
     pub fn is_running(&self, instance: InstanceId) -> bool {
         self.running
             .iter()

@@ -1,13 +1,14 @@
-//! `PExec`: which happening of an order is next, as things stand.
+//! `PExec`: chooses the next happening of an order in the present circumstances.
 //!
-//! Paper 2, Algorithm 1: of all layers of the order that fit what is believed, the lattermost says
-//! what is next. That skips what has become superfluous, and repeats what did not work. Where
-//! Algorithm 1 and its explanation differ, this follows the explanation: line 5 is meant to return
-//! the last layer when *nothing* is under way; what is under way ends before the goal is declared.
+//! Paper 2, Algorithm 1: of all layers of the order that fit the belief, the last one determines
+//! the next happening. This skips superfluous happenings, and repeats failed ones. Where Algorithm
+//! 1 and its explanation differ, the implementation follows the explanation: line 5 is meant to
+//! return the last layer when *nothing* is running. Running actions end before the goal is
+//! declared.
 //!
-//! A layer fits only where exactly those actions are under way that the order has under way there.
-//! (The paper asks for less: that the start of an end is. But then an order could be taken up
-//! behind the end of an action that is still running, which would never be ended.)
+//! A layer only fits if the running actions are exactly those of the layer. (The paper requires
+//! less: for an end, that its action is running. But then the executor could continue an order
+//! after the end of an action that is still running, which would never be ended.)
 
 mod demands;
 mod following;
@@ -25,62 +26,62 @@ use crate::search::{OrderSearch, Progress};
 use crate::total_order::{Slot, TotalOrderPlan};
 use following::Following;
 
-/// The next step of an order's execution.
+/// Next step of an order's execution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Choice {
-    /// The goal holds, nothing is under way, and no timed initial changes what the goal reads any
-    /// more.
+    /// The goal holds, no action is running, and no pending timed initial changes a fact or number
+    /// that the goal reads.
     GoalReached,
-    /// This happening.
+    /// The next happening.
     Next(NextHappening),
-    /// Let this action go; its end is not worth waiting for. Only a
-    /// [`Table`](crate::optimum::Table) says so.
+    /// Abandon this action, because its end is not worth waiting for. Only a
+    /// [`Table`](crate::optimum::Table) returns this.
     Abandon(InstanceId),
     /// No order of the plan leads to the goal from here.
     Replan,
 }
 
-/// The next happening of the current order.
+/// Next happening of the current order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NextHappening {
-    /// Which one; a node of the plan. A start or an instant is for the executor to do, the end of
-    /// an action and a timed initial are to be waited for.
+    /// The happening, as a node of the plan. The executor performs a start or an instantaneous
+    /// action, and waits for the end of an action or for a timed initial.
     pub node: NodeId,
     /// Its position in the order.
     pub position: usize,
-    /// The happenings behind it in the order that come at the same moment, because they need each other.
+    /// Subsequent happenings of the order at the same moment, because they need each other.
     pub together: Vec<NodeId>,
-    /// The window in which it may happen.
+    /// Time window of the happening.
     pub slot: Slot,
-    /// Whether the order is new.
+    /// `true` if the order is new.
     pub is_new_order: bool,
 }
 
-/// The policy for searching a new order.
+/// Policy for searching a new order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reconsider {
-    /// When no layer of the present one fits, as in the paper.
+    /// When no layer of the current one fits, as in the paper.
     #[default]
     WhenNoLayerFits,
-    /// Before each happening. The order is then always the one most likely to succeed from here.
+    /// Before each happening. The order is then always the most likely one from here.
     Always,
 }
 
-/// Chooses happenings of one plan, one after the other.
+/// Chooses the happenings of one plan, one after the other.
 #[doc(alias = "PExec")]
 #[derive(Clone, Debug)]
 pub struct LayerDispatch {
     search: OrderSearch,
     reconsider: Reconsider,
     order: Option<TotalOrderPlan>,
-    /// How many timed initials had passed when it began.
+    /// Number of timed initials before the order's beginning.
     passed: usize,
-    /// What is kept of the order; made when it is first followed.
+    /// Cached data of the order, created on first use.
     following: Option<Following>,
 }
 
 impl LayerDispatch {
-    /// With no order yet.
+    /// Creates a dispatcher without an order.
     pub fn new(search: OrderSearch, reconsider: Reconsider) -> Self {
         Self {
             search,
@@ -91,28 +92,29 @@ impl LayerDispatch {
         }
     }
 
-    /// The present order.
+    /// Returns the current order.
     pub fn order(&self) -> Option<&TotalOrderPlan> {
         self.order.as_ref()
     }
 
-    /// From now on keeps an order for as long as a layer of it fits. Returns `false` if that was so before.
+    /// Keeps an order from now on for as long as a layer of it fits. Returns `false` if this was
+    /// the policy before.
     pub fn keep_order(&mut self) -> bool {
         std::mem::replace(&mut self.reconsider, Reconsider::WhenNoLayerFits) == Reconsider::Always
     }
 
-    /// Drops the present order, so that the next choice is that of a new search.
+    /// Drops the current order, so that the next choice comes from a new search.
     pub fn drop_order(&mut self) {
         self.order = None;
         self.following = None;
     }
 
-    /// The search behind it.
+    /// Returns the search.
     pub fn search(&self) -> &OrderSearch {
         &self.search
     }
 
-    /// What to do next. `watch` can cut a search short, as in [`OrderSearch::best_order`].
+    /// Chooses the next step. `watch` can interrupt a search, as in [`OrderSearch::best_order`].
     ///
     /// # Errors
     /// When a condition couples too many uncertain facts.
@@ -151,7 +153,8 @@ impl LayerDispatch {
         };
         match order.slots.first() {
             Some(slot) => Ok(next(order, 0, slot.clone(), true)),
-            // Nothing to do is best, though the goal is not believed: no action of this plan helps.
+            // The empty order is best although the goal is not believed, so no action of this plan
+            // helps.
             None => Ok(Choice::Replan),
         }
     }
@@ -162,7 +165,7 @@ impl LayerDispatch {
     }
 }
 
-/// Whether the goal holds of what is more likely than not.
+/// Returns `true` if the goal holds in the most likely state.
 pub fn goal_holds(model: &crate::Model, circumstances: &Circumstances) -> bool {
     let truth = |fact| circumstances.belief.probability(fact) >= 0.5;
     let value = |leaf: &Expression| circumstances.value(leaf);
@@ -170,12 +173,12 @@ pub fn goal_holds(model: &crate::Model, circumstances: &Circumstances) -> bool {
     evaluate(task, task.goal(), &truth, &value).unwrap_or(false)
 }
 
-/// The position of the happening after the lattermost layer that fits, and when it may be.
+/// Returns the position and the time window of the happening after the last layer that fits.
 ///
-/// A layer after which there is no time for the rest of the order does not fit.
+/// A layer without enough time for the remaining order does not fit.
 ///
-/// This takes time in proportion to the order's length. [`LayerDispatch`] finds the same in less, from what
-/// it keeps of an order.
+/// The running time is proportional to the order's length. [`LayerDispatch`] computes the same
+/// result faster, with cached data of the order.
 pub fn lattermost_layer(
     search: &OrderSearch,
     order: &TotalOrderPlan,
@@ -221,12 +224,12 @@ fn next(order: &TotalOrderPlan, position: usize, slot: Slot, is_new_order: bool)
     })
 }
 
-/// Lets every search run to its end.
+/// Never interrupts a search; a callback.
 pub fn patient(_: &Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// How long until the slot begins, from `now`; 0 if it has.
+/// Returns the time from `now` until the slot begins; 0 if it has begun.
 pub fn wait(slot: &Slot, now: &Rational) -> Rational {
     (&slot.earliest - now).max(Rational::ZERO)
 }

@@ -1,23 +1,24 @@
-//! The success probability of a plan, and the most likely order of its actions (Olisipo).
+//! Success probabilities of plans, and the most likely order of their actions (Olisipo).
 //!
-//! In: a partially ordered plan, the likelihoods of failures and spontaneous changes, and the
-//! belief about the present state. Out: the order most likely to succeed, and the next happening.
+//! Input: a partially ordered plan, the likelihoods of failures and spontaneous changes, and the
+//! belief about the present state. Output: the order most likely to succeed, and the next
+//! happening.
 //!
 //! 1. [`Likelihoods`]: facts that change by themselves, starts, ends and effects that fail, and
-//!    what failures leave behind; read from files by [`likelihoods`].
+//!    changes that failures leave behind; read from files by [`likelihoods`].
 //! 2. [`Model`]: a plan's happenings as steps of a stochastic process.
 //! 3. [`PrunedNetwork`]: P(A) and P(A ∩ G) of an order, happening by happening.
 //! 4. [`OrderSearch`] (`PGen`): the best order, from [`Circumstances`].
 //! 5. [`LayerDispatch`] (`PExec`): the next happening, in the present state.
-//! 6. [`account`]: where an order's probability is lost, and what certainty and retrying would
-//!    gain; [`search::Lattice`]: all orders of a short plan at once.
+//! 6. [`account`]: where an order's probability is lost, and the gains of certainty and retrying;
+//!    [`search::Lattice`]: all orders of a short plan at once.
 //! 7. [`optimum`]: the best that any executor can reach in a small world, and its
 //!    [`optimum::Table`].
 //!
-//! What exactly is calculated, and why it is exact, is in `docs/probability.md`. Nothing here draws
-//! random numbers or looks at a clock: time limits come in as callbacks, and the same input gives
-//! the same answer. Probabilities are `f64`; whether there is time for an order is decided on the
-//! real temporal network, in exact numbers.
+//! `docs/probability.md` defines the computed values and explains why they are exact. The crate uses
+//! no random numbers and no clock: time limits are callbacks, and the same input gives the same
+//! result. Probabilities are `f64`. The temporal feasibility of an order is decided by the exact
+//! temporal network.
 //!
 //! ```
 //! use std::sync::Arc;

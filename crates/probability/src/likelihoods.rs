@@ -1,4 +1,4 @@
-//! How likely things are to go otherwise than planned: [`Likelihoods`].
+//! Probabilities of failures and spontaneous changes: [`Likelihoods`].
 
 mod authors;
 mod failing;
@@ -20,11 +20,12 @@ pub use authors::read as read_authors;
 pub use failing::{Aftermath, Argument, Failing, Outcome, OutcomeChange};
 pub use write::write;
 
-/// Reads a likelihood file, in our own format or in that of Olisipo's authors: theirs has a line
-/// `-` between facts and actions, which ours cannot have.
+/// Reads a likelihood file, in Elbowroom's format or in that of Olisipo's authors. The authors'
+/// format is recognised by a line `-` between facts and actions, which cannot occur in the other
+/// one.
 ///
 /// # Errors
-/// All mistakes found: of syntax, of names, of numbers, and what is missing.
+/// All mistakes found: syntax errors, unknown names, invalid numbers, and missing entries.
 pub fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagnostics> {
     let source = source.into();
     if source.text().lines().any(|line| line.trim() == "-") {
@@ -34,12 +35,12 @@ pub fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagn
     }
 }
 
-/// The probabilities of a spontaneous change of a fact in one step.
+/// Probabilities of a spontaneous change of a fact in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flip {
-    /// The probability that it becomes true, if it is false.
+    /// Probability that it becomes true, if it is false.
     pub becomes_true: f64,
-    /// The probability that it becomes false, if it is true.
+    /// Probability that it becomes false, if it is true.
     pub becomes_false: f64,
 }
 
@@ -50,19 +51,19 @@ impl Flip {
         becomes_false: 0.0,
     };
 
-    /// The probability of being true one step later, `p` being the probability now.
+    /// Returns the probability of being true one step later, if it is `p` now.
     pub fn after(self, p: f64) -> f64 {
         p * (1.0 - self.becomes_false) + (1.0 - p) * self.becomes_true
     }
 }
 
-/// How often a fact changes by itself, per second, as long as it has the other value: whatever has
-/// been before, it has changed within the next `t` seconds with probability 1 − exp(−rate · t).
+/// Rates of spontaneous changes of a fact, per second, while it has the other value. The process
+/// has no memory: the fact changes within the next `t` seconds with probability 1 − exp(−rate · t).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rate {
-    /// While it is false.
+    /// Rate while it is false.
     pub becomes_true: f64,
-    /// While it is true.
+    /// Rate while it is true.
     pub becomes_false: f64,
 }
 
@@ -73,7 +74,8 @@ impl Rate {
         becomes_false: 0.0,
     };
 
-    /// The probabilities of being true so many seconds later, if it is true now and if it is not.
+    /// Returns the probabilities of being true `seconds` later, if it is true now and if it is
+    /// false now.
     pub fn later(self, seconds: f64) -> (f64, f64) {
         let sum = self.becomes_true + self.becomes_false;
         if sum <= 0.0 {
@@ -84,7 +86,7 @@ impl Rate {
         (1.0 - (1.0 - in_the_end) * changed, in_the_end * changed)
     }
 
-    /// The probability that it stays as it is for so many seconds on end.
+    /// Returns the probability that it does not change for `seconds`.
     pub fn lasting(self, truth: bool, seconds: f64) -> f64 {
         let away = if truth {
             self.becomes_false
@@ -95,20 +97,20 @@ impl Rate {
     }
 }
 
-/// The success probabilities of an action: its start, its effects, and what is after its start.
+/// Success probabilities of an action: its start, its effects, and the time after its start.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Success {
-    /// The probability that an attempt to start it succeeds, its conditions being true.
+    /// Probability that an attempt to start it succeeds, if its conditions hold.
     pub start: Option<f64>,
     /// For each predicate, the probability that an effect on it takes place.
     pub effects: BTreeMap<PredicateId, f64>,
-    /// The same for effects that make facts false, where it differs.
+    /// The same for effects that make facts false, if it differs.
     pub deletions: BTreeMap<PredicateId, f64>,
     /// Failures after its start.
     pub failing: Failing,
 }
 
-/// Default probabilities, for what has no more specific entry.
+/// Default probabilities, used without a more specific entry.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Defaults {
     /// For facts that are false.
@@ -127,7 +129,7 @@ pub struct Defaults {
     pub failing: Failing,
 }
 
-/// The part of a [`Flip`] and of a [`Rate`] that an entry states.
+/// Parts of a [`Flip`] and of a [`Rate`] that an entry contains.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PartialFlip {
     /// See [`Flip::becomes_true`].
@@ -141,7 +143,7 @@ pub struct PartialFlip {
 }
 
 impl PartialFlip {
-    /// Of facts that never change by themselves.
+    /// Entry for facts that never change by themselves.
     pub(crate) const NEVER: Self = Self {
         becomes_true: Some(0.0),
         becomes_false: Some(0.0),
@@ -152,14 +154,14 @@ impl PartialFlip {
 
 /// Likelihoods: the probabilities of spontaneous changes, and of successful actions and effects.
 ///
-/// What is said of one ground fact or action goes before what is said of its predicate or schema,
-/// and that before the defaults.
+/// An entry of one ground fact or action takes precedence over one of its predicate or schema, and
+/// this one over the defaults.
 ///
-/// Invariant: all probabilities are in [0, 1], and rates per second are finite and not negative;
-/// whoever fills the fields sees to it.
+/// Invariant: all probabilities are in [0, 1], and rates per second are finite and not negative.
+/// The fields are public, so the caller is responsible for this.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Likelihoods {
-    /// The likelihoods of actions and facts that are not named.
+    /// Defaults.
     pub defaults: Defaults,
     /// By predicate.
     pub predicates: BTreeMap<PredicateId, PartialFlip>,
@@ -169,11 +171,11 @@ pub struct Likelihoods {
     pub schemas: BTreeMap<SchemaId, Success>,
     /// By ground action.
     pub actions: BTreeMap<(SchemaId, Vec<ObjectId>), Success>,
-    /// How likely facts are to hold at the beginning, where that is not certain.
+    /// Probabilities of facts in the initial state, if they are uncertain.
     pub beliefs: BTreeMap<(PredicateId, Vec<ObjectId>), f64>,
 }
 
-/// Something of the problem has no likelihood.
+/// A fact, an action or an effect of the problem has no likelihood.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the likelihoods say nothing of {what}; add an entry, or a default")]
 pub struct Missing {
@@ -182,7 +184,7 @@ pub struct Missing {
 }
 
 impl Likelihoods {
-    /// A world in which nothing goes wrong.
+    /// Returns the likelihoods of a world without failures.
     pub fn certain() -> Self {
         Self {
             defaults: Defaults {
@@ -196,10 +198,10 @@ impl Likelihoods {
         }
     }
 
-    /// The facts of which it is said how likely they hold at the beginning, and how likely.
+    /// Returns the facts that are uncertain initially, with their probabilities.
     ///
-    /// A fact that neither an action nor the goal mentions has no number in the task, and does not
-    /// matter.
+    /// A fact that neither an action nor the goal mentions has no number in the task, and is
+    /// irrelevant.
     pub fn believed(&self, task: &Task) -> Vec<(FactId, f64)> {
         let known = self
             .beliefs
@@ -210,10 +212,10 @@ impl Likelihoods {
         known.collect()
     }
 
-    /// The probabilities of a spontaneous change of a fact.
+    /// Returns the probabilities of a spontaneous change of a fact.
     ///
     /// # Errors
-    /// When nothing is said of it.
+    /// When there is no entry.
     pub fn flip(&self, task: &Task, fact: FactId) -> Result<Flip, Missing> {
         let (predicate, arguments) = task.atom(fact);
         self.flip_of(predicate, &arguments).ok_or_else(|| Missing {
@@ -223,7 +225,7 @@ impl Likelihoods {
 
     pub(crate) fn flip_of(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<Flip> {
         let said = self.said_of(predicate, arguments);
-        // Who says how often it changes in a second need not say how often it does in a step.
+        // With a rate per second, the probability per step is optional and defaults to 0.
         let by_time = |rate: Option<f64>| rate.map(|_| 0.0);
         let up = said.becomes_true.or(self.defaults.becomes_true);
         let down = said.becomes_false.or(self.defaults.becomes_false);
@@ -259,7 +261,7 @@ impl Likelihoods {
         )
     }
 
-    /// How often a fact changes by itself, per second: not at all, if nothing is said of it.
+    /// Returns the rates of spontaneous changes of a fact, per second; 0 without an entry.
     pub fn rate(&self, task: &Task, fact: FactId) -> Rate {
         let (predicate, arguments) = task.atom(fact);
         let (up, down) = self.rates_of(self.said_of(predicate, &arguments));
@@ -269,7 +271,8 @@ impl Likelihoods {
         }
     }
 
-    /// Whether facts may change with time, and not only with steps, or actions fail with time.
+    /// Returns `true` if facts may change with time, not only with steps, or actions may fail with
+    /// time.
     pub fn has_rates(&self) -> bool {
         let some = |rate: Option<f64>| rate.is_some_and(|rate| rate > 0.0);
         let entries = self.predicates.values().chain(self.facts.values());
@@ -281,12 +284,12 @@ impl Likelihoods {
             || self.has_failures_during()
     }
 
-    /// Whether actions may fail after their start.
+    /// Returns `true` if actions may fail after their start.
     pub fn has_failures(&self) -> bool {
         self.has_failing_ends() || self.has_failures_during()
     }
 
-    /// What the entries of a fact and of its predicate say.
+    /// Returns the merged entries of a fact and of its predicate.
     fn said_of(&self, predicate: PredicateId, arguments: &[ObjectId]) -> PartialFlip {
         let own = self.facts.get(&(predicate, arguments.to_vec())).copied();
         let own = own.unwrap_or_default();
@@ -311,10 +314,10 @@ impl Likelihoods {
         )
     }
 
-    /// The probability that an attempt to start an action succeeds.
+    /// Returns the probability that an attempt to start an action succeeds.
     ///
     /// # Errors
-    /// When nothing is said of it.
+    /// When there is no entry.
     pub fn start(&self, action: &Action) -> Result<f64, Missing> {
         self.start_of(action.schema, &action.arguments)
             .ok_or_else(|| Missing {
@@ -330,10 +333,10 @@ impl Likelihoods {
             .or(self.defaults.start)
     }
 
-    /// The probability that an effect of an action on a fact takes place.
+    /// Returns the probability that an effect of an action on a fact takes place.
     ///
     /// # Errors
-    /// When nothing is said of it.
+    /// When there is no entry.
     pub fn effect(
         &self,
         task: &Task,
@@ -366,7 +369,7 @@ impl Likelihoods {
             .or(self.defaults.effect)
     }
 
-    /// Whether nothing is left open for any instance of a schema with these effects.
+    /// Returns `true` if the entries are complete for all instances of a schema with these effects.
     fn says_enough_of(&self, schema: SchemaId, affected: &[(PredicateId, bool)]) -> bool {
         let none = Success::default();
         let all = self.schemas.get(&schema).unwrap_or(&none);
@@ -385,12 +388,12 @@ impl Likelihoods {
         self.actions.get(&(schema, arguments.to_vec()))
     }
 
-    /// What is known of the beginning: the task's initial state, where the likelihoods do not say
-    /// that it is uncertain.
+    /// Returns the initial belief: the task's initial state, except for the facts that are
+    /// uncertain by the likelihoods.
     pub fn initial_belief(&self, task: &Task) -> Belief {
         let mut belief = Belief::certain(task.initial());
         for ((predicate, arguments), probability) in &self.beliefs {
-            // What nothing has mentioned cannot matter.
+            // A fact that nothing mentions is irrelevant.
             if let Some(fact) = task.find_fact(*predicate, arguments) {
                 belief.set(fact, *probability);
             }
@@ -399,7 +402,7 @@ impl Likelihoods {
     }
 }
 
-/// Whether actions or timed initials can change facts of the predicate.
+/// Returns `true` if actions or timed initials can change facts of the predicate.
 pub(crate) fn is_changed(problem: &Problem, predicate: PredicateId) -> bool {
     use elbowroom_model::problem::{Body, Change, Effect, TimedChange};
     let touches = |effect: &Effect| match &effect.change {

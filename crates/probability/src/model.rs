@@ -1,8 +1,8 @@
 //! A plan's happenings as steps of a stochastic process: [`Model`].
 //!
-//! The process is stated in `docs/probability.md`. Facts and changing fluents are numbered
-//! densely here, conditions are cut into parts, and each effect has its probability; what happens
-//! to probabilities is the business of [`PrunedNetwork`](crate::PrunedNetwork).
+//! `docs/probability.md` defines the process. The model numbers facts and changing fluents densely,
+//! splits conditions into parts, and assigns a probability to each effect.
+//! [`PrunedNetwork`](crate::PrunedNetwork) computes with these probabilities.
 
 mod compile;
 mod requirement;
@@ -19,33 +19,33 @@ use crate::likelihoods::{Flip, Likelihoods, Missing, Rate};
 
 pub(crate) use requirement::{Requirement, Value, evaluate, visit_facts};
 
-/// The semantics of failed effects and of spontaneous changes.
+/// Semantics of failed effects and of spontaneous changes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Semantics {
-    /// Paper 2's network: an effect that fails leaves the opposite behind, and a fact on which
-    /// an action has an effect does not also change by itself in that step.
+    /// Paper 2's network: a failed effect leaves the opposite value, and a fact with an effect of
+    /// the action does not also change by itself in that step.
     #[default]
     Paper,
-    /// The perturbed worlds of `sim`: an effect that fails leaves the fact as it was, and every
-    /// fact may change by itself after each step.
+    /// The perturbed worlds of `sim`: a failed effect leaves the fact unchanged, and every fact may
+    /// change by itself after each step.
     World,
 }
 
-/// The happenings of a partially ordered plan, with the likelihoods of all that matters to them.
+/// Happenings of a partially ordered plan, with all relevant likelihoods.
 #[derive(Clone, Debug)]
 pub struct Model {
     task: Arc<Task>,
     plan: PartialOrderPlan,
     semantics: Semantics,
-    /// The facts that matter, sorted; then one memory for each guard that is read before it
-    /// counts, with ids that no fact has.
+    /// Relevant facts, sorted; then one memory for each guard that is read before its effect, with
+    /// ids that no task assigns.
     pub(crate) facts: Vec<FactId>,
     pub(crate) flips: Vec<Flip>,
-    /// How often facts change with time.
+    /// Rates of changes of facts with time.
     pub(crate) rates: Vec<Rate>,
-    /// Whether any of them is above 0, or actions fail with time.
+    /// `true` if any rate is above 0, or actions fail with time.
     pub(crate) has_rates: bool,
-    /// The fluents that some happening changes, sorted.
+    /// Fluents that some happening changes, sorted.
     pub(crate) fluents: Vec<FluentId>,
     /// By node of the plan.
     pub(crate) events: Vec<Event>,
@@ -54,28 +54,28 @@ pub struct Model {
     nodes_of: Vec<(NodeId, NodeId)>,
 }
 
-/// A happening, compiled.
+/// A compiled happening.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Event {
-    /// Needed on arrival.
+    /// Condition on arrival.
     pub(crate) condition: Requirement,
-    /// P(it succeeds | its condition); 1 for timed initials.
+    /// P(success | condition); 1 for timed initials.
     pub(crate) success: f64,
-    /// How often per second the action that starts here fails while it is under way.
+    /// Rate of failures per second of the action that starts here, while it is running.
     pub(crate) failures_per_second: f64,
-    /// What a failure of this end leaves behind; empty for all other happenings, which leave
-    /// everything as it was.
+    /// Possible outcomes of a failure of this end; empty for all other happenings, whose failures
+    /// change nothing.
     pub(crate) aftermaths: Vec<Leftover>,
-    /// Whether it is a snap action, after which facts change by themselves.
+    /// `true` for a snap action, after which facts change by themselves.
     pub(crate) is_step: bool,
-    /// The conditions from right after this start to the end of its action.
+    /// Conditions from right after this start to the end of its action.
     pub(crate) over_all: Requirement,
     /// Memories that become false when their condition does, from this start to the end.
     pub(crate) watches: Vec<(usize, Condition)>,
-    /// Sorted by fact.
+    /// Effects on facts, sorted by fact.
     pub(crate) effects: Vec<FactEffect>,
     pub(crate) updates: Vec<Update>,
-    /// Continuous change that begins here, or stops, with its rate.
+    /// Continuous changes that begin or stop here, with their rates.
     pub(crate) continuous: Vec<(usize, Expression)>,
     /// The action's duration, if only one is possible.
     pub(crate) duration: Option<Rational>,
@@ -87,18 +87,19 @@ pub(crate) struct FactEffect {
     pub(crate) fact: usize,
     pub(crate) makes_true: bool,
     pub(crate) probability: f64,
-    /// Read on arrival.
+    /// Condition of the effect, read on arrival.
     pub(crate) guard: Option<Condition>,
-    /// The fact's truth is set without a chance to fail or change (memories, timed initials).
+    /// `true` if the effect cannot fail, and the fact does not change by itself (memories, timed
+    /// initials).
     pub(crate) is_certain: bool,
 }
 
-/// How things may stand after a failed end.
+/// A possible outcome of a failed end.
 #[derive(Clone, Debug)]
 pub(crate) struct Leftover {
-    /// Given the failure.
+    /// Probability, given the failure.
     pub(crate) probability: f64,
-    /// The facts that are set, each once, sorted.
+    /// Facts that are set, each once, sorted.
     pub(crate) changes: Vec<(usize, bool)>,
 }
 
@@ -112,10 +113,10 @@ pub(crate) struct Update {
 }
 
 impl Model {
-    /// The model of a plan.
+    /// Creates the model of a plan.
     ///
     /// # Errors
-    /// When the likelihoods say nothing of a fact or an action of the plan.
+    /// When the likelihoods have no entry for a fact or an action of the plan.
     pub fn new(
         task: impl Into<Arc<Task>>,
         plan: PartialOrderPlan,
@@ -125,11 +126,12 @@ impl Model {
         compile::model(task.into(), plan, likelihoods, semantics)
     }
 
-    /// The same without changes by steps that help: a fact that is only needed true does not become true by itself, one
-    /// that is only needed false does not become false, and one that is needed either way does not change. Changes with
-    /// time stay.
+    /// Returns the model without helpful changes by steps: a fact that is only needed true does not
+    /// become true by itself, one that is only needed false does not become false, and one that is
+    /// needed with both values does not change. Changes with time are kept.
     ///
-    /// An executor that counts on such changes repeats steps in vain if the world does not have them.
+    /// An executor that relies on such changes repeats steps in vain if they do not occur in the
+    /// world.
     #[must_use]
     pub fn without_luck(mut self) -> Self {
         let mut needed = vec![[false; 2]; self.facts.len()];
@@ -167,40 +169,40 @@ impl Model {
         self
     }
 
-    /// The task.
+    /// Returns the task.
     pub fn task(&self) -> &Arc<Task> {
         &self.task
     }
 
-    /// The plan.
+    /// Returns the plan.
     pub fn plan(&self) -> &PartialOrderPlan {
         &self.plan
     }
 
-    /// The semantics of failed effects and of spontaneous changes.
+    /// Returns the semantics of failed effects and of spontaneous changes.
     pub fn semantics(&self) -> Semantics {
         self.semantics
     }
 
-    /// The facts that matter to the plan.
+    /// Returns the relevant facts of the plan.
     pub fn facts(&self) -> impl Iterator<Item = FactId> + '_ {
         self.facts.iter().copied().take_while(|&fact| is_fact(fact))
     }
 
-    /// Whether a happening has an effect on a fact.
+    /// Returns `true` if a happening has an effect on a fact.
     pub fn has_effect_on(&self, node: NodeId, fact: FactId) -> bool {
         let effects = &self.event(node).effects;
         let position = self.position(fact);
         effects.iter().any(|effect| Some(effect.fact) == position)
     }
 
-    /// Whether facts change with time, and not only with steps, or actions fail with time.
+    /// Returns `true` if facts change with time, not only with steps, or actions fail with time.
     pub fn has_rates(&self) -> bool {
         self.has_rates
     }
 
-    /// An end that fails, as a happening of its own: it has none of its end effects, and things
-    /// stand as they stand then. `None` where there is more than one way in which they may.
+    /// Returns a failed end as a happening of its own: it has none of its end effects, and the
+    /// effects of the failure. Returns `None` if the failure has several possible outcomes.
     pub(crate) fn failed_end(&self, node: NodeId) -> Option<Event> {
         let event = self.event(node);
         let [aftermath] = event.aftermaths.as_slice() else {
@@ -209,7 +211,7 @@ impl Model {
         let Node::End(id) = self.plan.nodes[node.index()] else {
             return None;
         };
-        // What the start has remembered is forgotten.
+        // The memories of the start are reset.
         let start = self.event(self.start(id)).effects.iter();
         let memories = start.filter(|effect| effect.is_certain);
         let memories = memories.map(|effect| (effect.fact, false, true));
@@ -232,7 +234,7 @@ impl Model {
         })
     }
 
-    /// How long an action takes at least, in seconds.
+    /// Returns the least duration of an action, in seconds.
     pub(crate) fn shortest(&self, id: InstanceId) -> f64 {
         self.plan.duration(id).0.to_f64()
     }
@@ -241,7 +243,7 @@ impl Model {
         &self.events[node.index()]
     }
 
-    /// The position of a fact, or of a memory.
+    /// Returns the position of a fact, or of a memory.
     pub(crate) fn position(&self, fact: FactId) -> Option<usize> {
         self.facts.binary_search(&fact).ok()
     }
@@ -250,17 +252,17 @@ impl Model {
         self.fluents.binary_search(&fluent).ok()
     }
 
-    /// The start node of an instance, or its only node.
+    /// Returns the start node of an instance, or its only node.
     pub fn start(&self, id: InstanceId) -> NodeId {
         self.nodes_of[id.index()].0
     }
 
-    /// The end node of an instance, or its only node.
+    /// Returns the end node of an instance, or its only node.
     pub fn end(&self, id: InstanceId) -> NodeId {
         self.nodes_of[id.index()].1
     }
 
-    /// Start and end of each instance.
+    /// Returns the start and the end of each instance.
     fn nodes_of(plan: &PartialOrderPlan) -> Vec<(NodeId, NodeId)> {
         let mut nodes_of = vec![(NodeId::ZERO, NodeId::ZERO); plan.instances.len()];
         for (index, node) in plan.nodes.iter().enumerate() {
@@ -275,8 +277,8 @@ impl Model {
         nodes_of
     }
 
-    /// The plan's happenings as they are timed, moment by moment. `steps` are in the order of the plan's
-    /// instances.
+    /// Returns the plan's happenings at their planned times, moment by moment. `steps` are in the
+    /// order of the plan's instances.
     pub(crate) fn moments(&self, steps: &[Step]) -> Vec<Vec<NodeId>> {
         let timed = self.task.timed();
         let nodes = self.plan.nodes.iter().enumerate();
@@ -297,7 +299,7 @@ impl Model {
         moments.map(nodes).collect()
     }
 
-    /// The happening in words.
+    /// Returns the happening in words.
     pub fn node_words(&self, node: NodeId) -> String {
         match self.plan.nodes[node.index()] {
             Node::Zero => "the beginning of the plan".to_owned(),
@@ -312,7 +314,7 @@ impl Model {
     }
 }
 
-/// Whether this is a fact of the task, not a memory.
+/// Returns `true` for a fact of the task, `false` for a memory.
 pub(crate) fn is_fact(fact: FactId) -> bool {
     fact < FactId::FIRST_FREE
 }

@@ -1,4 +1,4 @@
-//! The success probability of an order, step by step: [`PrunedNetwork`].
+//! Success probability of an order, step by step: [`PrunedNetwork`].
 
 mod clock;
 mod cluster;
@@ -30,26 +30,26 @@ use outcome::Outcome;
      calculation; at most {most} can be tracked together"
 )]
 pub struct TooCoupled {
-    /// The happening whose condition or effect it is.
+    /// The happening with the condition or effect.
     pub happening: String,
-    /// How many facts it would take.
+    /// Number of facts that would be coupled.
     pub count: usize,
-    /// How many are possible.
+    /// Largest number supported.
     pub most: usize,
 }
 
-/// Happenings in a row.
+/// A sequence of happenings.
 #[derive(Clone, Copy, Debug)]
 pub struct Happenings<'a> {
     /// The happenings.
     pub sequence: &'a [NodeId],
-    /// Of each, whether it comes at the moment of the one before it, so that nothing is required throughout
-    /// actions in between; `false` for those behind the end of this list.
+    /// For each happening, `true` if it comes at the moment of the previous one, so that no
+    /// over-all condition is required in between; `false` beyond the end of this list.
     pub joined: &'a [bool],
 }
 
 impl<'a> From<&'a [NodeId]> for Happenings<'a> {
-    /// One after another.
+    /// Creates a sequence without joined happenings.
     fn from(sequence: &'a [NodeId]) -> Self {
         Self {
             sequence,
@@ -65,7 +65,7 @@ impl<'a> From<&'a Vec<NodeId>> for Happenings<'a> {
 }
 
 impl<'a> Happenings<'a> {
-    /// The happenings from a position on.
+    /// Returns the happenings from a position on.
     pub(crate) fn rest(self, position: usize) -> Self {
         Self {
             sequence: &self.sequence[position..],
@@ -73,7 +73,7 @@ impl<'a> Happenings<'a> {
         }
     }
 
-    /// Each happening, and whether the next one comes at the same moment.
+    /// Returns each happening, with `true` if the next one comes at the same moment.
     pub(crate) fn each(self) -> impl Iterator<Item = (NodeId, bool)> + 'a {
         let is_open = move |at: usize| self.joined.get(at + 1) == Some(&true);
         let happenings = self.sequence.iter().enumerate();
@@ -81,34 +81,36 @@ impl<'a> Happenings<'a> {
     }
 }
 
-/// Paper 2's dynamic Bayesian network, pruned, for the order pushed so far.
+/// Paper 2's dynamic Bayesian network, pruned, for the order pushed until now.
 ///
-/// [`PrunedNetwork::push`] adds a happening and [`PrunedNetwork::pop`] takes the last one back;
-/// both take time in proportion to what the happening reads and writes, not to the length of the
-/// order. See `docs/probability.md` for what is calculated, and why it is exact.
+/// [`PrunedNetwork::push`] adds a happening and [`PrunedNetwork::pop`] removes the last one. Both
+/// take time proportional to the number of facts and numbers that the happening reads and writes,
+/// independent of the length of the order. `docs/probability.md` defines the computed values and
+/// explains why they are exact.
 #[derive(Clone, Debug)]
 pub struct PrunedNetwork<'m> {
     model: &'m Model,
     facts: Facts,
     numbers: Numbers,
-    /// The remaining durations of actions that were running at the beginning.
+    /// Remaining durations of actions that were running initially.
     remaining: Vec<(InstanceId, Option<Rational>)>,
-    /// The actions under way, in order of their start.
+    /// Running actions, sorted by start.
     running: Vec<InstanceId>,
     clock: Clock,
-    /// P(A), and what is required throughout the actions under way.
+    /// P(A), including the over-all conditions of running actions.
     probability: f64,
-    /// Numeric conditions taken for granted, as their numbers depend on time.
+    /// Number of numeric conditions that are assumed to hold, because their numbers depend on time.
     assumed: usize,
     sequence: Vec<NodeId>,
-    /// By happening, whether it comes at the same moment as the next one: see [`PrunedNetwork::push_open`].
+    /// By happening, `true` if it comes at the same moment as the next one; see
+    /// [`PrunedNetwork::push_open`].
     is_open: Vec<bool>,
     marks: Vec<Mark>,
     undo: Vec<Undo>,
     ledger: Ledger,
 }
 
-/// The state that [`PrunedNetwork::pop`] restores.
+/// State that [`PrunedNetwork::pop`] restores.
 #[derive(Clone, Copy, Debug)]
 struct Mark {
     facts: facts::Checkpoint,
@@ -122,15 +124,15 @@ struct Mark {
 enum Undo {
     Number(usize, Number),
     Started,
-    /// The place, the action, and when it was to end.
+    /// Position, action, and planned end.
     Ended(usize, InstanceId, f64),
 }
 
 impl<'m> PrunedNetwork<'m> {
-    /// The network without a happening.
+    /// Creates the network without a happening.
     ///
     /// # Errors
-    /// When what is required of actions under way couples too many facts.
+    /// When over-all conditions of running actions couple too many facts.
     pub fn new(model: &'m Model, circumstances: &Circumstances) -> Result<Self, TooCoupled> {
         Self::with(model, circumstances, Ledger::default())
     }
@@ -167,8 +169,8 @@ impl<'m> PrunedNetwork<'m> {
                 let number = &mut network.numbers.changing[*fluent];
                 *number = Numbers::begun(number);
             }
-            // What a guard said of the start has been decided: effects that will not take place
-            // are not in the action, and the others will.
+            // The parts of guards about the start have been decided: the action does not contain
+            // effects that will not take place, and the others will.
             for (memory, _) in &event.watches {
                 network.facts.set_certain(*memory, true);
             }
@@ -180,31 +182,31 @@ impl<'m> PrunedNetwork<'m> {
         Ok(network)
     }
 
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &'m Model {
         self.model
     }
 
-    /// The order so far.
+    /// Returns the current sequence.
     pub fn sequence(&self) -> &[NodeId] {
         &self.sequence
     }
 
-    /// The actions that have started and not ended, in order of their start.
+    /// Returns the actions that have started and not ended, sorted by start.
     pub fn running(&self) -> &[InstanceId] {
         &self.running
     }
 
-    /// P(A): that all happenings so far succeed.
+    /// Returns P(A), the probability that all happenings until now succeed.
     ///
-    /// While actions are under way, what is required throughout them counts, so far, with the
-    /// rest: no order can do without their ends. Once none is under way, this is the paper's P(A).
+    /// While actions are running, their over-all conditions until now are included, because every
+    /// order contains their ends. If none is running, this is the paper's P(A).
     #[doc(alias = "P(A)")]
     pub fn actions_probability(&self) -> f64 {
         self.probability
     }
 
-    /// P(A ∩ G): that all happenings succeed and the goal holds after them.
+    /// Returns P(A ∩ G), the probability that all happenings succeed and the goal holds after them.
     ///
     /// # Errors
     /// When the goal couples too many facts.
@@ -218,8 +220,8 @@ impl<'m> PrunedNetwork<'m> {
         required.map(|()| probability)
     }
 
-    /// Where an order's probability is lost, in the order of its happenings, and with respect to
-    /// the goal at last. The masses and P(A ∩ G) add up to 1.
+    /// Returns the losses of an order's probability, in the order of its happenings; those of the
+    /// goal come last. The masses and P(A ∩ G) add up to 1.
     ///
     /// # Errors
     /// When a condition couples too many facts.
@@ -234,13 +236,14 @@ impl<'m> PrunedNetwork<'m> {
         Ok(network.ledger.close())
     }
 
-    /// The number of numeric conditions that were taken for granted, because they read numbers that
-    /// depend on when things happen and not only on their order.
+    /// Returns the number of numeric conditions that are assumed to hold, because they read numbers
+    /// that depend on the times of happenings, not only on their order.
     pub fn assumed_conditions(&self) -> usize {
         self.assumed
     }
 
-    /// How likely a fact is to hold now, given that all went well so far.
+    /// Returns the probability that a fact holds now, given that all happenings until now
+    /// succeeded.
     pub fn marginal(&mut self, fact: elbowroom_model::ground::FactId) -> Option<f64> {
         let position = self.model.position(fact)?;
         Some(self.marginal_at(position))
@@ -250,7 +253,7 @@ impl<'m> PrunedNetwork<'m> {
         self.facts.marginal(self.model, position)
     }
 
-    /// The facts' distribution now, for comparison with another.
+    /// Returns the present distribution of the facts, for comparisons.
     pub(crate) fn snapshot(&mut self, is_relevant: &dyn Fn(usize) -> bool) -> facts::Snapshot {
         self.facts.snapshot(self.model, is_relevant)
     }
@@ -261,7 +264,7 @@ impl<'m> PrunedNetwork<'m> {
 
     /// Adds a happening; returns [`PrunedNetwork::actions_probability`].
     ///
-    /// The happening must be possible: an end needs its action to be under way, a start must not.
+    /// The happening must be possible: for an end, its action is running; for a start, it is not.
     ///
     /// # Errors
     /// When it couples too many facts; then nothing is added.
@@ -269,8 +272,8 @@ impl<'m> PrunedNetwork<'m> {
         self.push_as(node, false)
     }
 
-    /// Adds a happening, after which another one comes at the same moment. Over-all conditions of running
-    /// actions are required only after the last happening of the moment.
+    /// Adds a happening that is followed by another one at the same moment. Over-all conditions of
+    /// running actions are required only after the last happening of the moment.
     ///
     /// # Errors
     /// When it couples too many facts; then nothing is added.
@@ -301,12 +304,13 @@ impl<'m> PrunedNetwork<'m> {
         Ok(self.probability)
     }
 
-    /// Returns `true` if another happening is to come at the moment of the last one.
+    /// Returns `true` if another happening has to follow at the moment of the last one.
     pub(crate) fn is_open(&self) -> bool {
         self.is_open.last() == Some(&true)
     }
 
-    /// The happenings of the last moment: the last one, and those before it that it is joined with.
+    /// Returns the happenings of the last moment: the last one, and those before it that it is
+    /// joined with.
     pub(crate) fn moment(&self) -> &[NodeId] {
         let before = self.is_open.iter().rev().skip(1);
         let joined = before.take_while(|is_open| **is_open).count();
@@ -314,7 +318,7 @@ impl<'m> PrunedNetwork<'m> {
         &self.sequence[last..]
     }
 
-    /// Of each happening, whether it comes at the moment of the one before it.
+    /// Returns, for each happening, `true` if it comes at the moment of the previous one.
     pub(crate) fn joined(&self) -> Vec<bool> {
         let before = std::iter::once(&false).chain(&self.is_open);
         before.take(self.is_open.len()).copied().collect()
@@ -336,12 +340,12 @@ impl<'m> PrunedNetwork<'m> {
         })
     }
 
-    /// Adds an attempt to start an action, or an end, that fails, though it could succeed: facts
-    /// change by themselves, and the attempt can be made again. After a failed end things stand as
-    /// that failure leaves them behind; where there are several ways, none of them is counted.
-    /// Returns how likely all that is.
+    /// Adds a failed attempt to start an action, or a failed end, although its conditions hold.
+    /// Facts change by themselves, and the attempt can be repeated. A failed end has the effects of
+    /// the failure; if there are several possible outcomes, the result is 0. Returns the
+    /// probability of the sequence.
     ///
-    /// It cannot be taken back.
+    /// This cannot be undone by [`Self::pop`].
     ///
     /// # Errors
     /// When its condition couples too many facts.
@@ -352,7 +356,7 @@ impl<'m> PrunedNetwork<'m> {
                 return Ok(0.0);
             };
             self.happen(node, &failed, false)?;
-            // Whenever it is started again, it takes as long as it takes.
+            // The remaining duration is only valid for the first run.
             self.remaining.retain(|(running, _)| *running != id);
             return Ok(self.probability);
         }
@@ -364,7 +368,7 @@ impl<'m> PrunedNetwork<'m> {
         Ok(self.probability)
     }
 
-    /// Takes the last happening back.
+    /// Removes the last happening.
     pub fn pop(&mut self) {
         if let Some(mark) = self.marks.pop() {
             self.sequence.pop();
@@ -373,7 +377,7 @@ impl<'m> PrunedNetwork<'m> {
         }
     }
 
-    /// What a happening does, given as an event.
+    /// Applies a happening, given as an event.
     fn happen(&mut self, node: NodeId, event: &Event, is_open: bool) -> Result<(), TooCoupled> {
         let model = self.model;
         if !self.is_open() {
@@ -414,7 +418,7 @@ impl<'m> PrunedNetwork<'m> {
         self.require_throughout(node)
     }
 
-    /// Multiplies the probability, and notes the loss.
+    /// Multiplies the probability, and records the loss.
     fn multiply(
         &mut self,
         mass: f64,
@@ -431,7 +435,7 @@ impl<'m> PrunedNetwork<'m> {
         self.ledger.note(position, reading, masses, cause);
     }
 
-    /// Requires, in the present layer, the over-all conditions of the actions under way.
+    /// Requires, in the present layer, the over-all conditions of the running actions.
     fn require_throughout(&mut self, node: NodeId) -> Result<(), TooCoupled> {
         let model = self.model;
         for place in 0..self.running.len() {
@@ -459,7 +463,7 @@ impl<'m> PrunedNetwork<'m> {
         Ok(())
     }
 
-    /// Conditions on a requirement in the present layer.
+    /// Conditions the distribution on a requirement in the present layer.
     fn require(
         &mut self,
         requirement: &Requirement,
@@ -502,7 +506,7 @@ impl<'m> PrunedNetwork<'m> {
         Ok(())
     }
 
-    /// Whether a condition certainly holds, or certainly does not; `None` if either is possible.
+    /// Returns the truth value of a condition if it is certain, else `None`.
     fn truth(&mut self, condition: &Condition) -> Option<bool> {
         let (model, numbers) = (self.model, &self.numbers);
         let value = |leaf: &Expression| numbers.value(model, leaf, None);

@@ -1,30 +1,30 @@
-//! The yardstick: how likely the best of all executors is to reach the goal in a small world.
+//! Reference values: the probability that an optimal executor reaches the goal in a small world.
 //!
-//! [`Perturbed`] is a Markov decision process. A state is the truth of all facts and the set of
-//! actions under way. What the agent can do, and what then happens:
+//! [`Perturbed`] is a Markov decision process. A state consists of the truth values of all facts
+//! and the set of running actions. The agent has these moves:
 //!
-//! - *Try to start* an action that is not under way and whose condition holds. With the action's
-//!   success probability it is then under way and its start effects take place, each with its own
-//!   probability, deletions first; else nothing happens.
-//! - *End* an action under way whose end condition holds. With the probability of its end, its end
-//!   effects take place likewise; else it has failed, none of them takes place, and facts are as
-//!   one of its failure's outcomes leaves them
-//!   ([`Aftermath`](crate::likelihoods::Aftermath)). Either way it is no longer under way.
-//!   Instantaneous actions are tried like starts and leave nothing under way.
-//! - *Abandon* an action under way: its end effects will not take place. That takes no step.
+//! - *Start* an action that is not running and whose condition holds. With the action's success
+//!   probability, it is then running and its start effects take place, each with its own
+//!   probability, deletions first. Otherwise nothing happens.
+//! - *End* a running action whose end condition holds. With the probability of its end, its end
+//!   effects take place likewise. Otherwise it has failed, none of them takes place, and facts
+//!   change by one of the outcomes of its failure ([`Aftermath`](crate::likelihoods::Aftermath)).
+//!   In both cases, it is no longer running. Instantaneous actions are tried like starts, and are
+//!   not running afterwards.
+//! - *Abandon* a running action: its end effects will not take place. This is not a step.
 //!
-//! After each try and each end, successful or not, every fact may change by itself, once and
-//! independently of the others ([`Semantics::World`](crate::Semantics)). Then the agent sees the
-//! state as it is. It stops, with success, when it sees the goal hold with nothing under way.
+//! After each start and each end, successful or not, every fact may change by itself, once and
+//! independently of the others ([`Semantics::World`](crate::Semantics)). Then the agent observes
+//! the state. It stops with success when the goal holds and no action is running.
 //!
-//! There is no time in this world: durations, deadlines and waiting do not exist, as in the
-//! authors' simulation. What is required throughout an action is, as there, not looked at
-//! ([`Settings::enforces_over_all`] changes that).
+//! There is no time in this world: no durations, deadlines or waiting, as in the authors'
+//! simulation. Over-all conditions are ignored, as there ([`Settings::enforces_over_all`] changes
+//! that).
 //!
-//! The number that limits a run is that of its steps ([`Horizon`]). The experiments limit planning
-//! rounds instead: a run is over when no plan is found so many times. [`DeadEnds`] says what that
-//! means here. Where broken things can mend themselves, such a rule is needed, because otherwise
-//! whoever does something, no matter what, for long enough succeeds for certain.
+//! A run is limited by its number of steps ([`Horizon`]). The experiments limit planning rounds
+//! instead: a run is over when no plan is found a given number of times. [`DeadEnds`] is the
+//! corresponding rule here. If facts can be restored by spontaneous changes, such a rule is needed:
+//! without it, any agent that performs arbitrary steps for long enough succeeds with certainty.
 
 mod process;
 mod small_world;
@@ -41,42 +41,43 @@ use crate::total_order::Slot;
 pub use process::Perturbed;
 pub use small_world::{Table, best_value};
 
-/// The number of steps of a run.
+/// Limit on the number of steps of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Horizon {
-    /// At most this many.
+    /// At most this number of steps.
     Steps(usize),
-    /// As many as it takes.
+    /// No limit.
     Unlimited,
 }
 
-/// What becomes of a run in a dead end: where the goal could not be reached even if nothing went
-/// wrong any more, so that who plans does not find a plan. Only luck leads out of it.
+/// Rule for a run in a dead end: a state where the goal is unreachable even without further
+/// failures, so that a planner finds no plan. Only spontaneous changes lead out of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeadEnds {
-    /// It goes on.
+    /// The run continues.
     Harmless,
-    /// It is lost.
+    /// The run is lost.
     Lost,
-    /// It goes on, until so many of its steps have ended in one; that one is the last. At least 1.
+    /// The run continues until this number of its steps have ended in a dead end; the last of them
+    /// is lost. At least 1.
     Patience(usize),
 }
 
-/// The rules of the world.
+/// Rules of the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The limit on the number of steps of a run.
     pub horizon: Horizon,
-    /// The number of actions that can be under way at once.
+    /// Largest number of actions that run at once.
     pub most_running: usize,
-    /// The outcome of a run where there is no plan.
+    /// Rule for a run without a plan.
     pub dead_ends: DeadEnds,
-    /// Whether an action whose over-all condition fails is abandoned at once.
+    /// `true` if an action whose over-all condition fails is abandoned at once.
     pub enforces_over_all: bool,
 }
 
 impl Default for Settings {
-    /// The rules of the experiments, without a limit on what is under way.
+    /// Returns the rules of the experiments, without a limit on running actions.
     fn default() -> Self {
         Self {
             horizon: Horizon::Unlimited,
@@ -87,51 +88,51 @@ impl Default for Settings {
     }
 }
 
-/// The world is not one that can be tabulated.
+/// Reason why the world cannot be tabulated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotSmall {
     /// Too many states.
     #[error("{facts} facts and {actions} actions make more states than can be tabulated")]
     TooManyStates {
-        /// How many facts matter.
+        /// Number of relevant facts.
         facts: usize,
-        /// The number of actions.
+        /// Number of actions.
         actions: usize,
     },
-    /// Numbers, or effects that depend on what held throughout an action.
+    /// Numbers, or effects that depend on over-all conditions.
     #[error("{what}, and such worlds are not tabulated")]
     Unsupported {
         /// The unsupported feature.
         what: String,
     },
-    /// The likelihoods are those of another reading.
+    /// The model has the paper's semantics.
     #[error("the model must be one of a world, not of the paper's network")]
     PaperSemantics,
 }
 
-/// An agent's action in a state.
+/// A move of an agent in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Move {
-    /// Tries a start or an instantaneous action, or ends an action: a node of the plan.
+    /// Tries a start or an instantaneous action, or ends an action; a node of the plan.
     Do(NodeId),
-    /// Lets an action go.
+    /// Abandons an action.
     Abandon(InstanceId),
-    /// Does nothing any more.
+    /// Stops.
     Stop,
 }
 
-/// The value of each state for the best of all agents, and what it does there.
+/// Values of all states under an optimal policy, and the moves of the policy.
 #[derive(Clone, Debug)]
 pub struct Optimum {
     values: sweeps::Values,
     moves: Vec<Vec<Vec<Move>>>,
-    /// How many sweeps it took.
+    /// Number of sweeps.
     pub sweeps: usize,
 }
 
 impl Optimum {
-    /// The best choice from here, in the form of an executor's decision; `slot` says when a
-    /// happening can take place.
+    /// Returns the best choice from here, as an executor's decision; `slot` returns the time window
+    /// of a happening.
     pub fn choice(
         &self,
         process: &Perturbed,
@@ -154,10 +155,10 @@ impl Optimum {
         }
     }
 
-    /// The greatest probability of success from here, in [0, 1], with all patience left.
+    /// Returns the greatest probability of success from here, in [0, 1], with full patience.
     ///
-    /// With [`Horizon::Unlimited`] it is approached from below; the sweeps stop when none of them
-    /// adds more than 1e-12 to any state.
+    /// With [`Horizon::Unlimited`], it is approximated from below; the sweeps stop when none of
+    /// them adds more than 1e-12 to any state.
     pub fn value(&self, process: &Perturbed, circumstances: &Circumstances) -> f64 {
         let values = self.values.last().map_or(&[][..], Vec::as_slice);
         process
@@ -167,9 +168,9 @@ impl Optimum {
             .sum()
     }
 
-    /// What to do, with all steps of the horizon and all patience still to come.
+    /// Returns the best move, with all steps of the horizon and full patience remaining.
     ///
-    /// Of an uncertain belief, the most likely state counts.
+    /// For an uncertain belief, the most likely state is used.
     pub fn choose(&self, process: &Perturbed, circumstances: &Circumstances) -> Move {
         let mut weights = process.weights(circumstances);
         weights.sort_by(|(.., a), (.., b)| b.total_cmp(a));
@@ -180,8 +181,8 @@ impl Optimum {
             .map_or(Move::Stop, |((set, state, _), moves)| moves[*set][*state])
     }
 
-    /// What to do where everything is known, and when `patience` more steps may end in a dead end
-    /// ([`DeadEnds::Patience`]; 0: none, the next that does is the last).
+    /// Returns the best move in a known state, when `patience` more steps may end in a dead end
+    /// ([`DeadEnds::Patience`]; 0: the next one that does is the last).
     pub fn choose_at(
         &self,
         process: &Perturbed,

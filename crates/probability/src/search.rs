@@ -1,18 +1,19 @@
-//! `PGen`: the order of a plan's happenings that is most likely to succeed.
+//! `PGen`: finds the order of a plan's happenings that is most likely to succeed.
 //!
 //! Branch and bound over sequences of happenings (paper 2, section 2.2.1), depth first, the most
-//! promising happening first. A sequence is given up when
+//! promising happening first. A sequence is pruned in these cases:
 //!
-//! - its happenings cannot be done in this order if nothing goes wrong, or succeed with
-//!   probability 0;
-//! - there is no time for them: durations, their bounds, timed initials and now leave no schedule;
-//! - no way to go on can beat the best order found (a sharper bound than the paper's P(A), see
-//!   `search/bound.rs`);
-//! - another sequence has done the same and stands at least as well (see `search/memo.rs`);
-//! - it has a twin with instances that can stand for each other (see `search/symmetry.rs`).
+//! - Its happenings are impossible in this order without failures, or succeed with probability 0.
+//! - It has no schedule: durations, their bounds, timed initials and the present time are
+//!   inconsistent.
+//! - No continuation can be better than the best known order (by a sharper bound than the paper's
+//!   P(A), see `search/bound.rs`).
+//! - Another sequence with the same happenings dominates it (see `search/memo.rs`).
+//! - A symmetric sequence exists, with interchangeable instances exchanged (see
+//!   `search/symmetry.rs`).
 //!
-//! Unlike the published code this keeps the best order found, starts from the belief as it is now,
-//! and lets actions be done again that were done before.
+//! In contrast to the published code, it keeps the best order, starts from the present belief, and
+//! can repeat actions that were executed before.
 
 mod assignment;
 mod bound;
@@ -53,28 +54,28 @@ use separations::Separations;
 use symmetry::Symmetry;
 use timing::Timing;
 
-/// The sequences that count as orders of the plan.
+/// Sequences that count as orders of the plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Candidates {
-    /// Those that reach the goal if nothing goes wrong, as in the paper.
+    /// Sequences that reach the goal without failures, as in the paper.
     #[default]
     Working,
-    /// All. An order may then count on a fact to change by itself.
+    /// All sequences. An order may then rely on a spontaneous change of a fact.
     All,
 }
 
 /// Settings of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SearchSettings {
-    /// Which sequences count.
+    /// Sequences that count.
     pub candidates: Candidates,
-    /// Whether happenings keep the order of the plan's interference links, as in the paper. If
-    /// not, conditions and likelihoods alone decide.
+    /// `true` if happenings keep the order of the plan's interference links, as in the paper.
+    /// Otherwise, only conditions and likelihoods matter.
     pub keeps_interference: bool,
 }
 
 impl Default for SearchSettings {
-    /// The paper's.
+    /// Returns the settings of the paper.
     fn default() -> Self {
         Self {
             candidates: Candidates::Working,
@@ -83,40 +84,39 @@ impl Default for SearchSettings {
     }
 }
 
-/// Work that is counted for each examined sequence, in units of [`elbowroom_num::work`].
+/// Work units of each examined sequence, for [`elbowroom_num::work`].
 const SEQUENCE_WORK: u64 = 5_000;
 
-/// The reason why a search ended.
+/// Reason why a search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchStop {
-    /// Nothing is better.
+    /// The result is optimal.
     Complete,
-    /// The callback said so; there may be better.
+    /// The callback interrupted the search; there may be better orders.
     Interrupted,
 }
 
-/// The result of a search.
+/// Result of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// The order most likely to succeed; `None` if no order can.
+    /// The most likely order; `None` if no order can succeed.
     pub order: Option<TotalOrderPlan>,
-    /// Whether it is proven to be the best.
+    /// `Complete` if the order is proven to be the best.
     pub stop: SearchStop,
-    /// The number of sequences looked at; 0 if the answer was known from before.
+    /// Number of examined sequences; 0 if the result was cached.
     pub sequences: usize,
 }
 
 /// Progress of a search, for its callback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// The number of sequences looked at so far.
+    /// Number of sequences examined until now.
     pub sequences: usize,
-    /// The success probability of the best order so far.
+    /// Success probability of the best order until now.
     pub best: Option<f64>,
 }
 
-/// The search for orders of one plan. Keeps what it has found for when it is asked again, and shares
-/// that with its clones.
+/// Search for orders of one plan. Caches its results, and shares the cache with its clones.
 #[doc(alias = "PGen")]
 #[derive(Clone, Debug)]
 pub struct OrderSearch {
@@ -127,12 +127,12 @@ pub struct OrderSearch {
     symmetry: Arc<Symmetry>,
     bounds: Arc<Bounds>,
     cache: Cache,
-    /// Looked at before all others.
+    /// Sequence to examine first.
     first: Arc<Vec<NodeId>>,
 }
 
 impl OrderSearch {
-    /// A search for orders of the model's plan.
+    /// Creates a search for orders of the model's plan.
     pub fn new(model: impl Into<Arc<Model>>, settings: SearchSettings) -> Self {
         let model = model.into();
         let separations = Separations::of(&model, settings.keeps_interference);
@@ -150,31 +150,31 @@ impl OrderSearch {
         }
     }
 
-    /// Begins every search with this sequence, as far as it can be done: that of the plan as it is
-    /// timed, say. Of a long plan, a search that is cut short may find nothing else.
+    /// Examines this sequence first in every search, as far as it is possible; for example, the
+    /// plan's own order. If a search for a long plan is interrupted, this may be its only result.
     ///
-    /// Starts of what is under way and timed initials that have passed are left out.
+    /// Starts of running actions and timed initials in the past are left out.
     #[must_use]
     pub fn beginning_with(mut self, sequence: Vec<NodeId>) -> Self {
         self.first = Arc::new(sequence);
-        // What was found by a search that began otherwise may be another of several that are alike.
+        // Cached results may be different ones among several equivalent orders.
         self.cache = Cache::default();
         self
     }
 
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
 
-    /// Its settings.
+    /// Returns the settings.
     pub fn settings(&self) -> &SearchSettings {
         &self.settings
     }
 
-    /// A plan's happenings as they are timed, as an order: without the timed initials that do not
-    /// matter, and of those that come after all actions, with those up to the last that changes
-    /// what the goal reads. `steps` are in the order of the plan's instances.
+    /// Returns a plan's happenings at their planned times, as an order. Irrelevant timed initials
+    /// are left out. Of those after all actions, only those up to the last one that changes a fact
+    /// or number of the goal are included. `steps` are in the order of the plan's instances.
     pub fn as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
         let is_timed =
             |node: NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
@@ -190,7 +190,8 @@ impl OrderSearch {
         order
     }
 
-    /// All happenings as they are timed. At one moment ends come first, and each comes after those that it needs.
+    /// Returns all happenings at their planned times. At one moment ends come first, and each
+    /// happening comes after those that it needs.
     fn happenings_as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
         let mut order = Vec::new();
         for mut moment in self.model.moments(steps) {
@@ -205,14 +206,14 @@ impl OrderSearch {
         !self.couplings.is_empty()
     }
 
-    /// Whether no timed initial after `now` changes what the goal reads. Until then it is not
-    /// reached.
+    /// Returns `true` if no timed initial after `now` changes a fact or number of the goal. Before
+    /// that, the goal is not reached.
     pub fn is_goal_settled(&self, now: &Rational) -> bool {
         self.separations.is_goal_settled(now)
     }
 
-    /// Whether an order may end here as far as timed initials go: with the last one that the goal
-    /// depends on behind it, and not with one that nothing comes after. `next_timed` counts those
+    /// Returns `true` if timed initials allow an order to end here: it contains the last one that
+    /// the goal depends on, and does not end with a later one. `next_timed` is the number of those
     /// that have passed.
     fn may_be_over(&self, next_timed: usize, sequence: &[NodeId]) -> bool {
         let until_goal = self.separations.timed_until_goal;
@@ -222,11 +223,12 @@ impl OrderSearch {
         next_timed == until_goal || next_timed > until_goal && !ends_with_timed
     }
 
-    /// The order most likely to succeed from here.
+    /// Returns the order most likely to succeed from here.
     ///
-    /// `watch` is called now and then; when it breaks, the best order so far is the answer. Of
-    /// orders that are equally likely, a shorter one is preferred, then the one found first. Its starts wait for ends
-    /// as `search/postponed.rs` describes, where that costs no probability.
+    /// `watch` is called regularly. If it breaks, the best order until then is returned. Of equally
+    /// likely orders, a shorter one is preferred, then the one found first. Its starts are
+    /// postponed behind ends as described in `search/postponed.rs`, if this does not reduce the
+    /// probability.
     ///
     /// # Errors
     /// When a condition couples too many uncertain facts.
@@ -304,9 +306,9 @@ impl OrderSearch {
         })
     }
 
-    /// A sequence of one's own as an order, with its layers and probabilities.
+    /// Returns a given sequence as an order, with its layers and probabilities.
     ///
-    /// It need not be one that the search would find. Where there is no time for it, it has no
+    /// The search need not be able to find it. If the sequence has no schedule, the order has no
     /// slots.
     ///
     /// # Errors
@@ -327,8 +329,8 @@ impl OrderSearch {
         self.order(circumstances, happenings, probability)
     }
 
-    /// Of each happening of a sequence, whether it comes at the same moment as the one before it: coupled happenings do
-    /// where they would fail one after the other.
+    /// Returns, for each happening of a sequence, `true` if it comes at the same moment as the
+    /// previous one: coupled happenings do if they would fail one after the other.
     fn joined(
         &self,
         circumstances: &Circumstances,
@@ -356,7 +358,7 @@ impl OrderSearch {
         Ok(network.joined())
     }
 
-    /// The order with its layers and its times.
+    /// Returns the order with its layers and its times.
     fn order(
         &self,
         circumstances: &Circumstances,
@@ -376,13 +378,13 @@ impl OrderSearch {
         ))
     }
 
-    /// The time at which each happening of a sequence may and can be, if it begins now; `None` if
-    /// there is no time for the sequence.
+    /// Returns the time window of each happening of a sequence that begins now; `None` if the
+    /// sequence has no schedule.
     pub fn windows(&self, circumstances: &Circumstances, sequence: &[NodeId]) -> Option<Vec<Slot>> {
         self.windows_of(circumstances, sequence.into())
     }
 
-    /// The same, with happenings that come at the same moment. A first one that is joined comes now.
+    /// Like [`Self::windows`], with joined happenings. A first one that is joined comes now.
     pub fn windows_of(
         &self,
         circumstances: &Circumstances,
@@ -405,13 +407,13 @@ impl OrderSearch {
         Some(timing.windows().into_iter().map(slot).collect())
     }
 
-    /// How many of the timed initials that matter have passed.
+    /// Returns the number of relevant timed initials that have passed.
     pub(crate) fn timed_passed(&self, now: &Rational) -> usize {
         let timed = self.separations.timed.iter();
         timed.take_while(|(_, time)| time <= now).count()
     }
 
-    /// The rests of an order from a position on, for so many timed initials to have passed before it.
+    /// Returns the rests of an order from a position on, after `passed` timed initials.
     pub(crate) fn rests(&self, order: &TotalOrderPlan, from: usize, passed: usize) -> Rests {
         let running = order.layers.last().map_or(&[][..], |layer| &layer.running);
         let sequence = &order.sequence[..];
@@ -424,8 +426,8 @@ impl OrderSearch {
         )
     }
 
-    /// When the happening at a position may be, if the order goes on with it: the first of
-    /// [`OrderSearch::windows`], without the others.
+    /// Returns the time window of the happening at a position, if the order continues with it: the
+    /// first one of [`OrderSearch::windows`], without the others.
     pub(crate) fn first_of(
         &self,
         rests: &Rests,

@@ -1,4 +1,4 @@
-//! An order of a plan's happenings, with what must hold between them: [`TotalOrderPlan`].
+//! An order of a plan's happenings, with the conditions between them: [`TotalOrderPlan`].
 
 mod regress;
 
@@ -10,47 +10,48 @@ use crate::circumstances::Circumstances;
 use crate::model::{Model, evaluate};
 use crate::network::{Happenings, PrunedNetwork};
 
-/// Happenings in a row, and the layers of the pruned network between them.
+/// A sequence of happenings, and the layers of the pruned network between them.
 #[doc(alias = "Γ")]
 #[derive(Clone, Debug, PartialEq)]
 pub struct TotalOrderPlan {
-    /// The happenings: nodes of the partially ordered plan.
+    /// Happenings, as nodes of the partially ordered plan.
     pub sequence: Vec<NodeId>,
-    /// Of each happening, whether it comes at the same moment as the one before it, because they need each other.
+    /// For each happening, `true` if it comes at the same moment as the previous one, because they
+    /// need each other.
     pub joined: Vec<bool>,
-    /// One more than happenings: layer `i` is what must hold before `sequence[i]` for the rest to
-    /// work if nothing more goes wrong; the last is the goal.
+    /// Layers, one more than happenings. Layer `i` contains the conditions before `sequence[i]`
+    /// under which the remaining happenings work without failures. The last layer is the goal.
     pub layers: Vec<Layer>,
-    /// The window of each happening, if the order begins when it was found.
+    /// Time window of each happening, if the order begins at the time of the search.
     pub slots: Vec<Slot>,
-    /// P(A): that all happenings succeed.
+    /// P(A): probability that all happenings succeed.
     pub actions_probability: f64,
-    /// P(A ∩ G): that all happenings succeed and the goal holds after them.
+    /// P(A ∩ G): probability that all happenings succeed and the goal holds after them.
     pub probability: f64,
-    /// The number of numeric conditions that were taken for granted, because the numbers they read
-    /// depend on when things happen and not only on their order.
+    /// Number of numeric conditions that are assumed to hold, because their numbers depend on the
+    /// times of happenings, not only on their order.
     pub assumed_conditions: usize,
 }
 
-/// The conditions that must hold between two happenings.
+/// Conditions between two happenings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layer {
-    /// Facts with the truth they must have, sorted.
+    /// Facts with the required truth values, sorted.
     pub literals: Vec<(FactId, bool)>,
     /// Conditions on numbers, or on several facts at once.
     pub conditions: Vec<Condition>,
-    /// The actions under way there, sorted.
+    /// Running actions, sorted.
     pub running: Vec<InstanceId>,
 }
 
-/// The time window of a happening.
+/// Time window of a happening.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Slot {
-    /// Which one.
+    /// The happening.
     pub node: NodeId,
-    /// The earliest time.
+    /// Earliest time.
     pub earliest: Rational,
-    /// The latest time; `None` if there is no upper bound.
+    /// Latest time; `None` if it is unbounded.
     pub latest: Option<Rational>,
 }
 
@@ -64,7 +65,7 @@ impl<'a> From<&'a TotalOrderPlan> for Happenings<'a> {
 }
 
 impl TotalOrderPlan {
-    /// The order that a network has, begun in these circumstances.
+    /// Returns the order of a network that begins in these circumstances.
     pub(crate) fn new(
         model: &Model,
         circumstances: &Circumstances,
@@ -97,15 +98,15 @@ impl TotalOrderPlan {
         self.joined.contains(&true)
     }
 
-    /// The happenings that come at the same moment as the one at `position`, and before it. Empty unless they need each
-    /// other.
+    /// Returns the happenings before the one at `position` that come at the same moment. Empty
+    /// unless they need each other.
     pub(crate) fn joined_before(&self, position: usize) -> &[NodeId] {
         let joined = self.joined[..=position].iter().rev();
         let count = joined.take_while(|is_joined| **is_joined).count();
         &self.sequence[position - count..position]
     }
 
-    /// The same order, begun so much later.
+    /// Returns the order, begun `delay` later.
     #[must_use]
     pub(crate) fn delayed(&self, delay: &Rational) -> Self {
         let mut order = self.clone();
@@ -134,8 +135,9 @@ fn step(model: &Model, running: &mut Vec<InstanceId>, node: NodeId) {
 }
 
 impl Layer {
-    /// Whether what is believed fits: whether each fact is more likely to be as required than not,
-    /// all conditions hold of what is more likely, and the same actions are under way.
+    /// Returns `true` if the layer fits the circumstances: each fact is more likely to have the
+    /// required value than not, all conditions hold in the most likely state, and the running
+    /// actions are the same.
     pub fn fits(&self, model: &Model, circumstances: &Circumstances) -> bool {
         let mut running: Vec<InstanceId> =
             circumstances.running.iter().map(|r| r.instance).collect();
@@ -143,7 +145,7 @@ impl Layer {
         running == self.running && self.holds(model, circumstances)
     }
 
-    /// The same, whatever is under way.
+    /// Like [`Self::fits`], for any running actions.
     pub fn holds(&self, model: &Model, circumstances: &Circumstances) -> bool {
         let is_likely = |fact: FactId| circumstances.belief.probability(fact) >= 0.5;
         self.literals
@@ -152,13 +154,13 @@ impl Layer {
             && self.conditions_hold(model, circumstances)
     }
 
-    /// Whether the conditions on numbers and on several facts hold.
+    /// Returns `true` if the conditions on numbers and on several facts hold.
     pub(crate) fn conditions_hold(&self, model: &Model, circumstances: &Circumstances) -> bool {
         let is_likely = |fact: FactId| circumstances.belief.probability(fact) >= 0.5;
         let value = |leaf: &Expression| circumstances.value(leaf);
         let task = model.task();
         self.conditions.iter().all(|condition| {
-            // A duration that is not known cannot speak against it.
+            // A condition that depends on an unknown duration counts as true.
             evaluate(task, condition, &is_likely, &value).unwrap_or(true)
         })
     }

@@ -1,5 +1,5 @@
-//! What an order owes its probability to, and the lattice of orders, against all worlds and all
-//! orders spelt out.
+//! Analysis of success probabilities, and the lattice of orders, compared with the enumeration of
+//! all worlds and all orders.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -31,7 +31,7 @@ const TASTE: Taste = Taste {
     numbers: true,
 };
 
-/// A random case; in half of them actions fail after their start as well.
+/// Generates a random case; in half of them actions also fail after their start.
 fn mixed(rng: &mut ChaCha8Rng, round: usize) -> Case {
     let plain = case(rng, TASTE);
     match round % 4 {
@@ -81,7 +81,7 @@ fn what_is_lost_and_what_is_left_are_all_worlds() {
             let account = Account::of(&model, &case.circumstances, &order).unwrap();
             let lost: f64 = account.losses.iter().map(|loss| loss.mass).sum();
             assert_close(lost + account.probability, 1.0, &case.text);
-            // At each place so much is lost as there are fewer worlds after it.
+            // The loss at each position is the decrease of the worlds' total probability.
             let mut worlds = worlds(&case, &case.likelihoods, semantics);
             let at = |position, is_goal| {
                 let is_there = account.losses.iter().filter(move |loss| {
@@ -285,7 +285,7 @@ fn a_lattice_has_all_orders_in_it() {
             .lattice(&case.circumstances, LatticeLimits::default())
             .unwrap();
         let orders = twin::orders::all(&case, semantics, &search);
-        // The lattice has coupled happenings of one moment in one order only.
+        // The lattice contains coupled happenings of one moment in one order only.
         if orders.iter().any(|order| order.has_joined) {
             continue;
         }
@@ -340,9 +340,9 @@ fn a_lattice_beyond_its_limits_is_refused() {
     let model = Model::new(task, plan, &Likelihoods::certain(), Semantics::Paper).unwrap();
     let search = OrderSearch::new(model, SearchSettings::default());
     let lattice = search.lattice(&initial, LatticeLimits::default()).unwrap();
-    // Each lamp is off, being lit, or lit. Of the 6! / 2^3 ways there is no time for six: what
-    // takes as long cannot begin after one of two that began together has ended, and end before the
-    // other.
+    // Each lamp is off, being lit, or lit. Of the 6! / 2^3 orders, six have no schedule: with equal
+    // durations, an action cannot start after one of two that started together has ended, and end
+    // before the other.
     assert_eq!((lattice.nodes.len(), lattice.orders), (27, 84));
     let limits = LatticeLimits {
         nodes: 20,

@@ -1,4 +1,4 @@
-//! `PGen` against all orders tried one after the other.
+//! `PGen`, compared with the enumeration of all orders.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -23,11 +23,11 @@ use rand_chacha::ChaCha8Rng;
 use twin::random::{Case, Taste, case, failing_in_time, in_time, with_failing_ends};
 
 struct Compared {
-    /// In the best order, happenings need each other at one moment.
+    /// The best order contains happenings that need each other at one moment.
     is_joined: bool,
     /// The best order has more than one happening.
     is_long: bool,
-    /// An order was found though the search was cut short at once.
+    /// An order was found although the search was interrupted at once.
     is_hasty: bool,
 }
 
@@ -44,7 +44,8 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
         .unwrap();
     let orders = twin::orders::all(case, semantics, &search);
     let best = twin::orders::best(&orders, true);
-    // By itself, or where effects fail, a fact may change in favour of happenings that come at one moment without need.
+    // Spontaneous changes, or failures of effects, may help happenings that come at one moment
+    // although they do not need each other.
     let apart = twin::orders::best(&orders, false).map_or(0.0, |(best, _)| best);
     let is_certain = case.likelihoods.defaults.effect == Some(1.0);
     let is_steady = is_certain
@@ -76,7 +77,7 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
             if is_best {
                 assert_eq!(order.sequence.len(), shortest, "{words}\n{order:?}");
             }
-            // What is claimed of the order holds of it.
+            // The properties of the returned order are correct.
             let mut network = PrunedNetwork::new(search.model(), &case.circumstances).unwrap();
             network.push_all(order.into()).unwrap();
             assert!((network.success_probability().unwrap() - p).abs() < 1e-15);
@@ -99,7 +100,7 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
         }
         (found, best) => panic!("{found:?} is not {best:?}: {words}"),
     }
-    // A sequence to begin with changes nothing, but where the search is cut short at once.
+    // A given first sequence changes nothing, unless the search is interrupted at once.
     let plain = OrderSearch::new(search.model().clone(), search.settings().clone());
     let nodes = 0..search.model().plan().nodes.len();
     let first: Vec<NodeId> = nodes.map(NodeId::from).collect();
@@ -116,7 +117,7 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
         "{words}"
     );
     assert!(hasty <= best_known * (1.0 + 1e-9), "{words}");
-    // Asked again, it knows.
+    // The second query is answered from the cache.
     let again = search
         .best_order(&case.circumstances, &mut patient)
         .unwrap();
@@ -164,7 +165,7 @@ fn no_order_is_more_likely_to_succeed_than_the_one_found() {
         };
         compare(&case, settings.clone());
         settings.candidates = Candidates::Working;
-        // The twin knows what is nominal only of what is certain.
+        // The reference implementation determines nominal states from certain facts only.
         let running = std::mem::take(&mut case.circumstances.running);
         case.circumstances = Circumstances::initial(&case.task);
         case.circumstances.running = running;
@@ -174,7 +175,7 @@ fn no_order_is_more_likely_to_succeed_than_the_one_found() {
     assert!(hasty > 100, "{hasty} orders were there from the beginning");
 }
 
-/// Actions that make each other's conditions true, most of them at their start.
+/// Generates actions that make each other's conditions true, most of them at their start.
 fn coupled(rng: &mut ChaCha8Rng, has_numbers: bool, is_certain: bool) -> Case {
     let mut domain =
         "(define (domain d) (:predicates (f0) (f1) (f2) (d0) (d1) (d2)) (:functions (n))"
@@ -310,14 +311,15 @@ fn waiting_costs_where_facts_change_with_time_so_actions_stay_parallel() {
         [facts.whole]\nbecomes_false_per_second = 0.1\n";
     let likelihoods = likelihoods::read(text.as_bytes(), &task).unwrap();
     let found = search((task, plan), &likelihoods).order.unwrap();
-    // All three at once, a second each: who begins one after the other waits six seconds in all.
+    // All three at once take one second each. One after the other, the waiting times add up to six
+    // seconds.
     assert!(
         (found.probability - (-0.3_f64).exp()).abs() < 1e-12,
         "{found:?}"
     );
 }
 
-/// Lamps of one kind to be screwed in, in any order and also at once.
+/// Lamps of one kind that can be screwed in in any order, also simultaneously.
 fn lamps(count: usize) -> (Task, PartialOrderPlan) {
     let domain = "(define (domain lamps) (:types lamp)
         (:predicates (whole ?l - lamp) (lit ?l - lamp) (power))
@@ -338,14 +340,14 @@ fn lamps(count: usize) -> (Task, PartialOrderPlan) {
     shared::read_task(domain, &problem, &each("0: (screw l#) [1]\n"))
 }
 
-/// Everything about lamps is uncertain.
+/// Likelihoods that make all properties of lamps uncertain.
 fn frail(task: &Task) -> Likelihoods {
     let text = "format = \"elbowroom-likelihoods\"\nversion = 1
         [defaults]\nbecomes_true = 0.02\nbecomes_false = 0.03\nstart = 0.8\neffect = 0.9\n";
     likelihoods::read(text.as_bytes(), task).unwrap()
 }
 
-/// The best order of all, and how many sequences were looked at.
+/// Returns the best order, and the number of examined sequences.
 fn search((task, plan): (Task, PartialOrderPlan), likelihoods: &Likelihoods) -> Found {
     let initial = Circumstances::initial(&task);
     let model = Model::new(Arc::new(task), plan, likelihoods, Semantics::Paper).unwrap();
@@ -353,7 +355,7 @@ fn search((task, plan): (Task, PartialOrderPlan), likelihoods: &Likelihoods) -> 
     search.best_order(&initial, &mut patient).unwrap()
 }
 
-/// Where nothing is uncertain, every order is as likely and as long as the first.
+/// Without uncertainty, every order is as likely and as long as the first one.
 #[test]
 fn a_world_where_nothing_is_uncertain_is_not_searched() {
     let found = search(lamps(12), &Likelihoods::certain());
@@ -362,7 +364,7 @@ fn a_world_where_nothing_is_uncertain_is_not_searched() {
     assert!(found.sequences <= 25, "{} sequences", found.sequences);
 }
 
-/// Ten lamps of one kind have ten factorial orders that are equally likely.
+/// Ten lamps of one kind have 10! equally likely orders.
 #[test]
 fn many_instances_of_one_kind_are_searched_to_the_end() {
     let ten = lamps(10);
@@ -372,13 +374,13 @@ fn many_instances_of_one_kind_are_searched_to_the_end() {
     assert!(found.sequences < 2_000, "{} sequences", found.sequences);
 }
 
-/// Of orders that differ by which lamp is which only one is tried, and it is as good as all. So
-/// too when one of the three may be broken.
+/// Of orders that differ only in the choice of lamps, one is tried, and it is as good as the
+/// others. The same holds if one of the three lamps may be broken.
 #[test]
 fn of_instances_that_can_stand_for_each_other_one_is_tried() {
     for candidates in [Candidates::Working, Candidates::All] {
         for broken in [None, Some("(whole l1)")] {
-            // The twin knows what is nominal only of what is certain.
+            // The reference implementation determines nominal states from certain facts only.
             if broken.is_some() && candidates == Candidates::Working {
                 continue;
             }
@@ -408,7 +410,8 @@ fn of_instances_that_can_stand_for_each_other_one_is_tried() {
     }
 }
 
-/// The end would delete the goal's fact, and the start would make an over-all condition false, for other numbers.
+/// With other numbers, the end would delete the goal's fact, and the start would make an over-all
+/// condition false.
 #[test]
 fn effects_that_numbers_prevent_do_not_exclude_an_order() {
     for (effect, over_all) in [
@@ -474,7 +477,8 @@ fn comparison_of_undefined_fluent_does_not_hold() {
 
 #[test]
 fn duration_bounds_decide_on_orders() {
-    // The drive takes as long as is left: three seconds, after the stop that takes two of five.
+    // The duration of the drive is the remaining time: three seconds, after the stop that takes two
+    // of five.
     let domain = "(define (domain d) (:requirements :adl :durative-actions :numeric-fluents)
          (:predicates (p) (q)) (:functions (left))
          (:durative-action stop :parameters () :duration (= ?duration 1)

@@ -1,4 +1,4 @@
-//! `PExec`: what is next, as things stand.
+//! `PExec`: choice of the next happening.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -73,7 +73,7 @@ impl Desk {
         });
     }
 
-    /// What is next, in words; a star where a new order was needed.
+    /// Returns the next step in words; a star marks a new order.
     fn next(&mut self) -> String {
         match self.dispatch.choose(&self.now, &mut patient).unwrap() {
             Choice::GoalReached => "goal reached".to_owned(),
@@ -92,16 +92,16 @@ impl Desk {
 #[test]
 fn what_is_superfluous_is_skipped_and_what_failed_is_repeated() {
     let mut desk = Desk::new("(open)");
-    // Writing takes long; whether it comes first or second, the stamp can come off meanwhile.
+    // Writing takes long, so the stamp can come off in both orders.
     let first = desk.next();
     assert!(first.ends_with("* from 0"), "{first}");
-    // Someone else has written and stamped the letter: the lattermost layer fits.
+    // Another agent has written and stamped the letter, so the last layer fits.
     desk.believe("written", 1.0);
     desk.believe("stamped", 1.0);
     assert_eq!(desk.next(), "start of (post) from 0");
-    // The start failed: nothing has changed, so it is tried again.
+    // The start failed and nothing has changed, so it is tried again.
     assert_eq!(desk.next(), "start of (post) from 0");
-    // The stamp has come off. An earlier layer fits again.
+    // The stamp has come off, so an earlier layer fits again.
     desk.believe("stamped", 0.0);
     let next = desk.next();
     assert!(!next.contains('*') && !next.contains("post"), "{next}");
@@ -111,7 +111,7 @@ fn what_is_superfluous_is_skipped_and_what_failed_is_repeated() {
     desk.believe("stamped", 1.0);
     desk.start(2, 0);
     assert_eq!(desk.next(), "end of (post)* from 5");
-    // What is under way ends before the goal is declared.
+    // Running actions end before the goal is declared.
     desk.believe("posted", 1.0);
     assert_eq!(desk.next(), "end of (post)* from 5");
     desk.now.running.clear();
@@ -122,7 +122,7 @@ fn what_is_superfluous_is_skipped_and_what_failed_is_repeated() {
 fn an_end_that_the_order_does_not_have_asks_for_a_new_order() {
     let mut desk = Desk::new("(open) (written)");
     assert_eq!(desk.next(), "start of (stamp)* from 0");
-    // Someone has begun to write, though that is not in the order.
+    // The action `write` was started, though the order does not contain it.
     desk.start(0, 0);
     let next = desk.next();
     assert!(next.contains('*'), "{next}");

@@ -1,4 +1,4 @@
-//! The pruned network against worlds spelt out one by one.
+//! The pruned network, compared with the enumeration of all worlds.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -20,7 +20,7 @@ const FACTORED: Taste = Taste {
     numbers: true,
 };
 
-/// Pushes random orders, taking back some happenings on the way, and compares at each step.
+/// Pushes random orders, pops some happenings in between, and compares at each step.
 fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
     let model = Model::new(
         case.task.clone(),
@@ -41,7 +41,7 @@ fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
             &case.circumstances,
         );
         for (at, &node) in order.iter().enumerate() {
-            // There and back again.
+            // A push followed by a pop changes nothing.
             network.push(node).unwrap();
             network.success_probability().unwrap();
             network.pop();
@@ -76,7 +76,7 @@ fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
     possible
 }
 
-/// Compares random cases that `make` makes, under both semantics; how many steps were possible at all.
+/// Compares random cases from `make`, under both semantics. Returns the number of possible steps.
 fn possible_steps(seed: u64, mut make: impl FnMut(&mut ChaCha8Rng, usize) -> Case) -> usize {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut possible = 0;
@@ -89,7 +89,7 @@ fn possible_steps(seed: u64, mut make: impl FnMut(&mut ChaCha8Rng, usize) -> Cas
     possible
 }
 
-/// In every second round, conditions that couple facts.
+/// Returns features where, in every second round, conditions couple facts.
 fn coupled_now_and_then(round: usize) -> Taste {
     Taste {
         couples: round.is_multiple_of(2),

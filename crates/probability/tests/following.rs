@@ -1,4 +1,4 @@
-//! What is kept of an order between decisions leads to the same decisions as looking at everything anew.
+//! Cached data of an order leads to the same decisions as a computation from scratch.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -14,7 +14,7 @@ use elbowroom_probability::{
     SearchSettings, Semantics, TotalOrderPlan,
 };
 
-/// Numbers in a fixed order.
+/// Pseudorandom numbers.
 struct Dice(u64);
 
 impl Dice {
@@ -37,8 +37,8 @@ impl Dice {
 
 const FACTS: usize = 6;
 
-/// A random plan of a random domain, with a counter in some, and now and then with facts that change at
-/// times on the clock: often just for one of the actions.
+/// Generates a random plan of a random domain. Some have a counter, and some have facts that change
+/// at absolute times, often for just one of the actions.
 fn random_search(dice: &mut Dice) -> OrderSearch {
     let fact = |dice: &mut Dice| format!("(f{})", dice.below(FACTS));
     let has_number = dice.often(30);
@@ -119,7 +119,7 @@ fn random_search(dice: &mut Dice) -> OrderSearch {
     OrderSearch::new(model, SearchSettings::default())
 }
 
-/// Circumstances in which one of the layers fits, or nearly.
+/// Generates circumstances that fit one of the layers, or nearly.
 fn near_a_layer(dice: &mut Dice, search: &OrderSearch, order: &TotalOrderPlan) -> Circumstances {
     let model = search.model();
     let mut now = Circumstances::initial(model.task());
@@ -191,7 +191,7 @@ fn what_is_kept_of_an_order_says_what_looking_anew_says() {
             let is_over = now.running.is_empty()
                 && search.is_goal_settled(&now.now)
                 && goal_holds(search.model(), &now);
-            // A copy, so that both go on from the same order.
+            // A copy, so that both continue from the same order.
             let chosen = dispatch.clone().choose(&now, &mut patient).unwrap();
             let followed = dispatch.choose(&now, &mut patient).unwrap();
             assert_eq!(chosen, followed);

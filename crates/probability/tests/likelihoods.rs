@@ -1,4 +1,4 @@
-//! Likelihood files: what they mean, and what is said of mistakes.
+//! Likelihood files: their meaning, and messages about mistakes.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -62,7 +62,7 @@ fn the_more_specific_entry_counts() {
     let a = task.instantiate(shut, &[object("a")]).unwrap();
     let b = task.instantiate(shut, &[object("b")]).unwrap();
     assert_eq!(likelihoods.start(&a), Ok(0.75));
-    // Whoever asks for likelihoods need not know the format.
+    // `likelihoods::read` recognises the format.
     let known = elbowroom_probability::likelihoods::read(text.as_str(), &task);
     assert_eq!(known.unwrap(), likelihoods);
     assert_eq!(likelihoods.start(&b), Ok(0.5));
@@ -78,7 +78,7 @@ fn the_more_specific_entry_counts() {
             .to_string(),
         "0.3"
     );
-    // Written and read again, it is the same.
+    // Writing and reading preserves the likelihoods.
     let written = write(task.problem(), &likelihoods);
     assert_eq!(
         read(written.as_bytes(), &task).unwrap(),
@@ -114,11 +114,11 @@ fn rates_per_second_stand_beside_likelihoods_per_step() {
         let flips = [flip.becomes_true, flip.becomes_false];
         (flips, [rate.becomes_true, rate.becomes_false])
     };
-    // Who gives the rate of a second need not give the likelihood of a step.
+    // With a rate per second, the probability per step is optional.
     assert_eq!(said("(painted a)"), ([0.0, 0.0], [0.5, 0.25]));
     assert_eq!(said("(open a)"), ([0.0, 0.1], [0.0, 0.0]));
     assert_eq!(said("(open b)"), ([0.0, 0.1], [0.0, 2.0]));
-    // Maps do not change, whatever the defaults say.
+    // Maps do not change, whatever the defaults are.
     assert_eq!(said("(near a b)"), ([0.0, 0.0], [0.0, 0.0]));
     let written = write(task.problem(), &likelihoods);
     assert_eq!(
@@ -182,7 +182,7 @@ fn failures_after_the_start_leave_behind_what_the_file_says() {
         (0.5, 0.8)
     );
     assert!((likelihoods.lasts(&shut("a"), 2.0) - 0.8 * (-1.0_f64).exp()).abs() < 1e-15);
-    // First what is undone, then what becomes true, then what becomes false.
+    // Order: undone effects, facts that become true, facts that become false.
     assert_eq!(
         left("a"),
         [
@@ -200,7 +200,7 @@ fn failures_after_the_start_leave_behind_what_the_file_says() {
             leaves(0.75, ""),
         ]
     );
-    // What takes no time has no end, whatever the defaults say.
+    // An instantaneous action has no end, whatever the defaults are.
     let wait = task.problem().schema("wait").unwrap();
     let wait = task.instantiate(wait, &[]).unwrap();
     assert_eq!(
@@ -465,7 +465,7 @@ fn no_bytes_upset_the_readers() {
         for change in [0, 0xff, b'\n', b'"', b'#', b'[', b'%', 0xc3] {
             let mut changed = bytes.to_vec();
             changed[at] = change;
-            // Whatever they answer, they answer.
+            // The readers must not panic.
             let _ = read(&changed, &task).map_err(|errors| errors.to_string());
             let _ = read_authors(&changed, &task).map_err(|errors| errors.to_string());
             let _ = read(&changed[..at], &task);
@@ -477,7 +477,8 @@ fn no_bytes_upset_the_readers() {
 fn the_authors_files_say_the_same_in_our_format() {
     for world in shared::sf3().iter().chain(&shared::af3()) {
         let written = write(world.task.problem(), &world.likelihoods);
-        // They say nothing of actions from a machine to itself, which ours has to.
+        // The authors' file has no actions from a machine to itself, which Elbowroom's format
+        // requires.
         let default = "\n[defaults]\nstart = 0.0\neffect = 0.0\n\n[facts";
         let written = written.replacen("\n[facts", default, 1);
         let read = read(written.as_bytes(), &world.task).unwrap();

@@ -1,4 +1,4 @@
-//! The yardstick: closed forms, a plain recursion, and the authors' worlds.
+//! Optimal values, compared with closed forms, a plain recursion, and the authors' worlds.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -47,7 +47,7 @@ fn a_lone_action_is_tried_until_the_steps_run_out() {
     near(value(steps(1)), 0.0);
     near(value(steps(2)), 0.5 * 0.25);
     near(value(steps(3)), 0.75 * 0.25);
-    // Two starts and two ends; or one failed start more.
+    // Two starts and two ends; or one more failed start.
     let once = 0.5 + 0.25 + 0.125;
     near(value(steps(4)), once * 0.25 + 0.25 * 0.75 * 0.25);
     near(value(Settings::default()), 1.0);
@@ -114,20 +114,20 @@ fn the_optimum_is_that_of_a_plain_recursion() {
     assert!(dead_ends_matter > 20, "{dead_ends_matter}");
 }
 
-/// What of a run is left.
+/// Remaining resources of a run.
 #[derive(Clone, Copy, Debug)]
 struct Left {
     steps: usize,
-    /// How many steps that end in a dead end lose the run; `None`: no number of them.
+    /// Number of steps into a dead end that lose the run; `None`: unlimited.
     patience: Option<usize>,
 }
 
-/// Whether the goal can be reached if nothing goes wrong: by trying everything.
+/// Returns `true` if the goal cannot be reached without failures, by an exhaustive search.
 fn is_dead_end(case: &Case, state: &[bool], running: &[InstanceId]) -> bool {
     let mut open = vec![(state.to_vec(), running.to_vec())];
     let mut seen = open.clone();
     while let Some((state, running)) = open.pop() {
-        // What is under way can be let go.
+        // Running actions can be abandoned.
         if holds(case.task.goal(), &state) {
             return false;
         }
@@ -163,7 +163,7 @@ fn without(running: &[InstanceId], id: InstanceId) -> Vec<InstanceId> {
     others.collect()
 }
 
-/// The best chance of success with so much left.
+/// Returns the best probability of success with these remaining resources.
 fn best(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 {
     if running.is_empty() && holds(case.task.goal(), state) {
         return 1.0;
@@ -206,7 +206,7 @@ fn best(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 
     most
 }
 
-/// How things may stand after a failed end, by what the file format says.
+/// Returns the possible states after a failed end, by the definition of the file format.
 fn left_behind(
     case: &Case,
     action: &Action,
@@ -243,8 +243,8 @@ fn left_behind(
     states
 }
 
-/// The starts and ends that are possible: what each does, whose it is, and what is under way after
-/// it.
+/// Returns the possible starts and ends: the snap action, its instance, and the running actions
+/// after it.
 fn steps_from<'c>(
     case: &'c Case,
     state: &[bool],
@@ -267,7 +267,7 @@ fn steps_from<'c>(
     steps
 }
 
-/// The value after every fact has had its chance to change.
+/// Returns the value after spontaneous changes of all facts.
 fn perturbed(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 {
     let mut worlds = vec![(Vec::new(), 1.0)];
     for (fact, &is_true) in case.facts().zip(state) {
@@ -338,7 +338,7 @@ fn holds(condition: &Condition, state: &[bool]) -> bool {
     }
 }
 
-/// All actions for which the likelihoods have an entry, in no order.
+/// Returns all actions for which the likelihoods have an entry, without any order.
 fn everything(task: &Arc<Task>, likelihoods: &Likelihoods) -> (Arc<Task>, PartialOrderPlan) {
     let task = (**task).clone();
     let actions: Vec<_> = likelihoods
@@ -350,7 +350,7 @@ fn everything(task: &Arc<Task>, likelihoods: &Likelihoods) -> (Arc<Task>, Partia
     (Arc::new(task), plan)
 }
 
-/// What an agent does that asks for the best order before each happening.
+/// Returns the move of an agent that searches the best order before each happening.
 fn adaptable(dispatch: &mut LayerDispatch, circumstances: &Circumstances) -> Move {
     as_move(&dispatch.choose(circumstances, &mut patient).unwrap())
 }

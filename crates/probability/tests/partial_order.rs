@@ -1,4 +1,4 @@
-//! Which orderings of a plan are kept.
+//! Orderings of a plan that are kept.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -19,7 +19,7 @@ const DOMAIN: &str = "(define (domain d) (:types room)
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b - room)
     (:init (in a) (= (soap) 0) (= (size a) 4) (= (size b) 5)) (:goal (and (clean a) (clean b))))";
 
-/// `from -> to` for each interference link, in the words of instances and their ends.
+/// Returns `from -> to` for each interference link.
 fn interference(plan: &PartialOrderPlan) -> Vec<String> {
     let word = |node: elbowroom_plan::NodeId| format!("{:?}", plan.nodes[node.index()]);
     let links = plan.interference();
@@ -35,9 +35,9 @@ fn what_would_spoil_an_action_stays_after_it_and_what_enables_it_is_free() {
     assert_eq!(
         interference(&plan),
         [
-            // The soap that is used up in `b` is what `a` needed.
+            // Sweeping `b` uses soap that sweeping `a` needs.
             "Start((1)) -> Start((3))",
-            // Leaving `a` spoils sweeping it, and undoes nothing else.
+            // Leaving `a` invalidates sweeping it, and undoes nothing else.
             "End((1)) -> Start((2))",
         ]
     );

@@ -1,8 +1,7 @@
-//! The pruned network against exact inference by someone else: pgmpy, from the Python package
-//! index.
+//! The pruned network, compared with exact inference by the Python package pgmpy.
 //!
-//! Runs where `python3`, or the program that `ELBOWROOM_PYTHON` names, has pgmpy; says that it is
-//! skipped elsewhere.
+//! Runs if `python3`, or the program in `ELBOWROOM_PYTHON`, has pgmpy. Otherwise, reports that it
+//! is skipped.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -20,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use shared::skipped;
 use twin::random::{Case, Taste, case, order};
 
-/// Builds the network with all its nodes, unpruned, and asks for P(A) and P(A ∩ G).
+/// Builds the complete, unpruned network, and computes P(A) and P(A ∩ G).
 const SCRIPT: &str = r#"
 import itertools, json, sys
 from pgmpy.factors.discrete import TabularCPD
@@ -182,7 +181,7 @@ fn exact_inference_of_the_whole_network_gives_the_same() {
     );
 }
 
-/// The network as the script reads it; `None` for what the script does not know.
+/// Returns the network in the format of the script; `None` if it has unsupported features.
 fn described(case: &Case, order: &[NodeId]) -> Option<String> {
     let facts: Vec<FactId> = case.facts().collect();
     let joined = |parts: Vec<String>| format!("[{}]", parts.join(","));
@@ -259,7 +258,8 @@ fn described(case: &Case, order: &[NodeId]) -> Option<String> {
     ))
 }
 
-/// The literals of a conjunction, as `[fact, layer, truth]`, without the layer for the goal.
+/// Collects the literals of a conjunction, as `[fact, layer, truth]`, without the layer for the
+/// goal.
 fn literals(condition: &Condition, layer: usize, found: &mut Vec<String>) -> Option<()> {
     let mut note = |fact: FactId, truth: u8| {
         found.push(if layer == usize::MAX {

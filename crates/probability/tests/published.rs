@@ -1,4 +1,4 @@
-//! The authors' worlds: what their programs computed, where they computed it rightly.
+//! The authors' worlds, compared with the correct results of their programs.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
@@ -21,7 +21,7 @@ const AF3: [f64; 8] = [
 ];
 
 fn assert_published(world: &Published, probability: f64, published: f64) {
-    // The authors' numbers passed through 32-bit floats and were cut to four digits.
+    // The authors' numbers were rounded to 32-bit floats and cut to four digits.
     let error = (probability - published).abs();
     assert!(error < 6e-5, "{}: {probability}", world.name);
 }
@@ -80,7 +80,7 @@ fn an_order_may_count_on_luck_if_asked_to() {
     let Some(world) = worlds.get(8) else {
         return;
     };
-    // Machine 3 of p9 is maintained by someone else with probability 0.2 in each step.
+    // Another agent maintains machine 3 of p9 with probability 0.2 in each step.
     let settings = SearchSettings {
         candidates: Candidates::All,
         ..SearchSettings::default()

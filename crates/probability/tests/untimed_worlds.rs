@@ -1,5 +1,5 @@
-//! The optimum of random worlds without time, against a plain value iteration that shares nothing with it: the worlds
-//! are described once as numbers, and once as PDDL and likelihoods.
+//! The optimum of random worlds without time, compared with an independent value iteration: the
+//! worlds are described once as numbers, and once as PDDL and likelihoods.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::fmt::Write as _;
@@ -51,7 +51,7 @@ struct World {
     goal: Literals,
 }
 
-/// A random list of literals: each fact with probability `share`.
+/// Generates a random list of literals: each fact with probability `share`.
 fn literals(rng: &mut ChaCha8Rng, share: f64) -> Literals {
     let facts = 0..FACTS;
     let chosen = facts.filter_map(|fact| {
@@ -234,7 +234,7 @@ impl World {
         (task, likelihoods)
     }
 
-    /// The optimum as the library has it.
+    /// Returns the optimum computed by the library.
     fn optimum(&self, settings: &Settings) -> f64 {
         let (task, likelihoods) = self.task();
         let actions = all_actions_under(&task, &likelihoods).unwrap();
@@ -246,7 +246,7 @@ impl World {
     }
 }
 
-// The same by value iteration.
+// Independent value iteration.
 
 /// A state of the world, and the set of running actions, as bits.
 type Place = (usize, usize);
@@ -299,7 +299,7 @@ impl<'w> Iteration<'w> {
         iteration
     }
 
-    /// The steps that are possible, without abandoning.
+    /// Returns the possible steps, without abandoning.
     fn steps(&self, (state, running): Place) -> Vec<Step> {
         let actions = self.world.actions.iter().enumerate();
         let step = |(number, action): (usize, &ActionSpec)| {
@@ -312,7 +312,7 @@ impl<'w> Iteration<'w> {
         actions.filter_map(step).collect()
     }
 
-    /// The places after a step, before spontaneous changes.
+    /// Returns the places after a step, before spontaneous changes.
     fn after(&self, (state, running): Place, step: Step) -> Vec<(Place, f64)> {
         let (number, is_end) = match step {
             Step::Attempt(number) => (number, false),
@@ -363,7 +363,7 @@ impl<'w> Iteration<'w> {
         places
     }
 
-    /// Drops the actions whose condition over all does not hold, if that is the rule.
+    /// Abandons the actions whose over-all condition does not hold, if that is the rule.
     fn settled(&self, (state, running): Place) -> Place {
         if !self.enforces_over_all {
             return (state, running);
@@ -414,7 +414,7 @@ impl<'w> Iteration<'w> {
         }
     }
 
-    /// The optimum under a rule for dead ends.
+    /// Returns the optimum under a rule for dead ends.
     fn value(&self, dead_ends: DeadEnds) -> f64 {
         let layers = match dead_ends {
             DeadEnds::Patience(steps) => steps,
@@ -480,7 +480,8 @@ impl<'w> Iteration<'w> {
     }
 }
 
-/// Compares one world under all rules. Returns whether it begins in a dead end, and whether the goal is uncertain.
+/// Compares one world under all rules. Returns two flags: it begins in a dead end, and the goal is
+/// uncertain.
 fn compare(seed: u64) -> (bool, bool) {
     let world = world(&mut ChaCha8Rng::seed_from_u64(seed));
     let mut is_uncertain = false;
@@ -516,7 +517,7 @@ fn compare(seed: u64) -> (bool, bool) {
 #[test]
 fn optimum_of_random_worlds_equals_value_iteration() {
     let (mut dead_ends, mut uncertain_dead_ends, mut uncertain) = (0, 0, 0);
-    // By hand: `UNTIMED_WORLDS=5000`.
+    // For a longer run: `UNTIMED_WORLDS=5000`.
     let worlds = std::env::var("UNTIMED_WORLDS").ok();
     let worlds = worlds.map_or(60, |worlds| worlds.parse().unwrap());
     for seed in 0..worlds {

@@ -18,33 +18,33 @@ use crate::given::GivenPlan;
 use crate::sound::Endless;
 use crate::{claim, number, probability};
 
-/// Why nothing can be said of an answer, or what is wrong with it.
+/// Reason why an answer is not verified: there is nothing to check, or the answer is wrong.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnswerError {
-    /// It is no answer with a largest box.
+    /// The text is not an answer of `elbowroom envelope`.
     #[error("this is no answer of `elbowroom envelope --method best --json`: {0}")]
     Unreadable(#[from] serde_json::Error),
-    /// It is an answer of another format, which has no certificate.
+    /// The answer has another format, which has no certificate.
     #[error(
         "an answer of the format `{0}` has no certificate; only answers of `elbowroom envelope --method \
          best --json`, and of `elbowroom plan --json` that no plan exists, can be verified"
     )]
     OtherAnswer(String),
-    /// It is about no largest box.
+    /// The answer has no largest box.
     #[error(
         "the answer has no largest box, because it was made by another method, nothing may deviate, or \
          the plan does not work as planned; only answers of `elbowroom envelope --method best --json`, and \
          of `elbowroom plan --json` that no plan exists, can be verified"
     )]
     NoBox,
-    /// It has no certificate.
+    /// The answer has no certificate.
     #[error(
         "the answer has no certificate: its search was ended before it was done, or some ends could \
          not be told"
     )]
     NoCertificate,
-    /// Something in it is not so.
+    /// The check found a flaw.
     #[error(transparent)]
     Flaw(#[from] Flaw),
     /// The checker has no rule that derives the certificate from the files.
@@ -53,7 +53,8 @@ pub enum AnswerError {
 }
 
 impl AnswerError {
-    /// Returns `true` if nothing was found to be wrong, because there is nothing that can be checked, or no rule for it.
+    /// Returns `true` if the check found no flaw, but could not verify the answer: there is nothing
+    /// to check, or the checker has no rule for it.
     pub fn is_limit(&self) -> bool {
         !matches!(self, Self::Unreadable(_) | Self::Flaw(_))
     }
@@ -74,7 +75,7 @@ struct AnySettings {
     epsilon: Option<Number>,
 }
 
-/// The part of an answer with a largest box that the certificate is about.
+/// Part of an answer with a largest box that the certificate covers.
 #[derive(Deserialize)]
 struct Answer {
     domain: Option<String>,
@@ -166,7 +167,7 @@ fn is_near(decimal: f64, exact: &Rational) -> bool {
     (decimal - exact).abs() <= 4.0 * f64::EPSILON * exact.abs()
 }
 
-/// Returns `true` if each decimal anywhere in the answer is the one of the exact number beside it.
+/// Returns `true` if each decimal in the answer matches the exact number next to it.
 fn are_decimals_right(value: &Value) -> bool {
     match value {
         Value::Array(items) => items.iter().all(are_decimals_right),
@@ -223,8 +224,9 @@ pub fn verify_answer_of_network(
     verify_answer_in_world(text, task, Plan::Network(plan), None)
 }
 
-/// Distribution of the duration of an action in a world, from the action's name and its planned duration;
-/// `None` if it is always the planned one. The error says why a world's distribution cannot be compared.
+/// Distribution of the duration of an action in a world, from the action's name and its planned
+/// duration; `None` if it is always the planned one. The error is the reason why a world's
+/// distribution cannot be compared.
 pub type Distributions<'a> = &'a dyn Fn(&str, &Rational) -> Result<Option<chance::Chance>, String>;
 
 /// Checks as [`verify_answer_of`] does. For a box of the objective `probability` it also checks that the
@@ -349,10 +351,10 @@ fn initials(answer: &Answer, task: &Task) -> Result<BTreeMap<FluentId, usize>, A
     Ok(initials)
 }
 
-/// Checks the certificate of an answer, and that the answer says what it proves.
+/// Checks the certificate of an answer, and that the answer agrees with it.
 ///
 /// # Errors
-/// When the text is no such answer, or the first thing in it that is not so.
+/// The text is not such an answer, or the first flaw.
 pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
     let whole: Value = serde_json::from_str(text)?;
     let format = whole.get("format").and_then(Value::as_str);
@@ -412,8 +414,9 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
     Ok(verified)
 }
 
-/// Returns `true` if the answer encloses the probability of its box as the distributions of the certificate do, and
-/// no other answer has a probability. Its intervals are those of the certificate.
+/// Returns `true` if the answer's probability matches the enclosure that the certificate's
+/// distributions give for its box, with the certificate's intervals. An answer for another
+/// objective must not have a probability.
 fn is_likely_so(answer: &Answer, certificate: &Certificate, bound: &Rational) -> bool {
     let Some(told) = &answer.best.probability else {
         return answer.best.objective != Objective::Probability;
@@ -467,7 +470,7 @@ fn check_interval(
         let is_that = end.exact.parse::<Rational>().is_ok_and(|own| {
             own == value && end.decimal.is_none_or(|decimal| is_near(decimal, &value))
         });
-        // What reaches as far as counts, and is stopped by nothing, is infinite.
+        // An end is infinite if it is as far out as deviations are counted and no proof limits it.
         let is_endless = end.exact == endless && *slack == counted && !certificate.symmetric;
         let is_end = match &certificate.sound {
             None => is_that || is_endless,
@@ -489,7 +492,7 @@ fn check_interval(
     Ok(())
 }
 
-/// Returns an error that names `what` unless answer and certificate say the same of it.
+/// Returns an error that names `what`, unless answer and certificate agree on it.
 fn same(is_same: bool, what: &str) -> Result<(), Flaw> {
     let differs = || Flaw::Differs(what.to_owned());
     is_same.then_some(()).ok_or_else(differs)

@@ -4,18 +4,18 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-/// `constant + Σ factor · end`: ends are numbered, the lower one of parameter `p` is `2p`, the
-/// upper one `2p + 1`.
+/// `constant + Σ factor · end`. The ends are numbered: the lower end of parameter `p` is `2p`, the
+/// upper end is `2p + 1`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ends {
-    /// What depends on no end.
+    /// Constant term.
     pub constant: Rational,
-    /// What each end counts; none is zero.
+    /// Factor of each end; none is zero.
     pub factors: BTreeMap<usize, Rational>,
 }
 
 impl Ends {
-    /// A number.
+    /// Returns a constant sum.
     pub fn number(constant: Rational) -> Self {
         Self {
             constant,
@@ -23,7 +23,7 @@ impl Ends {
         }
     }
 
-    /// So many times an end.
+    /// Returns `factor · end`.
     pub fn end(end: usize, factor: i64) -> Self {
         Self {
             constant: Rational::ZERO,
@@ -39,7 +39,7 @@ impl Ends {
         }
     }
 
-    /// Lets an end count so many times more.
+    /// Adds `factor · end`.
     pub fn add(&mut self, end: usize, factor: &Rational) {
         let own = self.factors.entry(end).or_default();
         *own += factor;
@@ -48,7 +48,7 @@ impl Ends {
         }
     }
 
-    /// Whether a parameter occurs at both of its ends.
+    /// Returns `true` if some parameter occurs with both of its ends.
     pub fn tears(&self) -> bool {
         let ends: Vec<usize> = self.factors.keys().copied().collect();
         ends.windows(2).any(|pair| pair[0] / 2 == pair[1] / 2)

@@ -1,4 +1,4 @@
-//! What a certificate consists of (`docs/formats/certificate.md`).
+//! Data types of certificates (`docs/formats/certificate.md`).
 
 pub mod sound;
 
@@ -11,46 +11,46 @@ use sound::Sound;
 pub use crate::chance::{Chance, Shape, Touch};
 pub use crate::number::Exact;
 
-/// That no box inside an envelope is better than the one with these `slacks`.
+/// Proof that no box inside an envelope is better than the box with these `slacks`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Certificate {
-    /// What it proves, in words.
+    /// Claim of the certificate, in words.
     pub proves: String,
-    /// What it takes for granted, in words: each is to be known from elsewhere.
+    /// Assumptions of the certificate, in words. Each has to be established by other means.
     pub assumes: Vec<String>,
-    /// What is guaranteed inside the envelope.
+    /// Guarantee inside the envelope.
     pub guarantee: Guarantee,
-    /// What is left open.
+    /// Parameters: the quantities that are left open.
     pub parameters: Vec<Parameter>,
-    /// The time points, in words; the first is time zero, before which no other one comes.
+    /// Names of the time points. The first is time zero; no other point comes before it.
     pub points: Vec<String>,
     /// The constraints of the plan's network.
     pub constraints: Vec<Constraint>,
-    /// Whether both ends of an interval move together.
+    /// `true` if both ends of an interval move together.
     pub symmetric: bool,
-    /// Ends count up to a deviation of so many times the scale of their parameter.
+    /// Largest deviation of an end that counts, in multiples of its parameter's scale.
     #[serde(with = "number")]
     pub counted: Rational,
-    /// How far each variable moves its ends out from the nominal value: for each parameter its
-    /// lower end, then its upper end; or both, if these move together.
+    /// Deviation from the nominal value for each variable. Each parameter has one variable for its
+    /// lower end and one for its upper end, or a single one if both ends move together.
     pub slacks: Vec<Exact>,
     /// Proofs of inequalities in the ends of boxes.
     pub proofs: Vec<Proof>,
-    /// How it follows that no box is better.
+    /// Proof that no box is better.
     pub reasons: Reasons,
-    /// Why the box is inside the envelope; none if that is taken for granted.
+    /// Proof that the box is inside the envelope; `None` if this is assumed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sound: Option<Sound>,
 }
 
-/// What is guaranteed inside the envelope.
+/// Guarantee inside an envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Guarantee {
     /// For all values there is a schedule.
     Weak,
-    /// There is a strategy that learns the values as they come about.
+    /// There is a strategy that observes the values during execution.
     Dynamic,
     /// One schedule works for all values.
     Strong,
@@ -65,19 +65,19 @@ pub struct Parameter {
     /// Its value in the plan.
     #[serde(with = "number")]
     pub nominal: Rational,
-    /// The size by which its slack is measured.
+    /// Scale of the parameter. Slacks are compared as multiples of it.
     #[serde(with = "number")]
     pub scale: Rational,
-    /// What its width counts in the sum of widths.
+    /// Weight of its width in the sum of widths.
     #[serde(with = "number")]
     pub weight: Rational,
-    /// How far below the nominal value its lower end counts at most, where the proof uses that.
+    /// Largest deviation below the nominal value that counts, if the proof uses it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub most_below: Option<Exact>,
-    /// How far above it its upper end counts at most, where the proof uses that.
+    /// Largest deviation above the nominal value that counts, if the proof uses it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub most_above: Option<Exact>,
-    /// How it is distributed, for a probability; none if it always has its nominal value.
+    /// Distribution, for a probability; `None` if the parameter always has its nominal value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chance: Option<Chance>,
 }
@@ -94,7 +94,7 @@ pub struct Constraint {
     pub lower: Limit,
     /// The greatest difference.
     pub upper: Limit,
-    /// Whether the world decides on the difference, and shows it when `to` happens.
+    /// `true` if the world decides the difference, which is observed when `to` happens.
     pub observed: bool,
 }
 
@@ -110,25 +110,25 @@ pub enum Limit {
     Parameter(usize),
 }
 
-/// Why all boxes inside the envelope satisfy an inequality, or one of several.
+/// Proof that all boxes inside the envelope satisfy an inequality, or one of several.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Proof {
-    /// Bounds that follow each other in a circle, for an executor that knows all values.
+    /// Bounds that form a cycle, for an executor that knows all values.
     Cycle(Vec<Part>),
-    /// The same for times that are fixed in advance.
+    /// Bounds that form a cycle, for times that are fixed in advance.
     Fixed(Vec<Part>),
-    /// A semi-reducible cycle, for an executor that learns the values as they come about.
+    /// A semi-reducible cycle, for an executor that observes the values during execution.
     Semireducible {
-        /// All ways that it consists of; the parts of each mention only earlier ones.
+        /// All ways of the cycle. The parts of each refer only to earlier ways.
         ways: Vec<Way>,
-        /// The cycle: ways by position, each of which begins where the one before ends.
+        /// The cycle, as positions of ways. Each way begins where the previous one ends.
         cycle: Vec<usize>,
     },
-    /// No proof from the network: one of these sums is not negative because of something that the
-    /// network does not show.
+    /// No proof from the network: one of these sums is not negative, for a reason outside the
+    /// network.
     Assumed {
-        /// Why it holds, in words.
+        /// Reason, in words.
         why: String,
         /// The sums.
         sums: Vec<Sum>,
@@ -139,22 +139,22 @@ pub enum Proof {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sum {
-    /// What depends on no end.
+    /// Constant term.
     #[serde(with = "number")]
     pub constant: Rational,
-    /// What ends of intervals count.
+    /// Terms in ends of intervals.
     pub terms: Vec<Term>,
 }
 
-/// What an end of an interval counts in a [`Sum`].
+/// Term of a [`Sum`]: an end of an interval with its factor.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Term {
     /// The parameter, by position.
     pub parameter: usize,
-    /// Which end of its interval.
+    /// End of the interval.
     pub end: End,
-    /// How often it counts.
+    /// Factor.
     #[serde(with = "number")]
     pub factor: Rational,
 }
@@ -169,14 +169,14 @@ pub enum End {
     Upper,
 }
 
-/// Parts one after the other.
+/// Parts that follow each other, as one bound.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Way {
-    /// Each begins where the one before ends.
+    /// The parts. Each begins where the previous one ends.
     pub parts: Vec<Part>,
-    /// The way ends with the latest end of the duration of this constraint, and counts for at least
-    /// minus its shortest.
+    /// Position of the constraint whose duration ends the way at its latest time. The way counts
+    /// for at least minus the shortest duration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unlabelled: Option<usize>,
 }
@@ -196,35 +196,36 @@ pub enum Part {
     Early(usize),
     /// It is the longest: from its `to` to its `from`.
     Late(usize),
-    /// The way at this position, which counts as one bound. (Not the way itself: they are nested as
+    /// The way at this position, counted as one bound. (It is a position because ways are nested as
     /// deeply as a proof is long.)
     Way(usize),
 }
 
-/// How it follows from the inequalities that no box is better.
+/// Derivation from the inequalities that no box is better.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reasons {
-    /// No variable can have more slack, in relation to its scale, unless one with no more has less.
+    /// No variable can have more slack, in relation to its scale, unless another variable with at
+    /// most as much slack has less.
     LeastSlack(Vec<Stopped>),
-    /// The weighted sum of widths is at most so much in each of these cases, of which the first is
-    /// split into the others.
+    /// Upper bound of the weighted sum of widths in each of these cases. The first case is split
+    /// into the others.
     Widths(Vec<Case>),
-    /// The logarithm of the weighted product of widths is at most so much in each of these cases.
+    /// Upper bound of the logarithm of the weighted product of widths in each of these cases.
     Volume {
-        /// What is added to each width in relation to its scale.
+        /// Constant added to each width in relation to its scale.
         #[serde(with = "number")]
         foot: Rational,
-        /// The first is split into the others.
+        /// Cases; the first is split into the others.
         cases: Vec<Case>,
     },
-    /// The logarithm of the probability that all parameters are inside is at most so much in each of
-    /// these cases.
+    /// Upper bound of the logarithm of the probability that all parameters are inside the box, in
+    /// each of these cases.
     Probability(Vec<Case>),
 }
 
 impl Reasons {
-    /// The cases of a tree, if that is what follows.
+    /// Returns the cases; empty for [`Self::LeastSlack`].
     pub fn cases(&self) -> &[Case] {
         match self {
             Self::LeastSlack(_) => &[],
@@ -233,17 +234,18 @@ impl Reasons {
     }
 }
 
-/// Why a variable can have no more slack.
+/// Reason why a variable cannot have more slack.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stopped {
     /// The variable, by position in [`Certificate::slacks`].
     pub variable: usize,
-    /// The proof of what stops it, by position; none if it is as far out as counts.
+    /// Position of the proof that limits the variable; `None` if the variable is at its largest
+    /// counted deviation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proof: Option<usize>,
-    /// By how much each inequality of the proof is broken if no other variable has more slack than
-    /// this one; not negative.
+    /// Violation of each inequality of the proof when no other variable has more slack than this
+    /// one; not negative.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub over: Vec<Exact>,
 }
@@ -252,15 +254,14 @@ pub struct Stopped {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Case {
-    /// One of the inequalities of this proof holds: for each, the position of its case.
+    /// One of the inequalities of this proof holds. Each inequality has a case.
     Either {
         /// The proof, by position.
         proof: usize,
         /// The cases, by position.
         cases: Vec<usize>,
     },
-    /// The variable is less than a number, or not: where what it moves jumps to a greater
-    /// probability.
+    /// The variable is less than a number, or not. At this number, the probability jumps.
     Split {
         /// The variable, by position.
         variable: usize,
@@ -282,29 +283,29 @@ pub enum Case {
 pub struct Total {
     /// The inequalities.
     pub of: Vec<Multiplier>,
-    /// What their bounds add up to.
+    /// Sum of their bounds.
     #[serde(with = "number")]
     pub bound: Rational,
-    /// Where the objective is a product: what the width of each parameter counts in the sum, which
-    /// is the slope of a tangent of its logarithm. Where it is a probability: the same for the lower
-    /// end and the upper end of each parameter.
+    /// Slopes of the tangent of the objective's logarithm. For a product: the factor of each
+    /// parameter's width in the sum. For a probability: the factors of the lower end and of the
+    /// upper end of each parameter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub slopes: Vec<Exact>,
-    /// Where the objective is a probability: of each parameter where the tangent touches.
+    /// For a probability: the point of contact of the tangent, for each parameter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub touches: Vec<Touch>,
-    /// Where the objective is a probability: what its logarithm is at most, rounded up to 10^-18.
+    /// For a probability: the upper bound of its logarithm, rounded up to 10^-18.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub most: Option<Exact>,
 }
 
-/// An inequality, and how often it is added.
+/// An inequality with its multiplier.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Multiplier {
-    /// Which inequality.
+    /// The inequality.
     pub source: Source,
-    /// How often; not negative.
+    /// Multiplier; not negative.
     #[serde(with = "number")]
     pub factor: Rational,
 }
@@ -313,9 +314,9 @@ pub struct Multiplier {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
-    /// Of this proof, by position, the inequality at this position.
+    /// Inequality of a proof: position of the proof, position of the inequality in it.
     Row(usize, usize),
-    /// The variable at this position is at most as far out as counts.
+    /// The variable at this position is at most its largest counted deviation.
     Most(usize),
     /// The variable at this position is not negative.
     Least(usize),

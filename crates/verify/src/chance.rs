@@ -1,27 +1,28 @@
-//! Distributions in certificates, and where bounds on probabilities touch.
+//! Distributions in certificates, and points of contact of bounds on probabilities.
 
 use elbowroom_num::{Rational, chance};
 use serde::{Deserialize, Serialize};
 
 use crate::number::Exact;
 
-/// How a parameter is distributed: a density, cut at both sides, or a list of values.
+/// Distribution of a parameter: a density that is cut on both sides, or a list of values.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Chance {
-    /// The density, before it is cut.
+    /// Density before it is cut.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density: Option<Shape>,
-    /// Lesser values become this.
+    /// Minimum: lesser values become this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minimum: Option<Exact>,
-    /// Greater values become this.
+    /// Maximum: greater values become this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub maximum: Option<Exact>,
-    /// What values are rounded to multiples of; an interval counts as half of it longer at both ends.
+    /// Values are rounded to multiples of this resolution. An interval is extended by half of it at
+    /// both ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resolution: Option<Exact>,
-    /// Without a density: the values, all alike.
+    /// Equally likely values, if there is no density.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub values: Vec<Exact>,
 }
@@ -30,37 +31,37 @@ pub struct Chance {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub enum Shape {
-    /// All values between two numbers alike.
+    /// Constant density between two values.
     Uniform {
         /// The least value.
         from: Exact,
         /// The greatest value.
         to: Exact,
     },
-    /// Rises to the mode and falls after it.
+    /// Density that increases up to the mode and decreases after it.
     Triangular {
         /// The least value.
         from: Exact,
-        /// The likeliest value.
+        /// The mode.
         mode: Exact,
         /// The greatest value.
         to: Exact,
     },
-    /// Bell-shaped.
+    /// Normal distribution.
     Normal {
         /// The mean.
         mean: Exact,
         /// The standard deviation.
         deviation: Exact,
     },
-    /// `from`, and what an exponential distribution adds.
+    /// Exponential distribution, shifted by `from`.
     Exponential {
         /// The least value.
         from: Exact,
-        /// The mean of what is added.
+        /// Mean before the shift.
         mean: Exact,
     },
-    /// The logarithm is normal.
+    /// Lognormal distribution.
     Lognormal {
         /// The mean of the logarithm.
         location: Exact,
@@ -69,20 +70,20 @@ pub enum Shape {
     },
 }
 
-/// Where a linear bound on the logarithm of a probability touches, or nearly so.
+/// Point of contact of a linear bound on the logarithm of a probability, exact or approximate.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Touch {
-    /// At the interval whose ends are so far below and above the nominal value.
+    /// The interval with these deviations of its ends below and above the nominal value.
     At([Exact; 2]),
-    /// For a list of values: where the probability is this.
+    /// For a list of values: the probability at the point of contact.
     Mass(Exact),
-    /// Nowhere: no probability is more than 1.
+    /// No point of contact: the bound is that no probability exceeds 1.
     Nowhere,
 }
 
 impl Chance {
-    /// The same with numbers that can be reckoned with; `None` if it makes no sense.
+    /// Converts the distribution to a form for exact computation. Returns `None` if it is invalid.
     pub(crate) fn reckoned(&self) -> Option<chance::Chance> {
         let Some(shape) = &self.density else {
             let values = self.values.iter().map(|own| own.0.clone());

@@ -1,4 +1,4 @@
-//! That a certificate proves what it claims: [`verify`].
+//! Check that a certificate proves its claim: [`verify`].
 
 mod cases;
 
@@ -12,44 +12,46 @@ use crate::probability::{Chances, NEVER};
 use crate::sound::{Control, Sound};
 use crate::{claim, conditions, control, network, row, volume};
 
-/// What a certificate proves.
+/// Result of a successful check.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Verified {
-    /// What no box inside the envelope exceeds: the least slack as a share of the nominal value, the
-    /// weighted sum of widths, or of their logarithms.
+    /// Upper bound of the objective for all boxes inside the envelope: least slack as a share of
+    /// the nominal value, weighted sum of widths, or sum of their logarithms.
     pub bound: Rational,
-    /// A box counts as the best one if its value is at most so much below the bound: 0, or a
-    /// millionth where logarithms are only known between bounds.
+    /// Largest gap between value and bound for which the box counts as the best one: 0, or one
+    /// millionth if logarithms are only enclosed.
     pub tolerance: Rational,
-    /// The value of the box in the certificate.
+    /// Value of the box in the certificate.
     pub value: Rational,
-    /// The number of proofs of inequalities.
+    /// Number of proofs of inequalities.
     pub proofs: usize,
-    /// How many of these are not proved from the network, but taken from the certificate.
+    /// Number of these proofs that are assumed by the certificate instead of derived from the
+    /// network.
     pub assumed: usize,
-    /// The number of inequalities proved from conditions on numbers, derived from problem and plan.
+    /// Number of inequalities proved from conditions on numbers, derived from problem and plan.
     pub from_conditions: usize,
-    /// What is proved of the box being inside the envelope; none if that is taken for granted.
+    /// Result of the check that the box is inside the envelope; `None` if this is assumed.
     pub inside: Option<Inside>,
-    /// What is proved, in words.
+    /// Claim of the certificate, in words.
     pub proves: String,
-    /// What is taken for granted, in words.
+    /// Assumptions, in words.
     pub assumes: Vec<String>,
 }
 
-/// What is proved of the box being inside the envelope.
+/// Result of the check that the box is inside the envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inside {
-    /// Whether there are times for all points, as the guarantee demands; taken for granted otherwise.
+    /// `true` if it is proved that all points can be scheduled as the guarantee requires; assumed
+    /// otherwise.
     pub is_controllable: bool,
-    /// The number of conditions of the plan; none if all of them are taken for granted.
+    /// Number of conditions of the plan; `None` if all of them are assumed.
     pub conditions: Option<usize>,
-    /// How many of these are not proved to hold in the box, but only stated.
+    /// Number of these conditions that are assumed to hold in the box.
     pub assumed: usize,
 }
 
 impl Inside {
-    /// Whether nothing of it is taken for granted.
+    /// Returns `true` if nothing is assumed.
     pub fn is_proved(&self) -> bool {
         self.is_controllable && self.conditions.is_some() && self.assumed == 0
     }
@@ -64,7 +66,7 @@ struct Inequality {
 /// Checks a certificate.
 ///
 /// # Errors
-/// The first thing in it that is not so.
+/// The first flaw.
 pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
     let proves = claim::proves(certificate);
     let assumes = claim::assumes(certificate);
@@ -90,7 +92,7 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
             worth.ok_or(Flaw::Range("the volume of box", 0))?
         }
         Reasons::Probability(_) => {
-            // A bound below the least value would not bound this one.
+            // `NEVER` means no probability at all, so a bound must be above it.
             if bound <= Rational::from(NEVER) {
                 return Err(Flaw::Range("the probability of box", 0));
             }
@@ -115,7 +117,7 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
     })
 }
 
-/// What is proved of the box being inside the envelope; the rest is taken for granted.
+/// Returns the proof without the parts that fail the check. These parts become assumptions.
 fn proved(certificate: &Certificate, sound: &Sound) -> Result<Sound, Flaw> {
     let mut proved = sound.clone();
     let intervals = Intervals::new(certificate, &sound.endless)?;
@@ -130,7 +132,7 @@ fn proved(certificate: &Certificate, sound: &Sound) -> Result<Sound, Flaw> {
     Ok(proved)
 }
 
-/// Checks that the box is inside the envelope, as far as that is not taken for granted.
+/// Checks the proof that the box is inside the envelope. Assumed parts are skipped.
 fn inside_of(certificate: &Certificate, sound: &Sound) -> Result<Inside, Flaw> {
     let intervals = Intervals::new(certificate, &sound.endless)?;
     control::check(certificate, &intervals, &sound.control)?;
@@ -150,12 +152,13 @@ fn inside_of(certificate: &Certificate, sound: &Sound) -> Result<Inside, Flaw> {
     })
 }
 
-/// The certificate with what its inequalities add up to filled in ([`Stopped::over`],
-/// [`crate::certificate::Total::bound`]), and with what it proves and assumes, whatever it says there.
-/// What does not prove that the box is inside the envelope is taken away from it.
+/// Completes a certificate: fills in the sums of its inequalities ([`Stopped::over`],
+/// [`crate::certificate::Total::bound`]), its claim and its assumptions. Previous values are
+/// overwritten. Parts of the proof that the box is inside the envelope that fail the check become
+/// assumptions.
 ///
 /// # Errors
-/// When nothing can be added up. Whether the certificate proves anything is not asked.
+/// A sum cannot be computed. The result may still prove nothing.
 pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
     let checker = Checker::new(&certificate)?;
     let mut reasons = certificate.reasons.clone();
@@ -202,11 +205,11 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
 
 struct Checker<'a> {
     certificate: &'a Certificate,
-    /// How the parameters are distributed.
+    /// Distributions of the parameters.
     chances: Chances,
-    /// Of each proof the inequalities of which one holds.
+    /// For each proof its inequalities, at least one of them true.
     rows: Vec<Vec<Inequality>>,
-    /// Of each variable its slack, the size it is measured by, the most it can be, and its worth.
+    /// For each variable: slack, scale, upper limit of the slack, and weight in the sum of widths.
     slacks: Vec<Rational>,
     scales: Vec<Rational>,
     most: Vec<Option<Rational>>,
@@ -271,7 +274,7 @@ impl<'a> Checker<'a> {
         Ok(checker)
     }
 
-    /// That a sum of bounds is not negative, in terms of the variables.
+    /// Expresses in the variables that a sum of bounds is not negative.
     fn inequality(&self, sum: &Ends) -> Result<Inequality, Flaw> {
         let mut factors = vec![Rational::ZERO; self.slacks.len()];
         let mut bound = sum.constant.clone();
@@ -284,7 +287,8 @@ impl<'a> Checker<'a> {
             } else {
                 end
             };
-            // A lower end is the nominal value less the variable, an upper one that and more.
+            // A lower end is the nominal value minus the variable, an upper end the nominal value
+            // plus the variable.
             factors[variable] += &if end % 2 == 0 {
                 factor.clone()
             } else {
@@ -294,20 +298,20 @@ impl<'a> Checker<'a> {
         Ok(Inequality { factors, bound })
     }
 
-    /// The weighted sum of widths.
+    /// Returns the weighted sum of widths.
     fn worth(&self) -> Rational {
         let terms = self.worths.iter().zip(&self.slacks).map(|(w, s)| w * s);
         terms.sum()
     }
 
-    /// That a variable with more slack has to take some from one that has no more: the least slack
-    /// that follows.
+    /// Checks that more slack for one variable requires less slack for another one that has at most
+    /// as much, and returns the resulting least slack.
     ///
-    /// With the variables in the order of their slacks, let a box be at least as good. Its smallest
-    /// slack is then no less than the smallest here, so what stops those that have it here stops
-    /// them there; so its next one is no less than the next one here, and so on. Boxes inside the
-    /// envelope have their sub-boxes there, so it is enough that the box breaks the inequality in
-    /// which the others have no more than the variable that is stopped.
+    /// Order the variables by their slacks, and let another box be at least as good. Its smallest
+    /// slack is not less than the smallest one here, so the inequalities that limit these variables
+    /// here limit them there. Therefore its next slack is not less than the next one here, and so
+    /// on. Every sub-box of a box inside the envelope is inside as well, so it is sufficient that
+    /// the box violates the inequality when no other variable has more slack than the limited one.
     fn least_slack(&self, stopped: &[Stopped]) -> Result<Rational, Flaw> {
         let mut is_stopped = vec![false; self.slacks.len()];
         for (place, one) in stopped.iter().enumerate() {
@@ -348,7 +352,7 @@ impl<'a> Checker<'a> {
         Ok(least.unwrap_or_default())
     }
 
-    /// The slack of a variable in relation to its scale.
+    /// Returns the slack of a variable in relation to its scale.
     fn relative(&self, variable: usize) -> Result<Rational, Flaw> {
         let no_such = Flaw::NoSuch("variable", variable);
         let slack = self.slacks.get(variable).ok_or(no_such)?;
@@ -356,8 +360,8 @@ impl<'a> Checker<'a> {
         slack.ok_or(Flaw::Range("the scale of variable", variable))
     }
 
-    /// By how much each inequality of a proof is broken where no variable has more slack than this
-    /// one, in relation to its scale.
+    /// Returns by how much each inequality of a proof is violated when no variable has more slack,
+    /// in relation to its scale, than this one.
     fn over(&self, variable: usize, proof: usize) -> Result<Vec<Rational>, Flaw> {
         let rows = self.rows.get(proof).ok_or(Flaw::NoSuch("proof", proof))?;
         let level = self.relative(variable)?;
@@ -372,7 +376,7 @@ impl<'a> Checker<'a> {
         Ok(over.collect())
     }
 
-    /// The width of each parameter's interval.
+    /// Returns the width of each parameter's interval.
     fn widths_of_parameters(&self) -> impl Iterator<Item = (&'a Parameter, Rational)> {
         let parameters = self.certificate.parameters.iter().enumerate();
         parameters.map(|(index, parameter)| {
@@ -385,7 +389,7 @@ impl<'a> Checker<'a> {
         })
     }
 
-    /// That in each case the weighted sum of widths is at most a bound: the greatest of these.
+    /// Returns an upper bound of the weighted sum of widths: the greatest bound of the cases.
     fn widths(&self, cases: &[Case]) -> Result<Rational, Flaw> {
         self.cases(cases, &|total, factors, _| {
             let is_that =
@@ -395,8 +399,8 @@ impl<'a> Checker<'a> {
         })
     }
 
-    /// That in each case the logarithm of the product of widths is at most a bound: the greatest of
-    /// these.
+    /// Returns an upper bound of the logarithm of the product of widths: the greatest bound of the
+    /// cases.
     fn volume(&self, foot: &Rational, cases: &[Case]) -> Result<Rational, Flaw> {
         if !foot.is_positive() {
             return Err(Flaw::Range("foot", 0));
@@ -418,7 +422,7 @@ impl<'a> Checker<'a> {
         })
     }
 
-    /// That in each case the logarithm of the probability is at most a bound: the greatest of these.
+    /// Returns an upper bound of the logarithm of the probability: the greatest bound of the cases.
     fn probability(&self, cases: &[Case]) -> Result<Rational, Flaw> {
         self.cases(cases, &|total, factors, spans| {
             let bound = self.chances.bound(total, factors, spans)?;

@@ -1,9 +1,9 @@
-//! What a certificate proves and what it takes for granted, in words.
+//! Claims and assumptions of certificates, in words.
 
 use crate::certificate::{Certificate, Proof, Reasons};
 use crate::sound::{Condition, Control};
 
-/// What follows if the certificate is right.
+/// Returns the claim of a certificate.
 pub(crate) fn proves(certificate: &Certificate) -> String {
     let is_inside = certificate.sound.as_ref().is_some_and(|sound| {
         let conditions = sound.conditions.as_ref();
@@ -17,13 +17,13 @@ pub(crate) fn proves(certificate: &Certificate) -> String {
     }
 }
 
-/// The claim of a certificate without any assumption.
+/// Returns the claim of a certificate without any assumption.
 pub(crate) fn proves_all(certificate: &Certificate) -> String {
     let best = is_best(certificate);
     format!("the box is inside the envelope, and {best}")
 }
 
-/// That no box is better.
+/// Returns the claim that no box is better.
 fn is_best(certificate: &Certificate) -> &'static str {
     match certificate.reasons {
         Reasons::LeastSlack(_) => {
@@ -48,7 +48,7 @@ fn is_best(certificate: &Certificate) -> &'static str {
 pub(crate) const DISTRIBUTED: &str = "the parameters are independent of each other, each distributed as its `chance` \
                                       says, and one without it always at its nominal value";
 
-/// What has to be known from elsewhere, the same in all certificates first.
+/// Returns the assumptions of a certificate. Those of all certificates come first.
 pub(crate) fn assumes(certificate: &Certificate) -> Vec<String> {
     let mut assumes = is_inside(certificate);
     assumes.push("the time points and constraints are those of the plan".to_owned());
@@ -63,7 +63,7 @@ pub(crate) fn assumes(certificate: &Certificate) -> Vec<String> {
     assumes
 }
 
-/// What is taken for granted of the box being inside the envelope.
+/// Returns the assumptions of the claim that the box is inside the envelope.
 fn is_inside(certificate: &Certificate) -> Vec<String> {
     const CHECKED: &str = "(`elbowroom envelope --contains` checks that)";
     let Some(sound) = &certificate.sound else {

@@ -1,9 +1,9 @@
-//! That no condition of the plan can fail in a schedule for values in the box: [`check`].
+//! Check that no condition of the plan can fail in a schedule for values in the box: [`check`].
 //!
-//! Each way in which a condition could fail is a system of linear inequalities over times and
-//! values, together with the network's own bounds. A sum of these, none of them counted negatively,
-//! in which no time is left, and which comes out above zero for all values in the box, shows that the
-//! system has no solution (the easy half of Farkas' lemma).
+//! Each possible violation of a condition is a system of linear inequalities over times and values,
+//! together with the network's own bounds. A weighted sum of these with non-negative multipliers
+//! proves that the system has no solution if all times cancel and the sum is greater than zero for
+//! all values in the box (the easy half of Farkas' lemma).
 
 use std::collections::BTreeMap;
 
@@ -14,13 +14,13 @@ use crate::flaw::Flaw;
 use crate::intervals::Intervals;
 use crate::sound::{Condition, Difference, Failing, Ground, Inequality, Multiplied, Summand, Way};
 
-/// The limit on parameters of one way whose ends are combined.
+/// Largest number of parameters of one violation whose ends are combined.
 const MOST_CORNERS: usize = 8;
 
-/// Checks why a condition, at this position, cannot fail.
+/// Checks the proof that the condition at this position cannot fail.
 ///
 /// # Errors
-/// If it does not follow.
+/// The proof is not valid.
 pub(crate) fn check(
     certificate: &Certificate,
     intervals: &Intervals,
@@ -43,7 +43,7 @@ pub(crate) fn check(
     checker.cases(condition, differences)
 }
 
-/// One point comes before the other.
+/// Returns the difference that puts one point before the other.
 fn before(earlier: usize, later: usize) -> Difference {
     Difference {
         from: later,
@@ -56,9 +56,9 @@ fn before(earlier: usize, later: usize) -> Difference {
 struct Checker<'a> {
     certificate: &'a Certificate,
     intervals: &'a Intervals,
-    /// The position of the condition.
+    /// Position of the condition.
     index: usize,
-    /// The number of points, the moment included.
+    /// Number of points, including the moment.
     points: usize,
 }
 
@@ -67,7 +67,7 @@ impl Checker<'_> {
         Flaw::Condition(self.index)
     }
 
-    /// That the condition can fail in none of its cases.
+    /// Checks that the condition can fail in none of its cases.
     fn cases(&self, condition: &Condition, differences: Vec<Difference>) -> Result<(), Flaw> {
         let cases = &condition.cases;
         let mut is_seen = vec![false; cases.len()];
@@ -105,7 +105,7 @@ impl Checker<'_> {
         is_whole.then_some(()).ok_or_else(|| self.flaw())
     }
 
-    /// That a way to fail is not possible.
+    /// Checks that a violation is not possible.
     fn way(&self, way: &Way, known: &[Difference]) -> Result<(), Flaw> {
         let mut differences = known.to_vec();
         differences.extend(way.differences.iter().cloned());
@@ -126,10 +126,10 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// That products are decided at the corners: at most one inequality that the sums use has a
-    /// multiplied parameter in it, the network has none, and none is squared unless that is least
-    /// at an end. For fixed times and other values the inequality is then most easily satisfied with
-    /// the parameter at one of its ends.
+    /// Checks that it is sufficient to examine products at the corners. At most one inequality that
+    /// the sums use contains a multiplied parameter, the network contains none, and none is squared
+    /// unless its minimum is at an end. For fixed times and other values, the inequality is then
+    /// easiest to satisfy with the parameter at one of its ends.
     fn decides(&self, way: &Way) -> Result<(), Flaw> {
         let is_corner = |parameter: usize| way.corners.contains(&parameter);
         let in_network = self.certificate.constraints.iter().any(|own| {
@@ -174,7 +174,7 @@ impl Checker<'_> {
         is_decided.then_some(()).ok_or_else(|| self.flaw())
     }
 
-    /// That a sum shows that all of the differences and inequalities cannot be at once.
+    /// Checks that a sum contradicts the differences and inequalities.
     fn refutes(
         &self,
         sum: &[Summand],
@@ -222,7 +222,7 @@ impl Checker<'_> {
         follows.then_some(()).ok_or_else(|| self.flaw())
     }
 
-    /// Adds a bound of the network; whether there is one.
+    /// Adds a bound of the network. Returns `false` if there is none.
     fn bound(&self, total: &mut Total, index: usize, is_least: bool, factor: &Rational) -> bool {
         let Some(constraint) = self.certificate.constraints.get(index) else {
             return false;
@@ -262,13 +262,13 @@ impl Total {
         *self.values.entry(parameter).or_default() += factor;
     }
 
-    /// So many times the time of `to` less that of `from`.
+    /// Adds `factor` times the time of `to` minus that of `from`.
     fn difference(&mut self, from: usize, to: usize, factor: &Rational) {
         self.time(to, factor);
         self.time(from, &-factor);
     }
 
-    /// So many times an inequality, where the values that are multiplied are known.
+    /// Adds `factor` times an inequality. The values that are multiplied have to be fixed.
     fn inequality(
         &mut self,
         own: &Inequality,

@@ -1,4 +1,4 @@
-//! That there are times for all points, as the guarantee demands: [`check`].
+//! Check that all points can be scheduled, as the guarantee requires: [`check`].
 
 mod rules;
 mod strategy;
@@ -12,7 +12,7 @@ use crate::sound::Control;
 /// Checks the proof.
 ///
 /// # Errors
-/// The first thing in it that is not so.
+/// The first flaw.
 pub(crate) fn check(
     certificate: &Certificate,
     intervals: &Intervals,

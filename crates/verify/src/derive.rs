@@ -81,7 +81,7 @@ use subject::Subject;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotDerived {
-    /// It is about something else.
+    /// The certificate does not match the plan.
     #[error(transparent)]
     Flaw(#[from] Flaw),
     /// The checker has no rule for this.
@@ -99,7 +99,7 @@ impl NotDerived {
     }
 }
 
-/// The plan that a certificate has to be about.
+/// The plan that a certificate has to match.
 #[derive(Clone, Copy, Debug)]
 pub enum Plan<'a> {
     /// Actions with fixed times.
@@ -151,7 +151,7 @@ pub(crate) fn check(
     }
     let course = Course::new(&subject)?;
     let places = Places::new(certificate);
-    // Times are not negative. Of the others, bounds alone occur in the network.
+    // Times are not negative. Other parameters occur in the network only as bounds.
     let is_bound = |parameter: usize| {
         let kind = given.as_ref().and_then(|given| given.kind(parameter));
         kind == Some(BOUND)
@@ -197,14 +197,14 @@ pub(crate) fn check(
         }
         known.push(failure);
     }
-    // Other decisions may be part of other plans that work. Conditions say nothing about boxes with these then.
+    // Plans with other decisions may be valid. Conditions then imply nothing about their boxes.
     let of_all_boxes = if histories.needs_decisions(&mut widest) {
         known.as_slice()
     } else {
         &[]
     };
     assumed(certificate, &numbers, [of_all_boxes, &refuted.separations])?;
-    // The certificate leaves out conditions that cannot fail whatever the times are.
+    // The certificate omits conditions that cannot fail at any times.
     let told = sound.conditions.as_ref().map_or(0, Vec::len);
     Ok(Derived {
         labels: labels::labels(&subject, &quantities),

@@ -6,16 +6,16 @@ use crate::certificate::{Certificate, End};
 use crate::flaw::Flaw;
 use crate::sound::Endless;
 
-/// For each parameter its least and its greatest value; `None` is infinite.
+/// Least and greatest value of each parameter; `None` is infinite.
 #[derive(Clone, Debug)]
 pub(crate) struct Intervals(Vec<[Option<Rational>; 2]>);
 
 impl Intervals {
-    /// The box that the slacks are of, with some ends infinite.
+    /// Returns the box with these slacks, with some ends infinite.
     ///
     /// # Errors
-    /// When an infinite end does not exist or is listed twice, slacks are missing, or a symmetric box has an infinite
-    /// end.
+    /// When an infinite end does not exist or is listed twice, slacks are missing, or a symmetric
+    /// box has an infinite end.
     pub(crate) fn new(certificate: &Certificate, endless: &[Endless]) -> Result<Self, Flaw> {
         let parameters = certificate.parameters.iter().enumerate();
         let intervals = parameters.map(|(index, own)| {
@@ -43,13 +43,14 @@ impl Intervals {
         Ok(Self(intervals))
     }
 
-    /// These values alone.
+    /// Returns the box that contains only these values.
     pub(crate) fn exactly(values: impl Iterator<Item = Rational>) -> Self {
         Self(values.map(|own| [Some(own.clone()), Some(own)]).collect())
     }
 
-    /// Those parameters for which `is_up` says so have at least their nominal value, or at most that, and the
-    /// others just that. None is negative, unless `is_signed` says so.
+    /// Returns a box around the nominal values. Each parameter ranges from its nominal value
+    /// upwards if `is_up` returns `Some(true)`, downwards for `Some(false)`, and is fixed
+    /// otherwise. Values are not negative unless `is_signed` is true.
     pub(crate) fn around_nominal(
         certificate: &Certificate,
         is_signed: &dyn Fn(usize) -> bool,
@@ -67,14 +68,14 @@ impl Intervals {
         Self(intervals.collect())
     }
 
-    /// All values of quantities that are not negative, unless `is_signed` says so.
+    /// Returns the box of all values; they are not negative unless `is_signed` is true.
     pub(crate) fn widest(certificate: &Certificate, is_signed: &dyn Fn(usize) -> bool) -> Self {
         let parameters = 0..certificate.parameters.len();
         let least = |own: usize| (!is_signed(own)).then_some(Rational::ZERO);
         Self(parameters.map(|own| [least(own), None]).collect())
     }
 
-    /// The ends of a parameter's interval.
+    /// Returns the ends of a parameter's interval.
     ///
     /// # Errors
     /// When there is no such parameter.
@@ -84,8 +85,8 @@ impl Intervals {
             .ok_or(Flaw::NoSuch("parameter", parameter))
     }
 
-    /// The same with a parameter at one of its ends; `None` if that is infinite, or there is no such
-    /// parameter.
+    /// Returns the box with a parameter fixed at one of its ends; `None` if the end is infinite, or
+    /// there is no such parameter.
     pub(crate) fn at_end(&self, parameter: usize, is_upper: bool) -> Option<Self> {
         let value = self.0.get(parameter)?[usize::from(is_upper)].clone()?;
         let mut narrowed = self.clone();
@@ -93,7 +94,7 @@ impl Intervals {
         Some(narrowed)
     }
 
-    /// The greatest value of `constant + Σ factor · value`; `None` if there is none.
+    /// Returns the greatest value of `constant + Σ factor · value`; `None` if it is unbounded.
     pub(crate) fn greatest<'a>(
         &self,
         constant: Rational,

@@ -1,32 +1,34 @@
-//! Checks, without any search, that a box is inside a robustness envelope, and that none is better; and
-//! that a problem has no plan ([`no_plan`]).
+//! Checks, without any search, that a box is inside a robustness envelope and that no box is
+//! better, and that a problem has no plan ([`no_plan`]).
 //!
-//! In: an answer of `elbowroom envelope --method best --json` ([`verify_answer`]), or its
-//! [`Certificate`] alone ([`verify`]). Out: what it proves ([`Verified`]), or the first thing in it
-//! that is not so ([`Flaw`]).
+//! Input: an answer of `elbowroom envelope --method best --json` ([`verify_answer`]), or its
+//! [`Certificate`] alone ([`verify`]). Output: the verified claim ([`Verified`]), or the first flaw
+//! ([`Flaw`]).
 //!
-//! A certificate holds the plan's temporal network, the box, *proofs* of linear inequalities that
-//! all boxes inside the envelope satisfy (each a cycle of the network's bounds), and how it follows
-//! from these that no box is better. The inequalities themselves are not in it: they are worked out
-//! here from the proofs ([`row`]). And it holds the reason why the box is inside ([`sound`]): times,
-//! rules for times or a closed network, by guarantee, and sums of bounds that refute each way in which
-//! a condition of the plan could fail. So there is nothing to believe but
+//! A certificate contains the plan's temporal network, the box, *proofs* of linear inequalities
+//! that all boxes inside the envelope satisfy (each a cycle of the network's bounds), and a
+//! derivation from these inequalities that no box is better. It does not contain the inequalities
+//! themselves: this crate computes them from the proofs ([`row`]). It also contains a proof that
+//! the box is inside ([`sound`]): times, rules for times or a closed network, depending on the
+//! guarantee, and sums of bounds that refute each possible violation of a condition of the plan.
+//! The verdict relies on two assumptions:
 //!
-//! - that the network and the conditions are those of the plan. With problem and plan,
-//!   [`verify_answer_of`] (or [`verify_answer_of_network`]) derives both and assumes nothing about them (`derive`),
-//! - the theorems that make the cycles conflicts (Vidal & Fargier 1999; Morris & Muscettola 2005;
-//!   Morris 2006), and a closed network one that can be controlled (Morris & Muscettola 2005), and that
-//!   a box inside the envelope has its sub-boxes there, too.
+//! - The network and the conditions are those of the plan. With problem and plan,
+//!   [`verify_answer_of`] (or [`verify_answer_of_network`]) derives both and assumes nothing about
+//!   them (`derive`).
+//! - The theorems about such networks hold: the cycles are conflicts (Vidal & Fargier 1999; Morris
+//!   & Muscettola 2005; Morris 2006), a closed network is controllable (Morris & Muscettola 2005),
+//!   and every sub-box of a box inside the envelope is inside as well.
 //!
-//! What the network does not show, such as cuts by conditions on numbers, is in it as an assumption with
-//! its reason in words; how many there are is part of the verdict.
+//! Facts that the network does not show, such as cuts by conditions on numbers, are assumptions in
+//! the certificate, with their reasons in words. The verdict includes their number.
 //!
-//! This crate knows exact numbers and what a planning problem means, and imports nothing that makes
-//! networks or searches.
+//! This crate depends on exact numbers and on the semantics of planning problems. It imports no
+//! crate that builds networks or searches.
 //!
-//! Work of 10 seconds has to end while a light burns, for 5. How far may both deviate if nobody
-//! knows in advance how long they take? By 20 %, and the certificate has the cycle of bounds that
-//! would be negative if it were more.
+//! Example: work of 10 seconds has to end while a light is on, for 5 seconds. By how much may both
+//! deviate if no duration is known in advance? By 20 %: the certificate contains the cycle of
+//! bounds that would be negative for more.
 //!
 //! ```
 //! use elbowroom_verify::{AnswerError, verify_answer};

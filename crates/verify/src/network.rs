@@ -1,4 +1,4 @@
-//! That a certificate's constraints are a network with durations that the world decides on.
+//! Check that a certificate's constraints form a network with observed durations.
 
 use elbowroom_num::Rational;
 
@@ -6,8 +6,8 @@ use crate::certificate::{Certificate, Constraint, Limit};
 use crate::flaw::Flaw;
 use crate::intervals::Intervals;
 
-/// For each point the observed constraint that ends there, in a certificate that
-/// [is well formed](is_well_formed).
+/// Returns, for each point, the observed constraint that ends there. The certificate has to be
+/// [well formed](is_well_formed).
 pub(crate) fn ended_by(certificate: &Certificate) -> Vec<Option<usize>> {
     let mut ended_by = vec![None; certificate.points.len()];
     for (index, constraint) in certificate.constraints.iter().enumerate() {
@@ -18,10 +18,11 @@ pub(crate) fn ended_by(certificate: &Certificate) -> Vec<Option<usize>> {
     ended_by
 }
 
-/// The least and the greatest value in the box of an observed difference; `None` is infinite.
+/// Returns the least and the greatest value in the box of an observed difference; `None` is
+/// infinite.
 ///
 /// # Errors
-/// When it is no duration: it may be negative, or has not one parameter for both its bounds.
+/// When it is not a duration: it may be negative, or its bounds are not the same parameter.
 pub(crate) fn duration(
     certificate: &Certificate,
     intervals: &Intervals,
@@ -37,15 +38,15 @@ pub(crate) fn duration(
     Ok((least.ok_or(Flaw::NotObserved(index))?, greatest.clone()))
 }
 
-/// Checks that constraints are about points that there are, and that observed ones are durations:
-/// each leads to a point of its own, not to time zero, and they follow each other in no circle. The
-/// theorems about such networks take that for granted.
+/// Checks that constraints refer to existing points, and that observed constraints are durations:
+/// each ends at a point of its own, not at time zero, and they form no cycle. The theorems about
+/// such networks assume these properties.
 ///
 /// # Errors
-/// The first constraint that is not so.
+/// The first constraint that violates them.
 pub(crate) fn is_well_formed(certificate: &Certificate) -> Result<(), Flaw> {
     let points = certificate.points.len();
-    // Of each point the observed constraint that ends there.
+    // For each point the observed constraint that ends there.
     let mut ended_by: Vec<Option<usize>> = vec![None; points];
     for (index, constraint) in certificate.constraints.iter().enumerate() {
         let &Constraint { from, to, .. } = constraint;

@@ -1,26 +1,29 @@
-//! That a problem has no plan: facts with the times before which they cannot be true.
+//! Check that a problem has no plan, by facts with lower bounds on the times at which they are
+//! true.
 //!
 //! The certificate ([`NoPlan`]) is an inductive invariant of the delete relaxation (as in Eriksson,
-//! Röger & Helmert, "Unsolvability certificates for classical planning", ICAPS 2017), here with times. It
-//! lists facts, each with a time before which it is
-//! not true in any course of events; what it does not list is never true. The checker
-//! ([`verify_no_plan`]) confirms that
+//! Röger & Helmert, "Unsolvability certificates for classical planning", ICAPS 2017), here with
+//! times. It lists facts, each with a time before which it is not true in any execution. Facts that
+//! are not listed are never true. The checker ([`verify_no_plan`]) confirms three properties:
 //!
-//! - what is true at time 0, and what timed initials make true, is listed, and no later than that;
-//! - each instance of an action brings about only what is listed, and none of it too early, if its
-//!   conditions are true no earlier than listed;
-//! - the goal needs something that is not listed, or that timed initials take away for good.
+//! - Facts that are true at time 0, or that timed initials make true, are listed, with a time that
+//!   is not later.
+//! - If the conditions of an action instance are true no earlier than listed, all facts that the
+//!   instance adds are listed, with times that are not later.
+//! - The goal needs a fact that is not listed, or that timed initials delete for good.
 //!
-//! So the first fact that breaks the list in a course of events would have to be brought about by
-//! something of which none of this is so. The start of an action is only held to what it reads when it
-//! starts, and to what nobody but timed initials makes true: its later conditions may come true by others
-//! that start at the same time. Its end is held to all.
+//! So in no execution there is a first fact that violates the list. The check of an action's start
+//! considers only conditions that the action reads at its start, and facts that only timed initials
+//! make true: other actions that start at the same time may establish the later conditions. The
+//! check of its end considers all conditions.
 //!
-//! Where that is not enough, a certificate has pairs that are never true together ([`pairs`]) or a closed
-//! set of states ([`closed`]) beside the list, which then only says which instances of actions count.
+//! Where the list is not sufficient, the certificate also has pairs that are never true together
+//! ([`pairs`]) or a closed set of states ([`closed`]). The list then only determines the instances
+//! of actions to consider.
 //!
-//! Instances are found by trying objects for parameters one after the other; there is no search for a
-//! list, nor any for plans. Whoever makes a certificate can use the same [`Instances`].
+//! Instances are found by trying objects for the parameters one after the other. The checker
+//! searches neither for a list nor for plans. Programs that generate certificates can use the same
+//! [`Instances`].
 
 mod beginning;
 pub mod closed;
@@ -48,13 +51,13 @@ use pairs::Structure;
 /// A predicate and its objects.
 pub type Fact = (PredicateId, Vec<ObjectId>);
 
-/// Facts, each with a time before which it is not true. What is not listed is never true.
+/// Facts, each with a time before which it is not true. A fact that is not listed is never true.
 pub type Reached = BTreeMap<Fact, Rational>;
 
-/// The certificate that a problem has no plan.
+/// Certificate that a problem has no plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NoPlan {
-    /// What it proves, in words.
+    /// Claim, in words.
     pub proves: String,
     /// The files that the problem was read from, as they were named: domain and problem.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -62,32 +65,35 @@ pub struct NoPlan {
     /// The least separation ε of interfering happenings that the proof uses. Only bounds on pairs need it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub epsilon: Option<Exact>,
-    /// The facts that can become true, by time. Facts that only timed initials change are not among
-    /// them: the problem says when these hold.
+    /// Facts that can become true, by time. Facts that only timed initials change are not listed,
+    /// because the problem determines their intervals.
     pub reached: Vec<Group>,
-    /// What is not true together before some time, if that is needed: see [`pairs`].
+    /// Pairs that are not true together before some time; see [`pairs`]. Empty if they are not
+    /// needed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub apart: Vec<Apart>,
-    /// States into one of which whatever happens leads, if that is needed: see [`closed`].
+    /// Closed set of states; see [`closed`]. `None` if it is not needed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub closed: Option<Closed>,
 }
 
-/// Pairs that are not true together before some time. Each names literals, `(at rover depot)` or
-/// `(not (at rover depot))`, and actions: `doing (drive rover depot)` says that it is under way,
-/// `begun (drive rover depot)` that one is that was so at the beginning, and `ended …` that it no longer is.
+/// Pairs that are not true together before some time. The elements are literals, `(at rover depot)`
+/// or `(not (at rover depot))`, and states of actions: `doing (drive rover depot)` for a running
+/// action, `begun (drive rover depot)` for one that was running initially and still is, and `ended
+/// …` for one that was running initially and has ended.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Apart {
-    /// The time; never, if there is none.
+    /// The time; `None`: the pairs are never true together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<Exact>,
-    /// Two that have not become true together before.
+    /// Two elements that have not become true together before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub together: Vec<[String; 2]>,
-    /// An action that has not started before, if the other has been true since its start.
+    /// An action that has not started before, if the second element has been true since its start.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub started: Vec<[String; 2]>,
-    /// An action, and what has not become true before while it was under way.
+    /// A running action, and an element that has not become true before while the action was
+    /// running.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub meanwhile: Vec<[String; 2]>,
 }
@@ -97,32 +103,32 @@ pub struct Apart {
 pub struct Group {
     /// The time.
     pub from: Exact,
-    /// The facts, as PDDL writes them.
+    /// Facts in PDDL notation.
     pub facts: Vec<String>,
 }
 
-/// What every certificate of this kind proves.
+/// Claim of every certificate without pairs or states.
 pub const PROVES: &str = "no plan exists: even if nothing that has become true were ever lost, the \
                           goal would not be reached";
 
-/// What a certificate with [`NoPlan::apart`] proves.
+/// Claim of a certificate with [`NoPlan::apart`].
 pub const PROVES_APART: &str = "no plan exists: what the goal needs is never true together";
 
-/// What a certificate with [`NoPlan::closed`] proves.
+/// Claim of a certificate with [`NoPlan::closed`].
 pub const PROVES_CLOSED: &str = "no plan exists: whatever happens leads into one of the listed states, and the \
                                  goal holds in none";
 
-/// The most instances of actions and tried objects that are looked at.
+/// Largest number of action instances and tried objects.
 pub const MOST_STEPS: u64 = 20_000_000;
 
-/// Why a certificate does not prove that there is no plan.
+/// Reason why a certificate does not prove that there is no plan.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoPlanFlaw {
-    /// It says something else than it proves.
+    /// The claim does not match the certificate.
     #[error("`proves` is not what the certificate proves")]
     Claim,
-    /// The problem has something that the checker does not know.
+    /// The problem has a feature that the checker does not support.
     #[error("the checker does not know {0}")]
     Unknown(&'static str),
     /// The problem has no such fact.
@@ -131,33 +137,33 @@ pub enum NoPlanFlaw {
     /// A fact is listed twice.
     #[error("`{0}` is listed twice")]
     Twice(String),
-    /// A fact can become true that is not listed, or is listed for later.
+    /// A fact that is not listed, or is listed for later, can become true.
     #[error("`{fact}` can be true at {time}, by {by}; the certificate says {said}")]
     Breach {
         /// The fact.
         fact: String,
-        /// How early.
+        /// Earliest time.
         time: String,
-        /// What brings it about.
+        /// Happening that makes it true.
         by: String,
-        /// What is listed.
+        /// Entry of the list.
         said: String,
     },
-    /// Two things can be true together though the certificate says that they are not.
+    /// Two elements can be true together earlier than the certificate claims.
     #[error("{pair} can be so earlier than the certificate says, by {by}")]
     Together {
-        /// What is true together.
+        /// The elements.
         pair: String,
-        /// What brings it about.
+        /// Happening that makes them true.
         by: String,
     },
-    /// Something leads out of the states.
+    /// A happening leads to a state that is not listed.
     #[error("something that can happen in {0} leads to a state that is not listed")]
     Leads(String),
-    /// The objects cannot change places.
+    /// Two objects are not interchangeable.
     #[error("`{0}` and `{1}` are not alike")]
     NotAlike(String, String),
-    /// The goal is not out of reach.
+    /// The list does not exclude the goal.
     #[error("according to the listed facts, the goal could be reached")]
     GoalInReach,
     /// There are too many instances of actions.
@@ -165,17 +171,17 @@ pub enum NoPlanFlaw {
     TooMany,
 }
 
-/// Why an answer has nothing to be checked.
+/// Reason why an answer has no certificate to check.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoPlanAnswerError {
-    /// It is no answer of `elbowroom plan`.
+    /// The text is not an answer of `elbowroom plan`.
     #[error("this is no answer of `elbowroom plan --json`: {0}")]
     Unreadable(#[from] serde_json::Error),
-    /// It does not say that there is no plan.
+    /// The answer does not claim that there is no plan.
     #[error("the answer does not say that no plan exists")]
     NotDenied,
-    /// It has no certificate.
+    /// The answer has no certificate.
     #[error("the answer has no certificate: {0}")]
     Uncertified(String),
 }
@@ -197,10 +203,10 @@ enum Format {
     Plan,
 }
 
-/// The certificate of an answer of `elbowroom plan --json`.
+/// Returns the certificate of an answer of `elbowroom plan --json`.
 ///
 /// # Errors
-/// When it has none.
+/// When the answer has none.
 pub fn certificate_of(answer: &str) -> Result<NoPlan, NoPlanAnswerError> {
     let answer: Answer = serde_json::from_str(answer)?;
     match (
@@ -221,15 +227,15 @@ pub fn certificate_of(answer: &str) -> Result<NoPlan, NoPlanAnswerError> {
 /// Checks that the certificate proves that the task has no plan.
 ///
 /// # Errors
-/// The first thing that is not so.
+/// The first flaw.
 pub fn verify_no_plan(task: &Task, certificate: &NoPlan) -> Result<(), NoPlanFlaw> {
     verify_no_plan_from(task, &Situation::initial(task), certificate)
 }
 
-/// Checks that the certificate proves that no plan goes on from the situation.
+/// Checks that the certificate proves that no plan exists from the situation.
 ///
 /// # Errors
-/// The first thing that is not so.
+/// The first flaw.
 pub fn verify_no_plan_from(
     task: &Task,
     situation: &Situation,
@@ -260,8 +266,9 @@ pub fn verify_no_plan_from(
     }
 }
 
-/// Returns a time before which the condition holds in no course of events from the situation, by the certificate's list
-/// of facts; `None` if it never holds. The goal of the task and the certificate's other parts do not count.
+/// Returns a time before which the condition holds in no execution from the situation, by the
+/// certificate's list of facts; `None` if it never holds. The goal of the task and the
+/// certificate's other parts are ignored.
 ///
 /// # Errors
 /// The first fact that can become true and is not listed, or is listed for later.
@@ -299,19 +306,19 @@ fn verified_list(
     Ok((instances, reached))
 }
 
-/// How a certificate proves that there is no plan.
+/// Method of a proof that there is no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// By the delete relaxation.
+    /// Delete relaxation.
     Reached,
-    /// By pairs.
+    /// Pairs that are never true together.
     Apart,
-    /// By a closed set of states.
+    /// Closed set of states.
     Closed,
 }
 
 impl Kind {
-    /// What certificates of this kind prove, in words.
+    /// Returns the claim of certificates of this kind, in words.
     pub fn proves(self) -> &'static str {
         match self {
             Self::Reached => PROVES,
@@ -322,7 +329,7 @@ impl Kind {
 }
 
 impl NoPlan {
-    /// How it proves that there is no plan.
+    /// Returns the method of the proof.
     pub fn kind(&self) -> Kind {
         if self.closed.is_some() {
             Kind::Closed
@@ -334,7 +341,7 @@ impl NoPlan {
     }
 }
 
-/// The certificate of a list of facts; whether it proves anything is another question.
+/// Returns the certificate for a list of facts, without checking that it proves anything.
 pub fn no_plan_certificate(task: &Task, reached: &Reached) -> NoPlan {
     let mut by_time: BTreeMap<&Rational, Vec<String>> = BTreeMap::new();
     for ((predicate, objects), from) in reached {
@@ -355,7 +362,7 @@ pub fn no_plan_certificate(task: &Task, reached: &Reached) -> NoPlan {
     }
 }
 
-/// The facts that the certificate lists.
+/// Returns the facts that the certificate lists.
 fn listed(task: &Task, certificate: &NoPlan) -> Result<Reached, NoPlanFlaw> {
     let mut reached = Reached::new();
     for group in &certificate.reached {
@@ -369,7 +376,8 @@ fn listed(task: &Task, certificate: &NoPlan) -> Result<Reached, NoPlanFlaw> {
     Ok(reached)
 }
 
-/// The fact of that name: `(name arg …)`, or `(= (name arg …) value)` of an object function.
+/// Returns the fact of that name: `(name arg …)`, or `(= (name arg …) value)` for an object
+/// function.
 fn fact(task: &Task, name: &str) -> Option<Fact> {
     let problem = task.problem();
     let is_bracket = |c: char| c == '(' || c == ')' || c.is_whitespace();

@@ -1,9 +1,9 @@
-//! That in no box all parameters are more likely inside: sums of linear bounds on logarithms of
-//! probabilities.
+//! Check that no box has a greater probability that all parameters are inside, by sums of linear
+//! bounds on logarithms of probabilities.
 //!
-//! The bounds are those of [`elbowroom_num::chance`]: the probability of an interval is log-concave in
-//! its ends for a log-concave density (Prékopa 1973), and what jumps is counted in full where a case
-//! does not exclude it.
+//! The bounds are those of [`elbowroom_num::chance`]: the probability of an interval is log-concave
+//! in its ends for a log-concave density (Prékopa 1973). A jump counts in full where a case does
+//! not exclude it.
 
 use elbowroom_num::chance::{Cell, Chance, Reach, Touch as Touching};
 use elbowroom_num::{Rational, enclosed};
@@ -11,32 +11,32 @@ use elbowroom_num::{Rational, enclosed};
 use crate::certificate::{Certificate, Exact, Total, Touch};
 use crate::flaw::Flaw;
 
-/// Value of a box without any probability, in place of the logarithm.
+/// Replaces the logarithm of the probability if a box has probability 0.
 pub(crate) const NEVER: i64 = -1_000_000;
 
-/// Between which numbers a variable lies in a case.
+/// Interval of a variable in a case.
 #[derive(Clone, Debug)]
 pub(crate) struct Span {
-    /// It is not less than this.
+    /// Lower bound.
     pub(crate) least: Rational,
-    /// It is not more than this, where that is known.
+    /// Upper bound, if known.
     pub(crate) far: Option<Rational>,
-    /// Whether it is less than that.
+    /// `true` if the upper bound is strict.
     pub(crate) is_open: bool,
 }
 
 /// The parameters with their distributions.
 pub(crate) struct Chances {
     own: Vec<Option<(Rational, Chance)>>,
-    /// Of each parameter the variables that move its ends.
+    /// For each parameter the variables that move its ends.
     ends: Vec<[usize; 2]>,
 }
 
 impl Chances {
-    /// Those of a certificate.
+    /// Reads the distributions of a certificate.
     ///
     /// # Errors
-    /// When a distribution makes no sense, or none is there.
+    /// When a distribution is invalid or missing.
     pub(crate) fn new(certificate: &Certificate) -> Result<Self, Flaw> {
         let own = certificate
             .parameters
@@ -64,8 +64,9 @@ impl Chances {
         })
     }
 
-    /// Between which numbers variables lie where there is any probability, and where they gain any. A
-    /// box outside of them has no probability, or no more than one inside of it that is not.
+    /// Restricts variables to the range where the box has a positive probability and where moving
+    /// an end increases it. A box outside this range has probability 0, or no more than some box
+    /// inside it.
     pub(crate) fn narrow(&self, spans: &mut [Span]) {
         let mut gains: Vec<Option<Option<Rational>>> = vec![None; spans.len()];
         for (own, ends) in self.own.iter().zip(&self.ends) {
@@ -78,7 +79,7 @@ impl Chances {
                 span.least = span.least.clone().max(least);
                 gains[variable] = Some(match gains[variable].take() {
                     None => most,
-                    // As long as one of the ends that it moves gains.
+                    // The range ends when none of the ends that the variable moves gains any more.
                     Some(other) => other.zip(most).map(|(one, other)| one.max(other)),
                 });
             }
@@ -90,7 +91,7 @@ impl Chances {
         }
     }
 
-    /// Whether a probability jumps as this variable reaches a number.
+    /// Returns `true` if a probability jumps when this variable reaches a number.
     pub(crate) fn jumps(&self, variable: usize, at: &Rational) -> bool {
         let all = self.own.iter().zip(&self.ends);
         let mut own = all.filter_map(|(own, ends)| Some((own.as_ref()?, ends)));
@@ -101,7 +102,8 @@ impl Chances {
         })
     }
 
-    /// The logarithm of the probability of a box, rounded down; [`NEVER`] if there is none, or less than that.
+    /// Returns the logarithm of the probability of a box, rounded down; [`NEVER`] if it is 0 or
+    /// below that.
     pub(crate) fn worth(&self, slacks: &[Rational]) -> Rational {
         let mut sum = Rational::ZERO;
         for (own, ends) in self.own.iter().zip(&self.ends) {
@@ -118,9 +120,9 @@ impl Chances {
         enclosed::billionths_below(&sum).max(Rational::from(NEVER))
     }
 
-    /// What that is at most, rounded up to 10^-18, in a case in which the ends, each times its slope, add
-    /// up to no more than the total; `None` if nothing follows. `factors` are what the variables count in
-    /// it.
+    /// Returns an upper bound of the logarithm of the probability, rounded up to 10^-18, in a case
+    /// where the sum of the ends, each times its slope, is limited by the total. Returns `None` if
+    /// nothing follows. `factors` are the factors of the variables in the sum.
     pub(crate) fn bound(
         &self,
         total: &Total,
@@ -168,7 +170,7 @@ pub(crate) fn enclosure(
     ends: impl Iterator<Item = [Option<Rational>; 2]>,
     bound: &Rational,
 ) -> Option<[Rational; 2]> {
-    /// Longer than any duration, for ends that are infinite.
+    /// Longer than any duration; replaces infinite ends.
     const EVER: i64 = 1_000_000_000_000;
     let mut least = Rational::ONE;
     for (parameter, [lower, upper]) in certificate.parameters.iter().zip(ends) {
@@ -188,7 +190,7 @@ pub(crate) fn enclosure(
     Some([least, enclosed::billionths_above(&most).min(Rational::ONE)])
 }
 
-/// The touch with its numbers; `None` if it is not in the cell.
+/// Returns the point of contact with its numbers; `None` if it is not in the cell.
 fn touching(touch: &Touch, cell: &Cell) -> Option<Touching> {
     Some(match touch {
         Touch::At([Exact(below), Exact(above)]) => {

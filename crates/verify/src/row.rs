@@ -1,4 +1,4 @@
-//! From a proof to what it proves: that one of some sums of bounds is not negative.
+//! Inequality that a proof establishes: one of some sums of bounds is not negative.
 
 use elbowroom_num::Rational;
 
@@ -6,13 +6,13 @@ use crate::bounds::Ends;
 use crate::certificate::{Certificate, Constraint, End, Guarantee, Limit, Part, Proof, Sum, Way};
 use crate::flaw::Flaw;
 
-/// The limit on the sums of one proof.
+/// Largest number of sums of one proof.
 const MOST_SUMS: usize = 256;
 
-/// Sums of which one is not negative in every box inside the envelope.
+/// Returns sums such that, in every box inside the envelope, at least one is not negative.
 ///
 /// # Errors
-/// When the proof proves nothing of the kind.
+/// When the proof is not valid.
 pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<Ends>, Flaw> {
     let reader = Reader {
         certificate,
@@ -31,7 +31,7 @@ pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<Ends>, Flaw>
         Proof::Fixed(_) | Proof::Semireducible { .. } => return Err(Flaw::WrongGuarantee),
         Proof::Assumed { sums, .. } => sums.iter().map(stated).collect(),
     };
-    // Each once, so that alternatives have their positions.
+    // Duplicates are removed, so that alternatives have definite positions.
     let mut each: Vec<Ends> = Vec::new();
     for sum in sums.drain(..) {
         if !each.contains(&sum) {
@@ -41,7 +41,7 @@ pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<Ends>, Flaw>
     Ok(each)
 }
 
-/// A sum as the certificate has it.
+/// Converts a sum of the certificate.
 fn stated(sum: &Sum) -> Ends {
     let mut ends = Ends::number(sum.constant.clone());
     for term in &sum.terms {
@@ -53,7 +53,7 @@ fn stated(sum: &Sum) -> Ends {
 
 struct Reader<'a> {
     certificate: &'a Certificate,
-    /// What parts of the proof mention by position.
+    /// Ways that parts of the proof refer to by position.
     ways: &'a [Way],
 }
 
@@ -62,7 +62,7 @@ impl Reader<'_> {
         self.ways.get(index).ok_or(Flaw::NoSuch("way", index))
     }
 
-    /// That each way is mentioned once, by the cycle or by a later way.
+    /// Checks that each way is mentioned once, by the cycle or by a later way.
     fn is_tree(&self, cycle: &[usize]) -> Result<(), Flaw> {
         let mut is_mentioned = vec![false; self.ways.len()];
         let inner = self.ways.iter().enumerate().flat_map(|(place, way)| {
@@ -85,7 +85,7 @@ impl Reader<'_> {
         constraint.ok_or(Flaw::NoSuch("constraint", index))
     }
 
-    /// A constraint whose difference the world decides on, and its parameter.
+    /// Returns an observed constraint and its parameter.
     fn observed(&self, index: usize) -> Result<(&Constraint, usize), Flaw> {
         let constraint = self.constraint(index)?;
         match (&constraint.lower, &constraint.upper) {
@@ -98,7 +98,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Where a part of a way leads from and to.
+    /// Returns the first and the last point of a part of a way.
     fn points(&self, part: &Part) -> Result<(usize, usize), Flaw> {
         Ok(match part {
             Part::Beginning(point) => (*point, 0),
@@ -114,7 +114,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Where parts lead from and to, each from where the one before ends.
+    /// Returns the first and the last point of consecutive parts.
     fn ends_of(&self, parts: &[Part]) -> Result<(usize, usize), Flaw> {
         let first = parts.first().ok_or(Flaw::Empty)?;
         let (begin, mut at) = self.points(first)?;
@@ -128,13 +128,14 @@ impl Reader<'_> {
         Ok((begin, at))
     }
 
-    /// That parts lead back to where they begin.
+    /// Checks that parts form a cycle.
     fn is_circle(&self, parts: &[Part]) -> Result<(), Flaw> {
         let (begin, end) = self.ends_of(parts)?;
         (begin == end).then_some(()).ok_or(Flaw::Broken)
     }
 
-    /// The sum of a cycle at the worst values: each parameter counts with one sign in all.
+    /// Returns the sum of a cycle at the worst values: each parameter counts with one sign in
+    /// total.
     fn cycle(&self, parts: &[Part]) -> Result<Ends, Flaw> {
         self.is_circle(parts)?;
         let count = self.certificate.parameters.len();
@@ -169,7 +170,7 @@ impl Reader<'_> {
         Ok(sum)
     }
 
-    /// A bound that has to be kept whatever its parameter is.
+    /// Returns a bound that has to hold for all values of its parameter.
     fn requirement(&self, part: &Part) -> Result<Ends, Flaw> {
         let (index, is_most) = match part {
             Part::Beginning(_) => return Ok(Ends::default()),
@@ -189,7 +190,7 @@ impl Reader<'_> {
         match limit {
             Limit::None => Err(Flaw::NoLimit),
             Limit::Number(number) => Ok(Ends::number(&number.0 * &Rational::from(sign))),
-            // An upper bound at its least value, a lower one at its greatest.
+            // An upper bound counts with its least value, a lower bound with its greatest value.
             Limit::Parameter(parameter) if *parameter < self.certificate.parameters.len() => {
                 Ok(Ends::end(2 * parameter + usize::from(!is_most), sign))
             }
@@ -197,8 +198,9 @@ impl Reader<'_> {
         }
     }
 
-    /// The durations between a point and the one, chosen by the executor, from which they count.
-    /// There is such a point: durations follow each other in no circle ([`crate::network`]).
+    /// Returns the latest preceding point that the executor schedules (or `point` itself), and the
+    /// durations from there to `point`. Such a point exists because observed durations form no
+    /// cycle ([`crate::network`]).
     fn chain(&self, point: usize) -> Result<(usize, Vec<usize>), Flaw> {
         let mut links = Vec::new();
         let mut root = point;
@@ -213,8 +215,8 @@ impl Reader<'_> {
         }
     }
 
-    /// The sum of a cycle of bounds between points that the executor chooses, each for the worst
-    /// durations between them and the points that it is about.
+    /// Returns the sum of a cycle of bounds between points that the executor schedules. Each bound
+    /// counts for the worst case of the durations between these points and the points of the bound.
     fn fixed(&self, parts: &[Part]) -> Result<Ends, Flaw> {
         let mut sum = Ends::default();
         let mut way: Option<(usize, usize)> = None;
@@ -247,8 +249,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Sums of a semi-reducible cycle: its own, and those of what has to be negative for it to be
-    /// one.
+    /// Returns the sums of a semi-reducible cycle: its own, and those that have to be negative for
+    /// the reduction rules to apply.
     fn semireducible(&self, cycle: &[usize]) -> Result<Vec<Ends>, Flaw> {
         let parts: Vec<Part> = cycle.iter().copied().map(Part::Way).collect();
         self.is_circle(&parts)?;
@@ -265,14 +267,14 @@ impl Reader<'_> {
             flat.add_sum(&self.flat(way)?);
         }
         if !flat.tears() {
-            // At these ends, one for each parameter, the network has no schedule at all.
+            // With each parameter at one of its ends, the network has no schedule at all.
             return Ok(vec![flat]);
         }
         legal.extend(total);
         Ok(legal)
     }
 
-    /// The sum of all bounds on a way, no wait being cut short.
+    /// Returns the sum of all bounds of a way, with all waits in full.
     fn flat(&self, way: &Way) -> Result<Ends, Flaw> {
         let mut sum = Ends::default();
         for part in &way.parts {
@@ -286,8 +288,8 @@ impl Reader<'_> {
         Ok(sum)
     }
 
-    /// What a way can be as long as: the greatest of these. Adds to `legal` what has to be negative
-    /// for the rules to apply.
+    /// Returns the possible lengths of a way; the greatest one counts. Adds to `legal` the sums
+    /// that have to be negative for the rules to apply.
     fn lengths(&self, way: &Way, legal: &mut Vec<Ends>) -> Result<Vec<Ends>, Flaw> {
         self.ends_of(&way.parts)?;
         let waits_for = match way.parts.last() {
@@ -298,7 +300,7 @@ impl Reader<'_> {
         for (place, part) in way.parts.iter().enumerate().rev() {
             let is_last = place + 1 == way.parts.len();
             let own = match part {
-                // Nothing may follow at the last place, and no wait may be for the same end.
+                // Another part must follow, and the way must not end with a wait for the same duration.
                 Part::Early(index) if !is_last && Some(*index) != waits_for => {
                     legal.extend(lengths.iter().cloned());
                     vec![Ends::end(2 * self.observed(*index)?.1, 1)]
@@ -332,13 +334,13 @@ impl Reader<'_> {
     }
 }
 
-/// All sums of one of these and one of those.
+/// Returns all sums of an element of each list.
 fn all_sums(mut some: Vec<Ends>, others: &[Ends]) -> Result<Vec<Ends>, Flaw> {
     if some.len() * others.len() > MOST_SUMS {
         return Err(Flaw::TooLong);
     }
     if let [other] = others {
-        // So it is nearly always, and a way may have thousands of parts.
+        // This is the usual case, and a way may have thousands of parts.
         for one in &mut some {
             one.add_sum(other);
         }

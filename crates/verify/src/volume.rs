@@ -1,15 +1,15 @@
-//! That no box has a greater product of widths: sums of tangents.
+//! Check that no box has a greater product of widths, by sums of tangents.
 //!
-//! `ln x <= ln(1/c) - 1 + c·x` for all positive `x` and `c`. So where the widths, each times a
-//! slope, add up to no more than a bound, the sum of their logarithms is no more than that of the
+//! `ln x <= ln(1/c) - 1 + c·x` for all positive `x` and `c`. So if the sum of the widths, each
+//! times a slope, is limited by a bound, the sum of their logarithms is limited by that of the
 //! tangents with these slopes.
 
 use elbowroom_num::{Rational, enclosed};
 
 use crate::certificate::{Exact, Parameter};
 
-/// What the widths of a box are worth, rounded down: `Σ weight · ln(width / scale + foot)`; `None`
-/// if that is not defined.
+/// Returns the objective value of the widths, rounded down: `Σ weight · ln(width / scale + foot)`;
+/// `None` if it is not defined.
 pub(crate) fn worth<'a>(
     foot: &Rational,
     widths: impl Iterator<Item = (&'a Parameter, Rational)>,
@@ -23,8 +23,8 @@ pub(crate) fn worth<'a>(
     Some(enclosed::billionths_below(&worth))
 }
 
-/// What that is at most, rounded up, in all boxes in which the widths, each times the slope of its
-/// parameter, add up to no more than `sum`; `None` if nothing follows.
+/// Returns an upper bound of the objective, rounded up, for all boxes whose widths, each times the
+/// slope of its parameter, have at most the sum `sum`. Returns `None` if nothing follows.
 pub(crate) fn bound(
     foot: &Rational,
     parameters: &[Parameter],

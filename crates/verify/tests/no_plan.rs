@@ -1,5 +1,6 @@
-//! Certificates that no plan exists: what is accepted is so, by a checker that walks along a grid of
-//! times, and by a planner that finds no plan; and a changed certificate is refused, or proves it still.
+//! Certificates that no plan exists. An independent checker on a time grid confirms accepted
+//! certificates, and a planner finds no plan. A modified certificate is either rejected or still a
+//! proof.
 
 #![allow(
     clippy::unwrap_used,
@@ -36,7 +37,7 @@ fn task(domain: &str, problem: &str) -> Task {
     }
 }
 
-/// All that is reached, as early as it is.
+/// Returns all reached facts with their earliest times.
 fn listed(task: &Task) -> Reached {
     let mut instances = Instances::of(task).unwrap();
     let mut reached = Reached::new();
@@ -72,7 +73,7 @@ fn has_plan(task: &Task) -> bool {
     matches!(answer, Answer::Plan { .. })
 }
 
-/// All certificates that differ from this one in one place, and some that differ in more.
+/// Returns all certificates that differ from this one in one place, and some that differ in more.
 fn changed(certificate: &NoPlan) -> Vec<NoPlan> {
     let mut all = Vec::new();
     for group in 0..certificate.reached.len() {
@@ -174,7 +175,7 @@ fn who_is_at_the_door_when_it_closes_does_not_get_in() {
         .map(|own| format!("{}: {}", own.from.0, own.facts.join(" ")))
         .collect();
     assert_eq!(times, ["0: (at home)", "4: (at bridge)", "7: (at gate)"]);
-    // The same list says nothing if the door closes later.
+    // The same list proves nothing if the door closes later.
     let later = door(9);
     assert!(matches!(
         verify_no_plan(&later, &certificate),
@@ -201,7 +202,7 @@ fn facts_are_those_of_the_problem_and_listed_once() {
     assert_eq!(verify_no_plan(&task, &twice), Err(home));
 }
 
-/// Two actions that need each other can start at the same time, though neither can be first.
+/// Two actions that need each other can start at the same time, although neither can start first.
 #[test]
 fn what_starts_together_is_not_out_of_reach() {
     let action = |name: &str, gives: &str, needs: &str| {
@@ -230,7 +231,7 @@ fn what_starts_together_is_not_out_of_reach() {
     ));
 }
 
-/// Whatever conditions and effects look like, a plan is never denied.
+/// A certificate is never accepted for a solvable problem, with various conditions and effects.
 #[test]
 fn no_plan_is_denied_that_rules_quantifiers_or_numbers_allow() {
     let solvable = [
@@ -259,7 +260,7 @@ fn no_plan_is_denied_that_rules_quantifiers_or_numbers_allow() {
                  (at start (increase (level) (rate)))))",
             "(:init (= (level) 0) (= (rate) 2)) (:goal (full))",
         ),
-        // What timed initials take away and give back.
+        // Facts that timed initials delete and add again.
         (
             "(:requirements :durative-actions :timed-initial-literals) (:predicates (light) (seen))
              (:durative-action look :parameters () :duration (= ?duration 6)

@@ -1,5 +1,5 @@
-//! Strategies that are accepted win: the check of controllability, which has no planning in it, is
-//! compared with a game that is played out in full, and with the search of another crate.
+//! Accepted strategies win: the check of controllability, which is independent of planning, is
+//! compared with an exhaustive game, and with the search of another crate.
 
 #![allow(
     clippy::unwrap_used,
@@ -20,7 +20,7 @@ use elbowroom_verify::{
 };
 use game::{Board, Random};
 
-/// A certificate about the network that proves nothing but, perhaps, that it is controllable.
+/// Returns a certificate about the network that proves at most that it is controllable.
 fn certificate(network: &UncertainNetwork<i64>, strategy: Strategy) -> Certificate {
     let requirements = network.requirements().constraints().iter();
     let mut constraints: Vec<Constraint> = requirements
@@ -85,7 +85,7 @@ fn is_accepted(network: &UncertainNetwork<i64>, strategy: &Strategy) -> bool {
     told.sound.unwrap().control != Control::Assumed
 }
 
-/// What the dispatchable form of a controllable network has beside the network.
+/// Returns the edges and waits that the dispatchable form of a controllable network adds.
 fn strategy_of(network: &UncertainNetwork<i64>) -> Option<Strategy> {
     let form = network.dynamic().ok()?;
     let mut given: BTreeMap<(usize, usize), i64> = BTreeMap::new();
@@ -121,7 +121,7 @@ fn strategy_of(network: &UncertainNetwork<i64>) -> Option<Strategy> {
         to,
         most: Rational::from(most),
     });
-    // Without limit is longest.
+    // A wait without limit is the longest.
     let mut longest: BTreeMap<(usize, usize), Option<i64>> = BTreeMap::new();
     for (node, link, delay) in form.waits_found() {
         let own = network.link(link);
@@ -142,7 +142,7 @@ fn strategy_of(network: &UncertainNetwork<i64>) -> Option<Strategy> {
     })
 }
 
-/// The same requirements, with links of other lengths, or none of them less.
+/// Returns the network with modified link durations and the same requirements.
 fn changed(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNetwork<i64> {
     let links = network.links().iter().map(|link| {
         let lower = (link.lower + random.whole(-2, 2)).max(0);
@@ -158,7 +158,7 @@ fn changed(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNet
     UncertainNetwork::new(network.requirements().clone(), links.collect()).unwrap()
 }
 
-/// The same network, with a link that may take for ever.
+/// Returns the network with a link of unbounded duration.
 fn without_end(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNetwork<i64> {
     let mut links = network.links().to_vec();
     if !links.is_empty() {
@@ -167,7 +167,7 @@ fn without_end(network: &UncertainNetwork<i64>, random: &mut Random) -> Uncertai
     }
     let mut requirements = elbowroom_stn::Network::with_nodes(network.requirements().node_count());
     for own in network.requirements().constraints() {
-        // A deadline for all would leave nothing.
+        // A deadline for all points would leave nothing to test.
         if own.from.index() != 0 {
             requirements.add(own.clone());
         }
@@ -216,7 +216,7 @@ fn a_strategy_that_is_accepted_for_another_network_wins_there_too() {
         };
         for _ in 0..10 {
             let other = changed(&board.network(), &mut random);
-            // Now and then a bound or a wait is changed as well.
+            // Sometimes a bound or a wait is modified.
             if let Some(edge) = strategy.edges.last_mut().filter(|_| random.below(3) == 0) {
                 edge.most += Rational::from(random.whole(-2, 2));
             }

@@ -1,14 +1,14 @@
-//! One stratum of facts that rest on each other, settled by counting.
+//! Evaluation of one stratum of mutually dependent facts by counting.
 //!
 //! The bodies of the rules, with negations moved to the leaves, are a circuit of gates. A gate
-//! counts the parts it still misses; what comes true is passed on once.
+//! counts the parts that it still needs. Each part that becomes true is propagated once.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use super::{Derivation, Derived, GroundRule, Moment, holds};
 use crate::ground::{Condition, FactId};
 
-/// Settles the facts of a stratum; those below it are settled already.
+/// Evaluates the facts of a stratum. The strata below it have been evaluated.
 pub(super) fn settle<F: Clone>(
     derivation: &Derivation,
     stratum: &[FactId],
@@ -32,8 +32,8 @@ pub(super) fn settle<F: Clone>(
         derived.holding[rule.head.index()] = true;
         is_new
     });
-    // Gates that still miss something now take parts that say nothing for granted: what comes
-    // through rests on one of these.
+    // From here on, undefined parts count as true. A rule whose gate is completed now depends on an
+    // undefined part.
     let unclear = std::mem::take(&mut circuit.unclear);
     circuit.run(unclear, |rule| {
         if derived.is_settled(rule.head) {
@@ -51,11 +51,11 @@ pub(super) fn settle<F: Clone>(
 #[derive(Default)]
 struct Circuit<'a> {
     gates: Vec<Gate<'a>>,
-    /// The gates that each fact of the stratum is a part of, as often as it is.
+    /// For each fact of the stratum, the gates that it is a part of, with multiplicity.
     watchers: BTreeMap<FactId, Vec<usize>>,
-    /// Gates with a part that is true, as often as they have one.
+    /// Gates with a true part, with multiplicity.
     certain: VecDeque<usize>,
-    /// Gates with a part that says nothing, as often as they have one.
+    /// Gates with an undefined part, with multiplicity.
     unclear: VecDeque<usize>,
 }
 
@@ -115,8 +115,8 @@ impl<'a> Circuit<'a> {
         }
     }
 
-    /// Counts one part for each entry of the queue, and passes on what comes through. `accept`
-    /// says whether a rule that comes through settles its head.
+    /// Counts one part for each entry of the queue, and propagates completed gates. `accept`
+    /// returns `true` if a completed rule determines its head.
     fn run(&mut self, mut queue: VecDeque<usize>, mut accept: impl FnMut(&GroundRule) -> bool) {
         while let Some(gate) = queue.pop_front() {
             let gate = &mut self.gates[gate];

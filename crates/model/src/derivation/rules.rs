@@ -1,4 +1,4 @@
-//! Ground rules, found by their heads.
+//! Ground rules, indexed by their heads.
 
 use std::collections::BTreeMap;
 use std::ops::{Deref, Range};
@@ -10,11 +10,11 @@ use crate::ground::{Condition, FactId};
 pub struct GroundRule {
     /// The derived fact.
     pub head: FactId,
-    /// When it holds.
+    /// Condition under which it holds.
     pub body: Condition,
 }
 
-/// Rules, in a list; those of one head stand together.
+/// List of rules. Rules with the same head are contiguous.
 #[derive(Clone, Debug, Default)]
 pub struct Rules {
     list: Vec<GroundRule>,
@@ -22,7 +22,7 @@ pub struct Rules {
 }
 
 impl Rules {
-    /// Adds all rules of a head that has none yet.
+    /// Adds all rules of a head that has no rules yet.
     pub(crate) fn add(&mut self, head: FactId, bodies: Vec<Condition>) {
         if bodies.is_empty() {
             return;
@@ -34,7 +34,7 @@ impl Rules {
         debug_assert!(before.is_none(), "the rules of a head come at once");
     }
 
-    /// The rules with this head; none for a basic fact.
+    /// Returns the rules with this head; none for a basic fact.
     pub fn of(&self, head: FactId) -> &[GroundRule] {
         match self.by_head.get(&head) {
             Some(range) => &self.list[range.clone()],
@@ -42,12 +42,12 @@ impl Rules {
         }
     }
 
-    /// Whether a rule has this head.
+    /// Returns `true` if a rule has this head.
     pub(crate) fn define(&self, fact: FactId) -> bool {
         self.by_head.contains_key(&fact)
     }
 
-    /// Each fact that has rules, once.
+    /// Returns each fact that has rules, once.
     pub(crate) fn heads(&self) -> impl ExactSizeIterator<Item = FactId> + '_ {
         self.by_head.keys().copied()
     }

@@ -1,22 +1,22 @@
-//! Which derived facts rest on each other: the strongly connected components of the rules.
+//! Strata of mutually dependent derived facts: the strongly connected components of the rules.
 
 use super::rules::Rules;
 use crate::ground::{Condition, FactId};
 
-/// Derived facts in strata: each stratum comes after those that its facts rest on, and the facts
-/// of one stratum rest on each other.
+/// Derived facts in strata. Each stratum comes after those that its facts depend on. The facts of
+/// one stratum depend on each other.
 #[derive(Clone, Debug)]
 pub(crate) struct Strata {
-    /// Stratum by stratum.
+    /// Facts, stratum by stratum.
     facts: Vec<FactId>,
-    /// Where in `facts` each stratum ends.
+    /// End of each stratum in `facts`.
     ends: Vec<usize>,
-    /// By position in the task's table: whether the fact rests on itself.
+    /// By position in the task's table: `true` if the fact depends on itself.
     is_recursive: Vec<bool>,
 }
 
 impl Strata {
-    /// `None` if a derived fact depends on its own negation.
+    /// Returns `None` if a derived fact depends on its own negation.
     pub(crate) fn of(rules: &Rules) -> Option<Self> {
         let heads: Vec<FactId> = rules.heads().collect();
         let edges = edges(rules, &heads);
@@ -52,7 +52,7 @@ impl Strata {
         Some(strata)
     }
 
-    /// The facts of each stratum; lower strata first.
+    /// Returns the facts of each stratum, lower strata first.
     pub(super) fn iter(&self) -> impl Iterator<Item = &[FactId]> {
         let starts = [0].into_iter().chain(self.ends.iter().copied());
         starts
@@ -60,12 +60,13 @@ impl Strata {
             .map(|(start, &end)| &self.facts[start..end])
     }
 
-    /// Whether the derived fact rests on itself, directly or through others of its stratum.
+    /// Returns `true` if the derived fact depends on itself, directly or through others of its
+    /// stratum.
     pub(super) fn is_recursive(&self, fact: FactId) -> bool {
         self.is_recursive[fact.index()]
     }
 
-    /// More than the highest position of a derived fact in the task's table.
+    /// Returns a number above the highest position of a derived fact in the task's table.
     pub(super) fn table_size(&self) -> usize {
         self.is_recursive.len()
     }
@@ -95,7 +96,7 @@ fn edges(rules: &Rules, heads: &[FactId]) -> Vec<Vec<Edge>> {
     heads.iter().map(edges_of).collect()
 }
 
-/// Calls `visit` for each fact with whether it stands under an even number of negations.
+/// Calls `visit` for each fact, with `true` if the number of negations around it is even.
 fn visit_signed(condition: &Condition, sign: bool, visit: &mut impl FnMut(FactId, bool)) {
     match condition {
         Condition::Fact(fact) => visit(*fact, sign),
@@ -109,20 +110,20 @@ fn visit_signed(condition: &Condition, sign: bool, visit: &mut impl FnMut(FactId
     }
 }
 
-/// The strongly connected components, each after those that its edges lead to.
+/// Returns the strongly connected components, each after those that its edges lead to.
 ///
-/// Tarjan, "Depth-First Search and Linear Graph Algorithms" (1972), with a stack of its own.
+/// Tarjan, "Depth-First Search and Linear Graph Algorithms" (1972), with an explicit stack.
 fn components(edges: &[Vec<Edge>]) -> Vec<Vec<usize>> {
     const UNSEEN: usize = usize::MAX;
     let mut components = Vec::new();
-    // When each node was first seen, and the earliest seen node known to be reachable from it
-    // whose component is still open.
+    // Time of the first visit of each node, and the earliest visited node known to be reachable
+    // from it whose component is still open.
     let mut seen = vec![UNSEEN; edges.len()];
     let mut lowest = vec![UNSEEN; edges.len()];
     let mut is_open = vec![false; edges.len()];
     let mut open = Vec::new();
     let mut clock = 0;
-    // The nodes being visited, with how many of their edges have been followed.
+    // Nodes on the current path, with the number of their edges that have been followed.
     let mut path: Vec<(usize, usize)> = Vec::new();
     for root in 0..edges.len() {
         if seen[root] == UNSEEN {
@@ -136,7 +137,7 @@ fn components(edges: &[Vec<Edge>]) -> Vec<Vec<usize>> {
                 is_open[node] = true;
                 open.push(node);
             } else {
-                // Back from the edge followed last.
+                // Returns from the edge followed last.
                 let to = edges[node][followed - 1].to;
                 if is_open[to] {
                     lowest[node] = lowest[node].min(lowest[to]);

@@ -1,4 +1,5 @@
-//! Strata and counting against relaxation and the naive fixpoint; long chains and wide cycles.
+//! Comparison of strata and counting with relaxation and the naive fixpoint; long chains and wide
+//! cycles.
 
 mod naive;
 
@@ -14,7 +15,7 @@ use crate::problem::{self, Atom, Comparison, Predicate, PredicateId, Problem, Sc
 use crate::task::Task;
 use crate::validate::{Settings, Verdict, validate};
 
-/// Facts 0 to 3 are basic: true, false, saying nothing, and saying nothing in another way.
+/// Facts 0 to 3 are basic: true, false, undefined, and undefined for another reason.
 const BASIC: u32 = 4;
 /// The facts after them, in groups of three that mostly negate lower groups only.
 const DERIVED: u32 = 9;
@@ -35,7 +36,7 @@ impl Moment<u32> for Basic {
     }
 }
 
-/// Bodies whose negated facts are below `negatable`.
+/// Generates bodies whose negated facts are below `negatable`.
 fn body(negatable: u32) -> impl Strategy<Value = Condition> {
     let fact = |number| Condition::Fact(FactId(number));
     let leaf = prop_oneof![
@@ -47,7 +48,7 @@ fn body(negatable: u32) -> impl Strategy<Value = Condition> {
         prop_oneof![
             parts.clone().prop_map(Condition::And),
             parts.clone().prop_map(Condition::Or),
-            // Nothing is negated twice over but for this.
+            // The only double negations.
             parts.prop_map(|parts| {
                 let negate = |part| Condition::Not(Box::new(part));
                 negate(Condition::Or(parts.into_iter().map(negate).collect()))
@@ -56,8 +57,8 @@ fn body(negatable: u32) -> impl Strategy<Value = Condition> {
     })
 }
 
-/// Rules for each derived fact; positive facts may lie above their group, so that some sets have a
-/// fact that rests on its own negation.
+/// Generates rules for each derived fact. Positive facts may be above their group, so that some
+/// rule sets have a fact that depends on its own negation.
 fn rule_sets() -> impl Strategy<Value = Rules> {
     let bodies_of = |head: u32| prop::collection::vec(body(BASIC + head / 3 * 3), 0..3);
     let all: Vec<_> = (0..DERIVED).map(bodies_of).collect();
@@ -104,8 +105,8 @@ fn of_two_faults_the_first_rule_names_its_own() {
     assert_eq!(derived.truth(FactId(4)), Err(3));
 }
 
-/// Predicate 0 is basic and true, the others are derived with one rule each; the action `go`
-/// needs predicate 0, the goal is `goal`.
+/// Validates a plan with the action `go`. Predicate 0 is basic and true, the others are derived
+/// with one rule each; `go` needs predicate 0, the goal is `goal`.
 fn verdict(bodies: Vec<problem::Condition>, goal: problem::Condition) -> Verdict {
     let predicates = (0..=bodies.len()).map(|number| Predicate {
         name: format!("p{number}"),
@@ -162,7 +163,7 @@ fn a_chain_of_a_hundred_thousand_rules_is_judged() {
 
 #[test]
 fn a_chain_in_the_other_direction_is_judged() {
-    // p1 <- p2, p2 <- p3, …, and the last rests on p0.
+    // p1 <- p2, p2 <- p3, …, and the last one depends on p0.
     let downwards = (2..=LENGTH).chain([0]).map(lifted).collect();
     assert!(verdict(downwards, lifted(1)).is_valid());
 }
@@ -176,8 +177,8 @@ fn a_ring_of_a_hundred_thousand_rules_supports_nothing() {
 
 #[test]
 fn reachability_on_a_grid_with_cycles_is_judged() {
-    // Each cell is reached from its neighbours in all directions, the last one from outside; a
-    // second grid behind it has no way in.
+    // Each cell is reached from its neighbours in all directions, the last one from outside. A
+    // second grid after it has no connection.
     let side = 50;
     let cells = side * side;
     let neighbours = |cell: usize| {

@@ -8,15 +8,15 @@ use crate::problem::{
     Body, Change, Condition, Effect, ObjectId, PredicateId, Problem, Term, TimedChange, Variable,
 };
 
-/// The facts that are the same in every state.
+/// Facts that are the same in every state.
 struct Static<'a> {
-    /// For each predicate, whether nothing changes it.
+    /// For each predicate, `true` if nothing changes it.
     is_static: Vec<bool>,
     initial: BTreeSet<(PredicateId, &'a [ObjectId])>,
 }
 
 impl Grounder<'_> {
-    /// All processes and events of the problem that may ever be at work or happen.
+    /// Grounds all processes and events of the problem that may ever be active or happen.
     pub(crate) fn autonomous(&mut self) -> Autonomous {
         let problem = self.problem;
         let mut ground = Autonomous::default();
@@ -45,7 +45,7 @@ impl Grounder<'_> {
         ground
     }
 
-    /// Calls `action` for each way to choose objects for the parameters that static facts allow.
+    /// Calls `action` for each choice of objects for the parameters that static facts allow.
     fn for_possible(
         &mut self,
         facts: &Static<'_>,
@@ -134,7 +134,8 @@ impl<'a> Static<'a> {
         }
     }
 
-    /// Whether a conjunct is false in every state, as far as the objects chosen tell.
+    /// Returns `true` if the bound parameters are sufficient to make the conjunct false in every
+    /// state.
     fn rule_out(&self, conjunct: &Condition, binding: &[ObjectId]) -> bool {
         let resolve = |term: &Term| match term {
             Term::Object(object) => Some(*object),

@@ -8,7 +8,7 @@ use crate::ground::{self, FactId, FluentId};
 use crate::problem::{ObjectId, PreferenceId};
 use crate::simplify::Constants;
 
-/// Knows of nothing that is the same in every state.
+/// No knowledge of constant facts or values.
 struct Unknowing;
 
 impl Constants for Unknowing {
@@ -31,7 +31,7 @@ pub(crate) struct SoftCondition {
 }
 
 impl Grounder<'_> {
-    /// All constraints of the problem, goal preferences among them.
+    /// Grounds all constraints of the problem, including goal preferences.
     pub(crate) fn constraints(&mut self) -> Constraints {
         let problem = self.problem;
         let mut ground = Constraints::default();
@@ -50,7 +50,7 @@ impl Grounder<'_> {
         match constraint {
             Constraint::Modal(modal) => {
                 let modal = self.modal(modal, binding);
-                // Of objects that are compared, many instances say nothing.
+                // Comparisons of objects make many instances trivial.
                 let is_kept = matches!(&modal, Modal::Always(c) if c.is_trivial());
                 if !is_kept {
                     ground.hard.push(modal);
@@ -88,7 +88,7 @@ impl Grounder<'_> {
         })
     }
 
-    /// The instances of a preference that an action with these arguments has.
+    /// Returns the instances of a preference for an action with these arguments.
     pub(crate) fn action_preference(
         &mut self,
         preference: &ActionPreference,

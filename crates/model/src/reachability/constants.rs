@@ -1,4 +1,4 @@
-//! What no reached action and no timed initial writes.
+//! Facts and values that no reached action and no timed initial writes.
 
 use elbowroom_num::Rational;
 
@@ -9,7 +9,7 @@ use crate::table::Table;
 use super::relaxation::Relaxation;
 use super::value::Value;
 
-/// Knowns given before, by position of the fact or fluent.
+/// Cached results, by position of the fact or fluent.
 #[derive(Default)]
 pub(super) struct Memory {
     facts: Vec<Known<bool>>,
@@ -26,8 +26,8 @@ enum Known<T> {
 
 /// The facts and fluents of a task that no reached event writes.
 ///
-/// A fact that is only ever made true when it is so already is not among them: whoever writes it
-/// may not do so at the moment at which it is read.
+/// A fact that is only added where it is already true counts as written: the action that adds it
+/// may not do so at the moment when it is read.
 pub(super) struct Unwritten<'u> {
     pub(super) table: &'u Table,
     pub(super) relaxation: &'u Relaxation<'u>,

@@ -1,4 +1,4 @@
-//! What the effects of a reached action bring about.
+//! Effects of reached actions.
 
 use std::ops::ControlFlow;
 
@@ -10,7 +10,7 @@ use super::fixpoint::Fixpoint;
 use super::waiting::Pending;
 use super::writes;
 
-/// An effect: its schema, one of the schema's lists, the position in it.
+/// An effect: its schema, one of the schema's lists, and its position in the list.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EffectId {
     schema: SchemaId,
@@ -18,7 +18,7 @@ pub(super) struct EffectId {
     position: usize,
 }
 
-/// The lists of effects that a schema has. An instantaneous action has only start effects.
+/// The lists of effects of a schema. An instantaneous action has only start effects.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum List {
     Start,
@@ -71,7 +71,7 @@ impl List {
 }
 
 impl Fixpoint<'_, '_> {
-    /// Applies all effects of the list that are possible now; the others will wait.
+    /// Applies all effects of the list that are possible now; the others are queued.
     pub(super) fn apply_effects(
         &mut self,
         schema: SchemaId,
@@ -112,7 +112,7 @@ impl Fixpoint<'_, '_> {
         ControlFlow::Continue(())
     }
 
-    /// Applies the effect if it is possible. Else answers what it waits for.
+    /// Applies the effect if it is possible. Otherwise returns the events that it waits for.
     pub(super) fn try_effect(
         &mut self,
         id: EffectId,

@@ -1,4 +1,4 @@
-//! What can come about: a fact becomes true, a fact becomes false, a number changes.
+//! Events of the relaxation: a fact becomes true, a fact becomes false, a number changes.
 
 use std::hash::Hash;
 
@@ -6,7 +6,7 @@ use indexmap::Equivalent;
 
 use crate::problem::{FunctionId, ObjectId, PredicateId};
 
-/// A kind of event, arguments aside.
+/// Kind of event, without arguments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Symbol {
     /// A fact of the predicate is true at some time.
@@ -17,16 +17,16 @@ pub(super) enum Symbol {
     Changed(FunctionId),
 }
 
-/// A kind of event with its arguments.
+/// An event: its kind with arguments.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Event {
     /// The symbol of the event.
     pub(super) symbol: Symbol,
-    /// To which fact or fluent.
+    /// Arguments of the fact or fluent.
     pub(super) arguments: Box<[ObjectId]>,
 }
 
-/// An [`Event`] to look up, without a box of its own.
+/// Key of an [`Event`] for look-ups, without an allocation.
 #[derive(Clone, Copy, Debug, Hash)]
 pub(super) struct EventKey<'a> {
     /// See [`Event::symbol`].
@@ -53,7 +53,7 @@ impl Equivalent<Event> for EventKey<'_> {
 /// A set of kinds of events.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Symbols {
-    /// True, false, changed; each by predicate or function.
+    /// Members of each kind (true, false, changed), by predicate or function.
     members: [Vec<bool>; 3],
 }
 

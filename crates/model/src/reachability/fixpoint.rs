@@ -1,9 +1,9 @@
-//! The least fixpoint: what can start, what can end, and what that brings about, until nothing is
-//! new.
+//! The least fixpoint: instances that can start, instances that can end, and the effects of both,
+//! until no new events are found.
 //!
-//! Each event is taken up once, in the order in which it was reached. It triggers the joins of the
-//! rules that it matches, and wakes what was waiting for it: a binding whose tests were not yet
-//! possible, a started action that could not yet end, a conditional effect.
+//! Each event is processed once, in the order of discovery. It triggers the joins of the rules that
+//! it matches, and retries entries that waited for it: bindings whose tests were not yet possible,
+//! started actions that could not yet end, and conditional effects.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -19,20 +19,20 @@ use super::rule::{Head, Rule};
 use super::waiting::{Pending, Ticket, WaitingRoom};
 use crate::hash::Set;
 
-/// The objects for a schema's parameters.
+/// Objects for a schema's parameters.
 pub(super) type Arguments = Box<[ObjectId]>;
 
 /// The reachable atoms and values.
 pub(super) struct Reachable<'a> {
     pub(super) relaxation: Relaxation<'a>,
-    /// The arguments with which each schema can start.
+    /// Arguments of the instances that can start, by schema.
     pub(super) instances: Vec<Set<Arguments>>,
-    /// For each of these instances, whether it can also end.
+    /// For each of these instances, `true` if it can also end.
     pub(super) can_end: Vec<Vec<bool>>,
 }
 
-/// Runs to the fixpoint, without the `banned` instances (for each schema). `None` if a limit was
-/// reached; `count` is told of each step, and breaks at the limit of steps.
+/// Computes the fixpoint without the `banned` instances (for each schema). Returns `None` if a
+/// limit was reached. `count` is called for each step, and breaks at the step limit.
 pub(super) fn fixpoint<'a>(
     relaxation: Relaxation<'a>,
     rules: &[Rule<'a>],
@@ -47,15 +47,15 @@ pub(super) fn fixpoint<'a>(
     }
 }
 
-/// The fixpoint on its way. Its methods break when a limit is reached.
+/// State of the computation. Its methods break when a limit is reached.
 pub(super) struct Fixpoint<'f, 'a> {
     reachable: Reachable<'a>,
     rules: &'f [Rule<'a>],
     banned: &'f [BTreeSet<Arguments>],
-    /// How many instances may still be found.
+    /// Number of further instances that may be found.
     room: usize,
     count: &'f mut dyn FnMut() -> ControlFlow<()>,
-    /// For each predicate, the rules' atoms that match its facts, static ones aside.
+    /// For each predicate, the rule atoms that match its facts, without static atoms.
     triggers: Vec<Vec<(usize, usize)>>,
     waiting: WaitingRoom,
 }
@@ -121,7 +121,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         ControlFlow::Continue(())
     }
 
-    /// Draws the new conclusions of a rule.
+    /// Derives the new conclusions of a rule.
     fn apply(&mut self, index: usize, trigger: Option<Trigger>) -> ControlFlow<()> {
         let rule = &self.rules[index];
         let mut possible: Set<Arguments> = Set::default();
@@ -184,7 +184,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         self.wait(blockers, || Pending::End(schema, index))
     }
 
-    /// Ends the instance if that is possible. Else answers what it waits for.
+    /// Ends the instance if that is possible. Otherwise returns the events that it waits for.
     fn try_to_end(&mut self, schema: SchemaId, index: usize) -> ControlFlow<(), Vec<Event>> {
         let relaxation = &self.reachable.relaxation;
         let mut binding = self.reachable.instances[schema.index()][index].to_vec();
@@ -216,7 +216,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         self.apply_effects(schema, List::End, &mut binding)
     }
 
-    /// Tries again what waited for an event that was reached just now.
+    /// Retries an entry that waited for an event which has just been reached.
     fn retry(&mut self, ticket: Ticket) -> ControlFlow<()> {
         self.count_step()?;
         let Some(pending) = self.waiting.get(ticket).cloned() else {
@@ -231,7 +231,8 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         ControlFlow::Continue(())
     }
 
-    /// Draws a rule's conclusion if its tests are possible. Else answers what it waits for.
+    /// Applies a rule's conclusion if its tests are possible. Otherwise returns the events that it
+    /// waits for.
     fn try_binding(&mut self, rule: usize, binding: &[ObjectId]) -> ControlFlow<(), Vec<Event>> {
         let rule = &self.rules[rule];
         let arguments = &binding[..rule.parameter_count];
@@ -245,7 +246,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         ControlFlow::Continue(blockers)
     }
 
-    /// Lets what is impossible wait for one of the blockers.
+    /// Queues an impossible conclusion until one of the blockers is reached.
     pub(super) fn wait(
         &mut self,
         blockers: Vec<Event>,
@@ -271,7 +272,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
 }
 
 impl Reachable<'_> {
-    /// Whether the conclusion is neither banned nor drawn already.
+    /// Returns `true` if the conclusion is neither banned nor known.
     fn is_new(&self, head: Head, arguments: &[ObjectId], banned: &[BTreeSet<Arguments>]) -> bool {
         match head {
             Head::Derived(predicate) => !self.relaxation.reached.is_ever_true(predicate, arguments),

@@ -1,7 +1,7 @@
-//! All bindings of a rule's variables for which its atoms are true facts: a backtracking join.
+//! Backtracking join: finds all bindings of a rule's variables for which its atoms are true facts.
 //!
-//! At each step the atom with the fewest facts that fit the binding so far is matched next, so
-//! that a contradiction shows early; static tests prune as soon as their variables are bound.
+//! Each step matches the atom with the fewest facts that fit the current binding, so that a
+//! contradiction is found early. Static tests prune as soon as their variables are bound.
 
 use std::ops::ControlFlow;
 
@@ -10,19 +10,19 @@ use crate::problem::{ObjectId, Term};
 use super::relaxation::Relaxation;
 use super::rule::{JoinAtom, Rule};
 
-/// The fact for which new bindings are asked: the rule's atom that it matches, and its position
+/// The fact whose new bindings are searched: the rule's atom that it matches, and its position
 /// among the events.
 ///
-/// Each binding is found for one fact only, the latest one that it needs: atoms before the
-/// trigger match only earlier facts, atoms after it none later.
+/// Each binding is found for one fact only, the latest one that it needs: atoms before the trigger
+/// match only earlier facts, atoms after it no later ones.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trigger {
     pub(super) atom: usize,
     pub(super) event: u32,
 }
 
-/// Calls `sink` for each binding until it breaks; breaks itself when `count`, which is told of each
-/// step, does.
+/// Calls `sink` for each binding until it breaks. Also breaks when `count`, which is called for
+/// each step, breaks.
 pub(super) fn join(
     rule: &Rule,
     relaxation: &Relaxation,
@@ -57,9 +57,9 @@ struct Join<'r, 'a> {
     trigger: Option<Trigger>,
     binding: Vec<ObjectId>,
     is_bound: Vec<bool>,
-    /// The bound variables in the order in which they were bound.
+    /// Bound variables, in the order of binding.
     trail: Vec<usize>,
-    /// Atoms not yet matched, in no order.
+    /// Atoms not yet matched, unordered.
     remaining: Vec<usize>,
     scratch: Vec<ObjectId>,
     count: &'r mut dyn FnMut() -> ControlFlow<()>,
@@ -70,12 +70,12 @@ struct Join<'r, 'a> {
 enum Candidates<'r> {
     /// All arguments are known: this fact only.
     One(u32),
-    /// The shortest list of the index; the other arguments are still to be compared.
+    /// The shortest list of the index. The other arguments have to be compared.
     Listed(&'r [u32]),
 }
 
 impl<'r> Join<'r, '_> {
-    /// Matches what remains.
+    /// Matches the remaining atoms.
     fn extend(&mut self) -> ControlFlow<()> {
         let Some((slot, candidates)) = self.most_selective() else {
             return self.enumerate();
@@ -93,7 +93,7 @@ impl<'r> Join<'r, '_> {
         ControlFlow::Continue(())
     }
 
-    /// The atom with the fewest candidates, as its position in `remaining`.
+    /// Returns the atom with the fewest candidates, as its position in `remaining`.
     fn most_selective(&mut self) -> Option<(usize, Candidates<'r>)> {
         let mut best: Option<(usize, Candidates<'r>)> = None;
         for (slot, &atom) in self.remaining.iter().enumerate() {
@@ -117,7 +117,7 @@ impl<'r> Join<'r, '_> {
         best
     }
 
-    /// Matches the atom with the fact, and goes on from there.
+    /// Matches the atom with the fact, and continues with the remaining atoms.
     fn match_fact(&mut self, atom: usize, event: u32) -> ControlFlow<()> {
         self.count_step()?;
         let rule = self.rule;
@@ -135,12 +135,12 @@ impl<'r> Join<'r, '_> {
         ControlFlow::Continue(())
     }
 
-    /// Keeps each binding from being found for several triggers.
+    /// Prevents that a binding is found for several triggers.
     fn is_in_time(&self, atom: usize, event: u32) -> bool {
         let Some(trigger) = self.trigger else {
             return true;
         };
-        // Facts of a static predicate never are triggers.
+        // Facts of a static predicate are never triggers.
         self.rule.atoms[atom].is_static
             || event < trigger.event
             || (event == trigger.event && atom >= trigger.atom)
@@ -172,19 +172,20 @@ impl<'r> Join<'r, '_> {
         }
     }
 
-    /// Whether the static tests hold that the bindings since `mark` make decidable.
+    /// Returns `true` if all static tests hold that became decidable with the bindings since
+    /// `mark`.
     fn static_tests_hold(&mut self, mark: usize) -> bool {
         let fresh = &self.trail[mark..];
         self.rule.static_tests.iter().all(|test| {
             let is_due = test.reads.iter().any(|variable| fresh.contains(variable))
                 && test.reads.iter().all(|&variable| self.is_bound[variable]);
-            // Static tests have no blockers to tell of.
+            // Static tests have no blockers.
             let none = &mut Vec::new();
             !is_due || test.is_possible(self.relaxation, &self.binding, &mut self.scratch, none)
         })
     }
 
-    /// Tries all objects for the variables that no atom has bound.
+    /// Tries all objects for the variables that no atom binds.
     fn enumerate(&mut self) -> ControlFlow<()> {
         let Some(variable) = self.is_bound.iter().position(|is_bound| !is_bound) else {
             return (self.sink)(&self.binding);
@@ -238,7 +239,7 @@ fn candidates<'r>(
             shortest = list;
         }
     }
-    // A short list is compared sooner than a fact is looked up.
+    // Comparing a short list is faster than looking up a fact.
     if known.len() < atom.terms.len() || shortest.len() <= 1 {
         return Candidates::Listed(shortest);
     }

@@ -5,16 +5,16 @@ use crate::problem::{FunctionId, ObjectId, PredicateId};
 use super::event::{Event, EventKey, Symbol};
 use crate::hash::Set;
 
-/// All events that can come about, in the order in which they were found.
+/// All reachable events, in the order of discovery.
 ///
-/// The first ones are the facts that are true at time 0. The position of an event is its age:
-/// the fixpoint walks through them in this order, and a join for one event looks at no later one.
+/// The first ones are the facts that are true at time 0. The position of an event is its age: the
+/// fixpoint processes them in this order, and a join for one event uses no later events.
 #[derive(Debug)]
 pub(super) struct Reached {
     events: Set<Event>,
     relations: Vec<Relation>,
     initial: usize,
-    /// For each initial fact, whether something adds it (again).
+    /// For each initial fact, `true` if an effect adds it.
     added_again: Vec<bool>,
 }
 
@@ -22,12 +22,12 @@ pub(super) struct Reached {
 #[derive(Clone, Debug, Default)]
 struct Relation {
     all: Vec<u32>,
-    /// By argument position, then by object.
+    /// Positions by argument position, then by object.
     by_argument: Vec<Vec<Vec<u32>>>,
 }
 
 impl Reached {
-    /// At time 0.
+    /// Creates the set of facts that are true at time 0.
     pub(super) fn initially<'a>(
         predicate_count: usize,
         facts: impl Iterator<Item = (PredicateId, &'a [ObjectId])>,
@@ -46,7 +46,7 @@ impl Reached {
         reached
     }
 
-    /// Notes that the event can come about.
+    /// Records a reachable event.
     pub(super) fn insert(&mut self, symbol: Symbol, arguments: &[ObjectId]) {
         let key = EventKey { symbol, arguments };
         if let Some(position) = self.events.get_index_of(&key) {
@@ -62,12 +62,12 @@ impl Reached {
         }
     }
 
-    /// The event at that position, if there are so many.
+    /// Returns the event at that position, if it exists.
     pub(super) fn get(&self, position: usize) -> Option<&Event> {
         self.events.get_index(position)
     }
 
-    /// The facts that are true at some time, in the order in which they were found.
+    /// Returns the facts that are true at some time, in the order of discovery.
     pub(super) fn facts(&self) -> impl Iterator<Item = (PredicateId, &[ObjectId])> {
         self.events.iter().filter_map(|event| match event.symbol {
             Symbol::True(predicate) => Some((predicate, &*event.arguments)),
@@ -75,7 +75,7 @@ impl Reached {
         })
     }
 
-    /// Where the fact stands, if it is true at some time.
+    /// Returns the position of the fact, if it is true at some time.
     pub(super) fn position(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<usize> {
         self.events.get_index_of(&EventKey {
             symbol: Symbol::True(predicate),
@@ -83,12 +83,12 @@ impl Reached {
         })
     }
 
-    /// Whether the fact is true at some time.
+    /// Returns `true` if the fact is true at some time.
     pub(super) fn is_ever_true(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
         self.position(predicate, arguments).is_some()
     }
 
-    /// Whether the basic fact is false at some time.
+    /// Returns `true` if the basic fact is false at some time.
     pub(super) fn is_ever_false(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
         let is_initial = self
             .position(predicate, arguments)
@@ -96,7 +96,7 @@ impl Reached {
         !is_initial || self.is_deleted(predicate, arguments)
     }
 
-    /// Whether the fluent is given a value after time 0.
+    /// Returns `true` if the fluent is given a value after time 0.
     pub(super) fn is_changed(&self, function: FunctionId, arguments: &[ObjectId]) -> bool {
         self.events.contains(&EventKey {
             symbol: Symbol::Changed(function),
@@ -104,7 +104,7 @@ impl Reached {
         })
     }
 
-    /// The truth of a basic fact that nothing adds or deletes, not even to no effect.
+    /// Returns the truth value of a basic fact that no effect adds or deletes, even redundantly.
     pub(super) fn constant(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<bool> {
         if self.is_deleted(predicate, arguments) {
             return None;
@@ -123,12 +123,12 @@ impl Reached {
         })
     }
 
-    /// The true facts of the predicate.
+    /// Returns the true facts of the predicate.
     pub(super) fn all(&self, predicate: PredicateId) -> &[u32] {
         &self.relations[predicate.index()].all
     }
 
-    /// The true facts of the predicate with `object` as the argument at `position`.
+    /// Returns the true facts of the predicate with `object` as the argument at `position`.
     pub(super) fn with_argument(
         &self,
         predicate: PredicateId,
@@ -142,7 +142,7 @@ impl Reached {
             .map_or(&[], Vec::as_slice)
     }
 
-    /// The arguments of the event at that position.
+    /// Returns the arguments of the event at that position.
     pub(super) fn arguments(&self, position: u32) -> &[ObjectId] {
         &self.events[position as usize].arguments
     }

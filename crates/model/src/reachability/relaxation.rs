@@ -1,9 +1,9 @@
-//! What is possible when deletions are ignored: conditions judged by the events reached so far.
+//! Delete relaxation: possible truth values of conditions, by the events reached so far.
 //!
-//! "Possible" is optimistic: each fact read may be true or false independently of all others, as
-//! long as it has that truth value at some time; a fluent that something changes may have any
-//! value. So a condition that is impossible here is impossible in every plan made of the actions
-//! reached so far, and what is possible stays so as more events are reached.
+//! "Possible" is optimistic: each fact read may be true or false independently of all others, if it
+//! has that truth value at some time; a fluent that something changes may have any value. So a
+//! condition that is impossible here is impossible in every plan of the actions reached so far, and
+//! a possible condition remains possible as more events are reached.
 
 use elbowroom_num::Rational;
 
@@ -21,19 +21,19 @@ use super::value::Value;
 use super::writes;
 use crate::hash::Map;
 
-/// The events reached so far, and what never changes.
+/// The events reached so far, and constant parts of the problem.
 pub(super) struct Relaxation<'a> {
     pub(super) problem: &'a Problem,
     pub(super) domains: &'a Domains,
     pub(super) reached: Reached,
-    /// The kinds of events that may be reached after time 0.
+    /// Kinds of events that may be reached after time 0.
     written: Symbols,
-    /// The initial values, by the event that would change them.
+    /// Initial values, by the event that would change them.
     values: Map<Event, Rational>,
 }
 
 impl<'a> Relaxation<'a> {
-    /// At time 0.
+    /// Creates the relaxation at time 0.
     pub(super) fn initially(problem: &'a Problem, domains: &'a Domains) -> Self {
         let facts = problem.initial_facts.iter();
         let values = problem.initial_values.iter();
@@ -57,13 +57,13 @@ impl<'a> Relaxation<'a> {
         }
     }
 
-    /// Whether such an event may be reached after time 0.
+    /// Returns `true` if such an event may be reached after time 0.
     pub(super) fn is_written(&self, symbol: Symbol) -> bool {
         self.written.contains(symbol)
     }
 
-    /// Whether no event can make the condition possible that is not possible at time 0 (`wanted`),
-    /// or its negation (not `wanted`).
+    /// Returns `true` if no event after time 0 can make the condition (`wanted`), or its negation
+    /// (not `wanted`), possible.
     pub(super) fn is_static(&self, condition: &Condition, wanted: bool) -> bool {
         let mut is_static = true;
         writes::visit_condition(condition, wanted, &mut |symbol| {
@@ -72,7 +72,7 @@ impl<'a> Relaxation<'a> {
         is_static
     }
 
-    /// Whether nothing changes the bounds of the duration.
+    /// Returns `true` if nothing changes the bounds of the duration.
     pub(super) fn is_static_duration(&self, constraints: &[DurationConstraint]) -> bool {
         let mut is_static = true;
         for constraint in constraints {
@@ -83,10 +83,10 @@ impl<'a> Relaxation<'a> {
         is_static
     }
 
-    /// Whether the condition is possible (`wanted`), or its negation (not `wanted`).
+    /// Returns `true` if the condition (`wanted`) or its negation (not `wanted`) is possible.
     ///
-    /// If not, `blockers` receives events such that it stays impossible until at least one of
-    /// them is reached; if none, it stays so for ever.
+    /// Otherwise, `blockers` receives events such that it stays impossible until at least one of
+    /// them is reached. Without blockers, it stays impossible forever.
     pub(super) fn is_possible(
         &self,
         condition: &Condition,
@@ -140,7 +140,8 @@ impl<'a> Relaxation<'a> {
         blockers: &mut Vec<Event>,
     ) -> bool {
         let predicate = atom.predicate;
-        // When a derived fact can be false is not traced: always, to be on the safe side.
+        // The falsehood of derived facts is not tracked. It always counts as possible, which is
+        // safe.
         if !wanted && self.problem.predicates[predicate.index()].is_derived {
             return true;
         }
@@ -159,7 +160,7 @@ impl<'a> Relaxation<'a> {
         })
     }
 
-    /// `wanted` and whether all (rather than one) of the instances are needed.
+    /// Evaluates a quantifier. `all` of its instances are needed, or only one.
     fn is_quantified_possible(
         &self,
         variables: &[Variable],
@@ -198,14 +199,14 @@ impl<'a> Relaxation<'a> {
             (Value::Number(left), Value::Number(right)) => {
                 comparison.holds(&left, &right) == wanted
             }
-            // To read what has no value is a mistake, whatever is made of the answer.
+            // Reading an undefined value is an error, whatever the context.
             (Value::Undefined, _) | (_, Value::Undefined) => false,
             _ => true,
         }
     }
 
-    /// Whether the bounds (if not `with_end`, those read at the start) may leave room for a
-    /// duration `>= 0`. Blockers as in [`Self::is_possible`].
+    /// Returns `true` if the bounds may allow a duration `>= 0`. Bounds that are read at the end
+    /// count only if `with_end`. Blockers as in [`Self::is_possible`].
     pub(super) fn is_duration_possible(
         &self,
         constraints: &[DurationConstraint],
@@ -284,8 +285,7 @@ impl<'a> Relaxation<'a> {
         })
     }
 
-    /// Returns `true` if the expression is positive for all objects and at all times. `false` if that is
-    /// not known.
+    /// Returns `true` if the expression is known to be positive for all objects and at all times.
     fn is_positive(&self, expression: &Expression) -> bool {
         match expression {
             Expression::Constant(value) => value.is_positive(),
@@ -305,7 +305,7 @@ impl<'a> Relaxation<'a> {
         }
     }
 
-    /// The value if nothing reached so far changes it.
+    /// Returns the value, if no reached event changes it.
     pub(super) fn value(&self, expression: &Expression, binding: &[ObjectId]) -> Value {
         Value::of(expression, &mut |fluent| self.fluent_value(fluent, binding))
     }
@@ -316,7 +316,7 @@ impl<'a> Relaxation<'a> {
         })
     }
 
-    /// The value of a fluent if nothing reached so far changes it.
+    /// Returns the value of a fluent, if no reached event changes it.
     pub(super) fn constant(&self, function: FunctionId, arguments: &[ObjectId]) -> Value {
         if self.reached.is_changed(function, arguments) {
             return Value::Varies;
@@ -347,8 +347,8 @@ impl<'a> Relaxation<'a> {
 }
 
 impl Foreknowledge for Relaxation<'_> {
-    /// Decided by the basic facts and the fluents that nothing reached so far writes. Quantifiers
-    /// are left alone: what they range over will be asked for one by one.
+    /// Decides by basic facts and fluents that no reached event writes. Quantifiers are undecided;
+    /// their instances are queried one by one.
     fn truth(&self, condition: &Condition, binding: &[ObjectId]) -> Option<bool> {
         match condition {
             Condition::Atom(atom) if self.problem.predicates[atom.predicate.index()].is_derived => {
@@ -377,7 +377,7 @@ impl Foreknowledge for Relaxation<'_> {
 }
 
 impl Relaxation<'_> {
-    /// Of a conjunction, or a disjunction: `neutral` is what no part changes.
+    /// Returns the truth value of a conjunction or disjunction; `neutral` is its neutral element.
     fn joint_truth(
         &self,
         parts: &[Condition],

@@ -11,25 +11,25 @@ use super::event::{Event, Symbol};
 use super::relaxation::Relaxation;
 use super::variables;
 
-/// `head` can come about if all atoms can be true and all tests are possible, for some binding of
-/// the variables.
+/// The head is reachable if, for some binding of the variables, all atoms can be true and all tests
+/// are possible.
 pub(super) struct Rule<'a> {
     pub(super) head: Head,
-    /// How many of the variables are the head's.
+    /// Number of parameters of the head among the variables.
     pub(super) parameter_count: usize,
-    /// The head's parameters, then variables of quantifiers.
+    /// Ranges of the head's parameters, then of the variables of quantifiers.
     pub(super) variables: Vec<Rc<Domain>>,
     pub(super) atoms: Vec<JoinAtom>,
-    /// Tests whose outcome is final as soon as their variables are bound.
+    /// Tests whose result is final as soon as their variables are bound.
     pub(super) static_tests: Vec<Test<'a>>,
-    /// Tests that may fail now and succeed later.
+    /// Tests that may fail at first and succeed later.
     pub(super) tests: Vec<Test<'a>>,
 }
 
 /// The conclusion of a rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Head {
-    /// An action can start; if `and_end`, it can also end, and not otherwise start.
+    /// An action can start. If `and_end`, it can also end, and otherwise does not start.
     Start { schema: SchemaId, and_end: bool },
     /// A derived fact can be true.
     Derived(PredicateId),
@@ -47,22 +47,22 @@ impl Domain {
     }
 }
 
-/// An atom with the rule's variables in it.
+/// An atom over the rule's variables.
 #[derive(Clone, Debug)]
 pub(super) struct JoinAtom {
     pub(super) predicate: PredicateId,
     pub(super) terms: Vec<Term>,
-    /// Whether no facts of this predicate are reached after time 0.
+    /// `true` if no facts of this predicate are reached after time 0.
     pub(super) is_static: bool,
 }
 
-/// A condition that is checked rather than joined.
+/// A condition that is tested instead of joined.
 #[derive(Clone)]
 pub(super) struct Test<'a> {
     kind: TestKind<'a>,
     /// The rule's variable for each of the condition's free variables, by position.
     scope: Vec<usize>,
-    /// Those of the rule's variables that it really reads.
+    /// Variables of the rule that it reads.
     pub(super) reads: Vec<usize>,
 }
 
@@ -70,12 +70,12 @@ pub(super) struct Test<'a> {
 enum TestKind<'a> {
     /// The condition, or its negation.
     Condition(&'a Condition, bool),
-    /// The constraints; whether also those that are read at the end.
+    /// The constraints; `true` includes those that are read at the end.
     Duration(&'a [DurationConstraint], bool),
 }
 
 impl Rule<'_> {
-    /// Whether all tests but the static ones are possible. Blockers as in
+    /// Returns `true` if all non-static tests are possible. Blockers as in
     /// [`Relaxation::is_possible`].
     pub(super) fn are_tests_possible(
         &self,
@@ -90,7 +90,7 @@ impl Rule<'_> {
 }
 
 impl Test<'_> {
-    /// As [`Relaxation::is_possible`], for a binding of the rule's variables.
+    /// Like [`Relaxation::is_possible`], for a binding of the rule's variables.
     pub(super) fn is_possible(
         &self,
         relaxation: &Relaxation,
@@ -111,7 +111,8 @@ impl Test<'_> {
     }
 }
 
-/// All rules of a problem: one or more for each schema and each rule of a derived predicate.
+/// Returns all rules of a problem: one or more for each schema and each rule of a derived
+/// predicate.
 pub(super) fn rules_of<'a>(
     relaxation: &Relaxation<'a>,
     is_start_silent: impl Fn(&Schema) -> bool,
@@ -137,7 +138,7 @@ pub(super) fn rules_of<'a>(
                 and_end = is_start_silent(schema) && !may_be_vacuous;
                 drafts.require(at_start, true, &scope);
                 drafts.require_duration(duration, and_end, &scope);
-                // What never changes need not wait for the effects of the start.
+                // Static conditions do not depend on the effects of the start.
                 drafts.only_static = !and_end;
                 if !may_be_vacuous {
                     drafts.require(over_all, true, &scope);
@@ -157,17 +158,17 @@ pub(super) fn rules_of<'a>(
     rules
 }
 
-/// A disjunction multiplies rules up to this many; further ones become tests.
+/// Limit on the alternatives that disjunctions produce; further disjunctions become tests.
 const MAX_ALTERNATIVES: usize = 16;
 
-/// The rules that a condition is being turned into: their disjunction.
+/// Rules under construction from a condition: their disjunction.
 struct Drafts<'r, 'a> {
     relaxation: &'r Relaxation<'a>,
     parameter_count: usize,
     alternatives: Vec<Draft<'a>>,
-    /// The number of groups of alternatives like the current one.
+    /// Number of groups of alternatives like the current one.
     groups: usize,
-    /// Whether to pass over what is not static.
+    /// `true` to skip conditions that are not static.
     only_static: bool,
 }
 
@@ -263,7 +264,7 @@ impl<'r, 'a> Drafts<'r, 'a> {
         self.alternatives = after;
     }
 
-    /// `part`, or its negation, for some values of the variables.
+    /// Requires `part`, or its negation, for some values of the variables.
     fn require_some(
         &mut self,
         variables: &[Variable],
@@ -271,7 +272,7 @@ impl<'r, 'a> Drafts<'r, 'a> {
         wanted: bool,
         scope: &[usize],
     ) {
-        // Alternatives differ in how many variables they have: each one goes on by itself.
+        // Alternatives have different numbers of variables, so each one is processed separately.
         let mut after = Vec::new();
         let before = std::mem::take(&mut self.alternatives);
         let groups = self.groups;
@@ -322,7 +323,7 @@ impl<'r, 'a> Drafts<'r, 'a> {
         let (relaxation, parameter_count) = (self.relaxation, self.parameter_count);
         let alternatives = self.alternatives.into_iter();
         let possible = alternatives.filter(move |draft| {
-            // Nothing is bound yet: only what reads no variable can be decided, once for all.
+            // No variable is bound yet, so only tests without variables can be decided.
             let unbound = vec![ObjectId(0); draft.variables.len()];
             draft.static_tests.iter().all(|test| {
                 !test.reads.is_empty()
@@ -353,8 +354,9 @@ fn domain(relaxation: &Relaxation, types: &[TypeId]) -> Domain {
     Domain { objects, is_member }
 }
 
-/// Whether a conjunct of the condition (of its negation if not `wanted`) is an atom for each of
-/// these variables: then a join finds their values; otherwise it would try all objects.
+/// Returns `true` if, for each of these variables, a conjunct of the condition (of its negation if
+/// not `wanted`) is an atom that contains it. A join then finds their values; otherwise it would
+/// try all objects.
 fn binds_all(condition: &Condition, wanted: bool, mut variables: std::ops::Range<usize>) -> bool {
     fn binds(condition: &Condition, wanted: bool, variable: usize) -> bool {
         match (condition, wanted) {

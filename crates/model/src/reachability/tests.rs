@@ -1,4 +1,4 @@
-//! The comparison with a plainly right twin, and limits.
+//! Comparison with a simple reference implementation, and limits.
 
 mod random;
 mod twin;

@@ -1,4 +1,4 @@
-//! Numbers of which it is known that they never change.
+//! Values of expressions that are known never to change.
 
 use elbowroom_num::Rational;
 
@@ -9,14 +9,14 @@ use crate::problem::{Expression, Fluent};
 pub(super) enum Value {
     /// This number, always.
     Number(Rational),
-    /// It may change, or depends on what the problem leaves open.
+    /// It may change, or depends on an open number.
     Varies,
-    /// None, as some part of it never gets a value.
+    /// Some part never has a value.
     Undefined,
 }
 
 impl Value {
-    /// The value of an expression, given that of its fluents.
+    /// Returns the value of an expression from the values of its fluents.
     pub(super) fn of(expression: &Expression, fluent: &mut impl FnMut(&Fluent) -> Self) -> Self {
         match expression {
             Expression::Constant(value) => Self::Number(value.clone()),

@@ -1,8 +1,9 @@
-//! Which variables a condition reads.
+//! Variables that conditions read.
 
 use crate::problem::{Condition, Expression, Term};
 
-/// Marks each variable read; variables of inner quantifiers lie beyond the end of `read`.
+/// Marks each variable read. Variables of inner quantifiers have positions beyond the end of
+/// `read`.
 pub(super) fn of_condition(condition: &Condition, read: &mut [bool]) {
     match condition {
         Condition::Atom(atom) => of_terms(&atom.arguments, read),

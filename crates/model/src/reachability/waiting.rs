@@ -1,4 +1,4 @@
-//! What is not possible yet, and the events that it waits for.
+//! Queue of conclusions that are not possible yet, indexed by the events that they wait for.
 
 use std::ops::ControlFlow;
 
@@ -8,34 +8,34 @@ use super::effects::EffectId;
 use super::event::Event;
 use crate::hash::{Map, Set};
 
-/// Everything that waits, with a ticket each.
+/// All waiting entries, each with a ticket.
 pub(super) struct WaitingRoom {
-    /// `None` once it has come about.
+    /// `None` if the entry has left the queue.
     entries: Vec<Option<Entry>>,
-    /// Whom an event wakes.
+    /// Entries to retry for each event.
     watchers: Map<Event, Vec<Ticket>>,
-    /// How many more may wait.
+    /// Number of further entries that may wait.
     room: usize,
 }
 
-/// A position in the waiting room.
+/// Position in the queue.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ticket(usize);
 
-/// A rule instance that is not applicable yet.
+/// A conclusion that is not possible yet.
 #[derive(Clone, Debug)]
 pub(super) enum Pending {
     /// A binding of a rule (by position) whose tests are not all possible.
     Binding(usize, Box<[ObjectId]>),
-    /// An instance (by position) that has started and cannot end.
+    /// An instance (by position) that has started and cannot end yet.
     End(SchemaId, usize),
-    /// An effect whose guard is not possible, with the objects of all its variables.
+    /// An effect whose guard is not possible yet, with the objects of all its variables.
     Effect(EffectId, Box<[ObjectId]>),
 }
 
 struct Entry {
     what: Pending,
-    /// The events that will wake it, if they are several. Some may have come about.
+    /// Events that retry it, if there are several. Some of them may have been reached.
     watched: Set<Event>,
 }
 
@@ -48,8 +48,8 @@ impl WaitingRoom {
         }
     }
 
-    /// Lets it wait for one of the events; breaks if there is no room. What waits for nothing
-    /// never comes about and is forgotten.
+    /// Queues an entry until one of the events is reached. Breaks if the queue is full. An entry
+    /// without events can never become possible and is dropped.
     pub(super) fn enter(&mut self, what: Pending, events: Vec<Event>) -> ControlFlow<()> {
         if events.is_empty() {
             return ControlFlow::Continue(());
@@ -67,17 +67,18 @@ impl WaitingRoom {
         ControlFlow::Continue(())
     }
 
-    /// Those that wait for the event; they wait for it no longer.
+    /// Returns the entries that wait for the event, and removes the event.
     pub(super) fn wake(&mut self, event: &Event) -> Vec<Ticket> {
         self.watchers.swap_remove(event).unwrap_or_default()
     }
 
-    /// The entry that waits with this ticket, unless it has left.
+    /// Returns the waiting entry with this ticket, unless it has left the queue.
     pub(super) fn get(&self, ticket: Ticket) -> Option<&Pending> {
         Some(&self.entries[ticket.0].as_ref()?.what)
     }
 
-    /// Lets what was woken wait for one of the events, or leave if there are none.
+    /// Queues a retried entry again until one of the events is reached, or removes it if there are
+    /// none.
     pub(super) fn go_on(&mut self, ticket: Ticket, events: Vec<Event>) {
         if events.is_empty() {
             self.entries[ticket.0] = None;
@@ -91,7 +92,7 @@ impl WaitingRoom {
         let Some(entry) = &mut self.entries[ticket.0] else {
             return;
         };
-        // One that waits for a single event, as nearly all do, watches nothing when it is woken.
+        // An entry that waits for a single event, the usual case, needs no set of watched events.
         let is_only = events.len() == 1 && entry.watched.is_empty();
         for event in events {
             if is_only || entry.watched.insert(event.clone()) {

@@ -1,11 +1,11 @@
-//! Which kinds of events a problem's actions and timed initials can bring about at all, and which
-//! kinds its conditions ask for.
+//! Kinds of events that a problem's actions and timed initials can cause, and kinds that its
+//! conditions depend on.
 
 use crate::problem::{Body, Change, Condition, Expression, Problem, Schema, Term, TimedChange};
 
 use super::event::{Symbol, Symbols};
 
-/// All kinds of events that something in the problem can bring about after time 0.
+/// Returns all kinds of events that can occur after time 0.
 pub(super) fn written(problem: &Problem) -> Symbols {
     let mut written = Symbols::default();
     for schema in &problem.schemas {
@@ -38,7 +38,7 @@ pub(super) fn written(problem: &Problem) -> Symbols {
     written
 }
 
-/// The kind of event that a change is.
+/// Returns the kind of event of a change.
 pub(super) fn symbol_of(change: &Change) -> Symbol {
     match change {
         Change::Add(atom) => Symbol::True(atom.predicate),
@@ -47,7 +47,7 @@ pub(super) fn symbol_of(change: &Change) -> Symbol {
     }
 }
 
-/// The arguments of what a change changes.
+/// Returns the arguments of the changed fact or fluent.
 pub(super) fn terms_of(change: &Change) -> &[Term] {
     match change {
         Change::Add(atom) | Change::Delete(atom) => &atom.arguments,
@@ -55,8 +55,8 @@ pub(super) fn terms_of(change: &Change) -> &[Term] {
     }
 }
 
-/// Whether no condition can tell that the action has started: none asks for any of the events that
-/// it brings about before its end.
+/// Returns `true` if no condition depends on the start of the action: none reads any of the events
+/// that it causes before its end.
 pub(super) fn is_start_silent(schema: &Schema, read: &Symbols) -> bool {
     match &schema.body {
         Body::Instantaneous { .. } => true,
@@ -73,7 +73,8 @@ pub(super) fn is_start_silent(schema: &Schema, read: &Symbols) -> bool {
     }
 }
 
-/// All kinds of events that could make some condition of the problem true, the goal included.
+/// Returns all kinds of events that could make some condition of the problem true, including the
+/// goal.
 pub(super) fn read(problem: &Problem) -> Symbols {
     let mut read = Symbols::default();
     let mut visit = |symbol| {
@@ -128,8 +129,8 @@ fn visit_body(body: &Body, visit: &mut impl FnMut(Symbol)) {
     }
 }
 
-/// Calls `visit` for each kind of event that could help to make the condition true, or, if not
-/// `wanted`, false.
+/// Calls `visit` for each kind of event that could contribute to making the condition true, or, if
+/// not `wanted`, false.
 pub(super) fn visit_condition(condition: &Condition, wanted: bool, visit: &mut impl FnMut(Symbol)) {
     match condition {
         Condition::Atom(atom) if wanted => visit(Symbol::True(atom.predicate)),

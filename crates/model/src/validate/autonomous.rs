@@ -1,18 +1,19 @@
-//! Processes and events: what goes on between two happening groups without being asked.
+//! Processes and events between two happening groups.
 //!
-//! The time between two groups is cut where an event happens, or a process starts or stops. These
-//! moments are zeros of polynomials, and may be irrational. Up to a rational moment the state is
-//! carried on as up to a group. From an irrational one on, polynomials go on by the same clock, with
-//! a new constant, if that is rational: so it is where the course of a number does not change, where
-//! it gets a rational value, and where it reaches the bound of a condition. A number whose
-//! constant is irrational loses its value until it is assigned a new one, and the plan is undecided
-//! if something reads it before.
+//! The time between two groups is cut at each event, and at each start or stop of a process. These
+//! moments are zeros of polynomials, and may be irrational. Up to a rational moment, the state
+//! advances as it does to a group. From an irrational moment on, polynomials continue on the same
+//! clock, with a new constant, if that is rational: this is so where the motion of a number does
+//! not change, where its value is rational, and where it reaches the bound of a condition. A number
+//! whose constant is irrational has no value until it is assigned a new one. The plan is undecided
+//! if a condition or an effect reads it before.
 //!
-//! At one moment, first comes what is true then, and after that what is true right after it: an
-//! event on `(> x 1)` happens right after `x` has reached 1. What is true right after a moment
-//! depends on which processes are at work then, and the other way round; the answer is found by
-//! trying those whose condition is true at the moment, then those that are true under these, until
-//! nothing changes.
+//! At each moment, conditions that are true at the moment are processed first, and then those that
+//! are true right after it: an event on `(> x 1)` happens right after `x` has reached 1. The
+//! conditions that are true right after a moment depend on the processes that are active then, and
+//! vice versa. The validator starts with the processes whose condition is true at the moment,
+//! continues with those whose condition is true under these, and repeats this until nothing
+//! changes.
 
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
@@ -36,28 +37,28 @@ use crate::interference::Footprint;
 use crate::problem::UpdateOperator;
 use crate::task::Task;
 
-/// How many events and turns of processes there may be between two happening groups.
+/// Largest number of changes (events, starts and stops of processes) between two happening groups.
 const MOST_CHANGES: usize = 1000;
 
-/// When an event happens is no number of the plan, so nothing is forgiven.
+/// Conditions of events have no tolerance, because the plan does not contain the times of events.
 static NO_SLACK: Rational = Rational::ZERO;
 
-/// Events that have happened, as far as that matters.
+/// Record of the events that have happened, as far as it is needed.
 #[derive(Debug)]
 pub(super) struct Nature {
-    /// What each event reads and writes.
+    /// Footprint of each event.
     footprints: Vec<Footprint>,
-    /// The events that have happened at the present moment.
+    /// Events that have happened at the present moment.
     fired: BTreeSet<usize>,
-    /// How many of them came before the last ones.
+    /// Number of these that happened before the last ones.
     rounds: usize,
-    /// The events since the last two groups: the time of the group before, the time since, and
-    /// which it was.
+    /// Events since the last but one group: time of the preceding group, time since then, and
+    /// position of the event.
     recent: Vec<(Rational, Instant, usize)>,
 }
 
 impl Nature {
-    /// `None` if nothing happens without a plan.
+    /// Returns `None` if the task has neither processes nor events.
     pub(super) fn of(task: &Task) -> Option<Self> {
         let autonomous = task.autonomous();
         let footprint = |event: &GroundEvent| Footprint::of_snap(task, &event.snap);
@@ -72,9 +73,9 @@ impl Nature {
 
 /// A moment between two groups.
 struct Flow {
-    /// When the clock began.
+    /// Start of the clock.
     base: Rational,
-    /// The moment, by that clock; before it, numbers moved like this.
+    /// The moment, on that clock, and the motion of numbers before it.
     at: Instant,
     motion: Motion,
 }
@@ -88,13 +89,13 @@ impl Flow {
         }
     }
 
-    /// The time, or a number close to it.
+    /// Returns the time, or a number close to it.
     fn time(&self) -> Rational {
         &self.base + self.at.near()
     }
 }
 
-/// When a condition is read: at a moment, or right after it, under a motion.
+/// Moment at which a condition is read: at a moment, or right after it, under a motion.
 enum Read<'m> {
     At,
     After(&'m Now, &'m Motion, &'m Rational),
@@ -105,7 +106,8 @@ impl<'a> Judge<'a> {
         self.task.autonomous()
     }
 
-    /// Lets the events happen whose conditions hold now, and those that hold because of them.
+    /// Fires the events whose conditions hold now, and those whose conditions become true as a
+    /// result.
     pub(super) fn fire_now(&mut self, time: &Rational) -> Result<(), Stop> {
         if self.nature.is_none() {
             return Ok(());
@@ -113,7 +115,8 @@ impl<'a> Judge<'a> {
         self.fire_at(&mut Flow::beginning(time))
     }
 
-    /// Processes and events from just after the group at `from` to the arrival at the next one.
+    /// Applies processes and events from just after the group at `from` to the arrival at the next
+    /// one.
     pub(super) fn pass_with_nature(&mut self, from: &Rational, to: &Rational) -> Result<(), Stop> {
         let mut flow = Flow::beginning(from);
         self.forget_events_before(from);
@@ -142,13 +145,13 @@ impl<'a> Judge<'a> {
         Err(undecided(&flow.time(), Difficulty::ManyChanges { most }))
     }
 
-    /// Checks all that must hold throughout a part.
+    /// Checks over-all conditions and constraints throughout a part.
     fn watch(&mut self, flow: &Flow, length: &Rational, part: &Stretch) -> Result<(), Stop> {
         self.watch_over_all(&flow.base, &flow.motion, length, Some(part))?;
         self.watch_course(&flow.base, &flow.motion, length, Some(part))
     }
 
-    /// Goes on to a later moment.
+    /// Advances to a later moment.
     fn advance(&mut self, flow: &mut Flow, at: Instant) {
         if let Some(elapsed) = at.as_exact() {
             flow.motion.carry(&mut self.now, elapsed);
@@ -163,7 +166,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Lets the events happen whose conditions hold at the moment.
+    /// Fires the events whose conditions hold at the moment.
     fn fire_at(&mut self, flow: &mut Flow) -> Result<(), Stop> {
         loop {
             let ready = self.ready(flow, &Read::At)?;
@@ -174,8 +177,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Finds out which processes are at work right after the moment, and lets the events happen
-    /// whose conditions hold right after it. Whether there were any.
+    /// Determines the processes that are active right after the moment, and fires the events whose
+    /// conditions hold right after it. Returns `true` if there were any.
     fn settle_after(&mut self, flow: &mut Flow, length: &Rational) -> Result<bool, Stop> {
         let mut is_after = false;
         loop {
@@ -199,7 +202,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// How numbers move right after the moment, and the state in which some stand still.
+    /// Returns the motion of numbers right after the moment, and the state with the values of those
+    /// that do not change.
     fn at_work(&self, flow: &Flow, length: &Rational) -> Result<(Now, Motion), Stop> {
         let processes = &self.autonomous().processes;
         let time = flow.time();
@@ -238,8 +242,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The next moment at which, or right after which, an event's condition comes to hold or a
-    /// process starts or stops.
+    /// Returns the next moment at which, or right after which, an event's condition becomes true or
+    /// a process starts or stops.
     fn next_turn(&self, flow: &Flow, length: &Rational) -> Result<Option<Instant>, Stop> {
         if flow.motion.is_still() {
             return Ok(None);
@@ -267,7 +271,7 @@ impl<'a> Judge<'a> {
         Ok(next)
     }
 
-    /// The conditions of all events and processes.
+    /// Returns the conditions of all events and processes.
     fn conditions(&self) -> impl Iterator<Item = &'a Condition> {
         let autonomous = self.autonomous();
         let events = autonomous.events.iter().map(|event| &event.snap.condition);
@@ -275,7 +279,7 @@ impl<'a> Judge<'a> {
         events.chain(processes.map(|process| &process.condition))
     }
 
-    /// The events whose conditions hold.
+    /// Returns the events whose conditions hold.
     fn ready(&self, flow: &Flow, read: &Read<'_>) -> Result<Vec<usize>, Stop> {
         let mut ready = Vec::new();
         for (index, event) in self.autonomous().events.iter().enumerate() {
@@ -329,7 +333,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Some events happen at once.
+    /// Applies simultaneous events.
     fn fire(&mut self, flow: &mut Flow, ready: &[usize], read: &Read<'_>) -> Result<(), Stop> {
         self.refuse_endless(flow, ready)?;
         self.refuse_interference(flow, ready)?;
@@ -358,7 +362,7 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// An event happens once at a moment.
+    /// Rejects an event that happens twice at a moment.
     fn refuse_endless(&self, flow: &Flow, ready: &[usize]) -> Result<(), Stop> {
         let Some(nature) = &self.nature else {
             return Ok(());
@@ -373,7 +377,7 @@ impl<'a> Judge<'a> {
         Err(self.violation(&flow.time(), None, mistake))
     }
 
-    /// Of events that happen at once, the order must not matter.
+    /// Rejects simultaneous events that interfere.
     fn refuse_interference(&self, flow: &Flow, ready: &[usize]) -> Result<(), Stop> {
         let Some(nature) = &self.nature else {
             return Ok(());
@@ -397,7 +401,7 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// What some events change, all read in the same state.
+    /// Returns the changes of some events, all read in the same state.
     fn changes(&self, flow: &Flow, ready: &[usize], read: &Read<'_>) -> Result<Changes, Stop> {
         let mut changes = Changes::default();
         let time = flow.time();
@@ -440,8 +444,8 @@ impl<'a> Judge<'a> {
         Ok(changes)
     }
 
-    /// Happenings of the plan keep ε away from events before them. Where no separation is asked for,
-    /// the event on arrival comes first, and that is all.
+    /// Checks that happenings of the plan are at least ε after events before them. If no separation
+    /// is needed, it is sufficient that the event comes first.
     pub(super) fn keep_from_events(&self, group: &Group<'a>) -> Result<(), Stop> {
         let Some(nature) = self
             .nature
@@ -475,7 +479,7 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// Forgets the events that no later happening can be too close to.
+    /// Removes the events that are too far in the past for later happenings.
     fn forget_events_before(&mut self, time: &Rational) {
         let separation = self.task.epsilon();
         if let Some(nature) = &mut self.nature {
@@ -487,16 +491,17 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// What some events change.
+/// Changes of some events.
 #[derive(Default)]
 struct Changes {
     deletes: Vec<(FactId, usize)>,
     adds: Vec<(FactId, usize)>,
-    /// The new value, by the clock of the motion: right at the moment, and meaningless at others.
+    /// New values, as polynomials on the clock of the motion. They are valid only at the moment
+    /// itself.
     values: Vec<(FluentId, Polynomial)>,
 }
 
-/// The value of a fluent after an update.
+/// Returns the value of a fluent after an update.
 fn updated(
     operator: UpdateOperator,
     old: Result<Polynomial, Fault>,

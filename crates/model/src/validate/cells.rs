@@ -1,4 +1,4 @@
-//! A piece of time cut into cells: at the zeros of polynomials, and between them.
+//! Cells of a piece of time: the zeros of polynomials, and the intervals between them.
 
 use elbowroom_num::Rational;
 
@@ -6,14 +6,14 @@ use super::instant::Instant;
 use super::piece::Stretch;
 use super::polynomial::{Polynomial, Root};
 
-/// The zeros of some polynomials within a piece.
+/// Zeros of some polynomials within a piece.
 pub(super) struct Cuts {
     pub(super) polynomials: Vec<Polynomial>,
-    /// In order; brackets share no point with each other.
+    /// Sorted; no two brackets have a common point.
     pub(super) roots: Vec<Root>,
 }
 
-/// The polynomial that is zero where one of these is, each zero once.
+/// Returns a polynomial with the zeros of all of these, each zero once.
 pub(super) fn product(polynomials: &[Polynomial]) -> Polynomial {
     let one = Polynomial::constant(Rational::ONE);
     polynomials
@@ -22,15 +22,15 @@ pub(super) fn product(polynomials: &[Polynomial]) -> Polynomial {
         .square_free()
 }
 
-/// One cut, or the moments strictly between two neighbouring cuts.
+/// A cut, or the moments strictly between two neighbouring cuts.
 pub(super) struct Cell {
-    /// Where to look.
+    /// Representative place in the cell.
     pub(super) place: Place,
     /// The cut itself, or the one on the left.
     pub(super) from: Root,
-    /// Whether these are moments between cuts.
+    /// `true` if the cell is the interval between two cuts.
     pub(super) is_open: bool,
-    /// Whether the cell reaches the end of the piece.
+    /// `true` if the cell reaches the end of the piece.
     pub(super) is_last: bool,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct Cell {
 pub(super) enum Place {
     Point(Rational),
     Instant(Instant),
-    /// At the only zero, of any difference, between these two numbers.
+    /// The only zero of any difference between these two numbers.
     Root(Rational, Rational),
 }
 
@@ -51,7 +51,7 @@ impl Place {
         }
     }
 
-    /// The place, or a number close to it.
+    /// Returns the place, or a number close to it.
     pub(super) fn near(&self) -> Rational {
         match self {
             Self::Point(value) | Self::Root(value, _) => value.clone(),
@@ -60,8 +60,8 @@ impl Place {
     }
 }
 
-/// The cells of `[0, length)`, or of `(0, length)`, in order; with a `part`, those of it, whose ends
-/// are among the cuts.
+/// Returns the cells of `[0, length)`, or of `(0, length)`, in order. With a `part`, returns the
+/// cells of the part, whose ends are among the cuts.
 pub(super) fn cells(
     cuts: &Cuts,
     length: &Rational,
@@ -75,7 +75,7 @@ pub(super) fn cells(
     let mut is_point = false;
     if let Some(part) = part {
         let polynomial = product(&cuts.polynomials);
-        // Where the end of the part stands among the cuts; not the ends of the piece.
+        // Position of the part's end among the cuts, without the ends of the piece.
         let find = |roots: &[Root], at: &Instant| {
             let same = |root: &Root| Instant::of(root.clone(), &polynomial) == *at;
             roots.iter().position(same)
@@ -107,8 +107,8 @@ pub(super) fn cells(
     }
     for right in roots.iter().chain([&end]) {
         let is_last = *right == end;
-        // Brackets share no point with other cuts, so the middle lies strictly between the two,
-        // or at the common end of two brackets, which is no zero.
+        // Brackets have no common points with other cuts. So the middle is strictly between the
+        // two, or at the common end of two brackets, which is not a zero.
         let middle = (left.upper() + right.lower()) / Rational::from(2);
         cells.push(Cell {
             place: Place::Point(middle),

@@ -1,4 +1,4 @@
-//! What the judge says, in words.
+//! Messages of the validator.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use super::violation::{
 use crate::describe::decimal;
 use crate::problem::Comparison;
 
-/// A time as planners print it, with at least three decimals where that is exact.
+/// Formats a time as planners do, with at least three decimals if that is exact.
 pub(super) fn clock(time: &Rational) -> String {
     let exact = decimal(time);
     if exact.contains('/') {

@@ -1,4 +1,4 @@
-//! What a happening group changes.
+//! Effects of happening groups.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use super::violation::{Mistake, When};
 use crate::ground::{Change, Effect, Expression, FactId, FluentId};
 use crate::problem::UpdateOperator;
 
-/// All that a group changes, read off before anything changes.
+/// All changes of a group, computed before any of them is applied.
 #[derive(Default)]
 struct Changes<'a> {
     deletes: Vec<(FactId, What<'a>)>,
@@ -27,7 +27,7 @@ struct Update<'a> {
     what: What<'a>,
 }
 
-/// The continuous effects now at work.
+/// Returns the active continuous effects.
 pub(super) fn rates<'b>(judge: &Judge<'b>) -> Vec<Rate<'b>> {
     let mut rates = Vec::new();
     for (&position, running) in &judge.running {
@@ -50,8 +50,8 @@ pub(super) fn rates<'b>(judge: &Judge<'b>) -> Vec<Rate<'b>> {
 }
 
 impl<'a> Judge<'a> {
-    /// Carries out the effects of a group: all read the state on arrival, deletions come before
-    /// additions, and what ends stops running.
+    /// Applies the effects of a group. All read the state on arrival, deletions come before
+    /// additions, and actions that end stop running.
     pub(super) fn apply(&mut self, group: &Group<'a>) -> Result<(), Stop> {
         let mut changes = Changes::default();
         for happening in &group.happenings {
@@ -155,7 +155,7 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// Refuses that two steps, or a step and a timed initial, write the same fact.
+    /// Rejects two steps, or a step and a timed initial, that write the same fact.
     fn refuse_equal_writes(&self, changes: &Changes<'a>, time: &Rational) -> Result<(), Stop> {
         let mut writers: BTreeMap<FactId, What<'a>> = BTreeMap::new();
         for (fact, what) in changes.deletes.iter().chain(&changes.adds) {
@@ -174,7 +174,7 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// Several updates of one fluent must all be increases and decreases.
+    /// Updates a fluent. Several updates of one fluent must all be increases or decreases.
     fn update(
         &mut self,
         fluent: FluentId,

@@ -1,13 +1,14 @@
 //! Validation of an execution, event by event.
 //!
-//! In an execution, the world determines the real starts and ends of actions, their failures, and all other
-//! changes. [`Execution`] takes events in the order of their arrival at the executor, and updates the state by
-//! the rules of the validator. It judges the decisions of the executor only: each start, against the state at the
-//! moment of the command, and the claim that the goal is reached. It does not judge conditions and durations that
-//! the world violates.
+//! In an execution, the world determines the real starts and ends of actions, their failures, and
+//! all other changes. [`Execution`] receives events in the order of their arrival at the executor,
+//! and updates the state by the rules of the validator. It validates only the decisions of the
+//! executor: each start, against the state at the moment of the command, and the claim that the
+//! goal is reached. It does not validate conditions and durations that the world violates.
 //!
-//! All reports about one time form a group. A start reads the state on arrival at its group. Facts and values that
-//! were *seen* at that time belong to this state, because a sensor reports a value, not the moment of its change.
+//! All reports about one time form a group. A start reads the state on arrival at its group. Facts
+//! and values that were *seen* at that time belong to this state, because a sensor reports a value,
+//! not the moment of its change.
 //!
 //! ```
 //! use elbowroom_model::validate::Execution;

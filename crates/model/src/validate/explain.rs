@@ -1,4 +1,4 @@
-//! Which parts make a condition false, and since when.
+//! Explanations of false conditions: the responsible parts, and their last changes.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use crate::derivation::{Moment, holds};
 use crate::ground::{Condition, Expression, FactId};
 use crate::task::Task;
 
-/// The data that an explanation uses.
+/// Data for an explanation.
 pub(super) struct Witness<'a> {
     pub(super) task: &'a Task,
     /// Numbers at the moment in question.
@@ -23,14 +23,14 @@ pub(super) struct Witness<'a> {
 }
 
 impl Witness<'_> {
-    /// The parts of a false condition that keep it from being true.
+    /// Returns the parts of a false condition that prevent it from being true.
     pub(super) fn reasons(&self, condition: &Condition) -> Vec<Reason> {
         let mut reasons = Vec::new();
         self.collect(condition, false, &mut reasons);
         reasons
     }
 
-    /// Adds the parts that make `condition` have the truth `is_true`.
+    /// Adds the parts that give `condition` the truth value `is_true`.
     fn collect(&self, condition: &Condition, is_true: bool, reasons: &mut Vec<Reason>) {
         if holds(condition, self.moment) != Ok(is_true) {
             return;

@@ -1,4 +1,4 @@
-//! Moments between two happenings, also irrational ones.
+//! Moments between two happenings, rational or irrational.
 
 use std::cmp::Ordering;
 
@@ -6,14 +6,14 @@ use elbowroom_num::Rational;
 
 use super::polynomial::{Polynomial, Root};
 
-/// How close an irrational moment is told.
+/// Precision for the approximation of an irrational moment.
 const CLOSE: (i64, i64) = (1, 1_000_000);
 
-/// A moment, by the time since the beginning of a piece: a number, or a zero of a polynomial.
+/// A moment, as the time since the beginning of a piece: a number, or a zero of a polynomial.
 #[derive(Clone, Debug)]
 pub(super) struct Instant {
     root: Root,
-    /// Square-free; zero at the moment.
+    /// A square-free polynomial that is zero at the moment.
     zero: Polynomial,
 }
 
@@ -26,7 +26,7 @@ impl Instant {
         }
     }
 
-    /// A zero of a square-free polynomial.
+    /// Creates a moment from a zero of a square-free polynomial.
     pub(super) fn of(root: Root, zero: &Polynomial) -> Self {
         match root {
             Root::Exact(value) => Self::exact(value),
@@ -37,10 +37,10 @@ impl Instant {
         }
     }
 
-    /// The same moment as a zero of the one of these polynomials that has the lowest degree, without
-    /// its zeros at `others`. The lower the degree is, the more values are seen to be rational, the
-    /// moment itself among them. The polynomials have no other zeros than the one that the moment
-    /// was made from.
+    /// Returns the same moment as a zero of the one of these polynomials that has the lowest
+    /// degree, without its zeros at `others`. A lower degree makes it possible to recognise more
+    /// values as rational, including the moment itself. The polynomials must not have other zeros
+    /// than the one that defined the moment.
     pub(super) fn zero_of_one(self, polynomials: &[Polynomial], others: &[Rational]) -> Self {
         let zeros = polynomials.iter().filter(|one| self.sign(one) == 0);
         let Some(zero) = zeros.min_by_key(|one| one.degree()) else {
@@ -65,12 +65,12 @@ impl Instant {
         }
     }
 
-    /// The polynomial that is zero at the moment.
+    /// Returns the polynomial that is zero at the moment.
     pub(super) fn zero(&self) -> &Polynomial {
         &self.zero
     }
 
-    /// The moment, or a number within a millionth below it.
+    /// Returns the moment, or a number within a millionth below it.
     pub(super) fn near(&self) -> Rational {
         let narrow = self
             .zero
@@ -78,7 +78,7 @@ impl Instant {
         narrow.lower().clone()
     }
 
-    /// The sign of a polynomial at the moment.
+    /// Returns the sign of a polynomial at the moment.
     pub(super) fn sign(&self, polynomial: &Polynomial) -> i32 {
         let mut root = self.root.clone();
         if let Root::Between(low, high) = &root
@@ -93,7 +93,8 @@ impl Instant {
             match &root {
                 Root::Exact(value) => return polynomial.at(value).signum(),
                 Root::Between(low, high) => {
-                    // It is not zero at the moment, so near enough it is zero nowhere.
+                    // The polynomial is not zero at the moment, so it has no zero in a sufficiently
+                    // small neighbourhood.
                     let has_signs = !polynomial.at(low).is_zero() && !polynomial.at(high).is_zero();
                     if polynomial.degree() == 0
                         || has_signs && polynomial.count_roots_between(low, high) == 0
@@ -107,7 +108,7 @@ impl Instant {
         }
     }
 
-    /// The value of a polynomial at the moment, if it can be seen to be rational.
+    /// Returns the value of a polynomial at the moment, if it is recognised as rational.
     pub(super) fn value(&self, polynomial: &Polynomial) -> Option<Rational> {
         match &self.root {
             Root::Exact(value) => Some(polynomial.at(value)),
@@ -115,7 +116,7 @@ impl Instant {
         }
     }
 
-    /// Which of two moments of a piece comes first.
+    /// Compares two moments of a piece.
     pub(super) fn order(&self, other: &Self) -> Ordering {
         match (&self.root, &other.root) {
             (Root::Exact(own), Root::Exact(other)) => own.cmp(other),

@@ -1,4 +1,4 @@
-//! The no-moving-targets rule: interfering happenings keep their distance.
+//! The no-moving-targets rule: minimum separation of interfering happenings.
 
 use super::judge::Judge;
 use super::stop::Stop;
@@ -7,7 +7,8 @@ use super::violation::Mistake;
 use crate::interference::Footprint;
 use crate::task::Task;
 
-/// Checks the happenings of the last group against each other and against those shortly before.
+/// Checks the happenings of the last group against each other and against preceding ones that are
+/// close.
 pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), Stop> {
     let Some((group, earlier)) = groups.split_last() else {
         return Ok(());
@@ -27,7 +28,7 @@ pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), S
     let separation = judge.task.epsilon();
     let latest = &group.happenings.last().expect("a group is not empty").time;
     for before in earlier.iter().rev() {
-        // Earlier groups are further away still, but their own happenings may be later.
+        // Earlier groups are further away, but may contain later happenings.
         let reach = &before.time + judge.settings.group_width() + separation;
         if reach <= group.time && reach <= *latest {
             break;
@@ -45,10 +46,10 @@ pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), S
     Ok(())
 }
 
-/// So few happenings are compared with each other, whatever they touch.
+/// Up to this number of happenings, all pairs are compared.
 const FEW: usize = 16;
 
-/// The ways in which a footprint touches a fact or a fluent.
+/// Kinds of access to a fact or a fluent.
 const READS: usize = 0;
 const ADDS: usize = 1;
 const DELETES: usize = 2;
@@ -56,7 +57,7 @@ const READS_FLUENT: usize = 3;
 const SHIFTS: usize = 4;
 const ASSIGNS: usize = 5;
 
-/// For each of these ways, those that it interferes with.
+/// For each kind of access, the kinds that it interferes with.
 const AGAINST: [&[usize]; 6] = [
     &[ADDS, DELETES],
     &[READS, DELETES],
@@ -66,11 +67,12 @@ const AGAINST: [&[usize]; 6] = [
     &[READS_FLUENT, SHIFTS, ASSIGNS],
 ];
 
-/// Which happenings of a group, by position, read and write what: of thousands at once most share nothing, and need not be
-/// compared with each other.
+/// Index of the facts and fluents that the happenings of a group access. Of thousands of
+/// simultaneous happenings, most share nothing and need not be compared.
 struct Touched {
     count: usize,
-    /// What is touched and how, as [`place`] numbers it, and by which; in order. `None` if there are few.
+    /// Sorted pairs of access, as numbered by [`place`], and position of the happening. `None` if
+    /// there are few happenings.
     by: Option<Vec<(usize, usize)>>,
 }
 
@@ -89,7 +91,8 @@ impl Touched {
         Self { count, by }
     }
 
-    /// Those that may interfere with such a happening, in order: all that do are among them.
+    /// Returns the happenings that may interfere with such a happening, sorted. It may contain
+    /// others.
     fn near(&self, footprint: &Footprint) -> Vec<usize> {
         let Some(by) = &self.by else {
             return (0..self.count).collect();
@@ -109,7 +112,7 @@ impl Touched {
     }
 }
 
-/// The number of a fact or a fluent that is touched in that way.
+/// Returns the number of an access to a fact or a fluent.
 fn place(id: u32, how: usize) -> usize {
     id as usize * AGAINST.len() + how
 }
@@ -136,13 +139,13 @@ fn compare<'a>(
     first: &Happening<'a>,
     second: &Happening<'a>,
 ) -> Result<(), Stop> {
-    // The plan is not to blame for when timed initials happen.
+    // Times of timed initials are no mistake of the plan.
     let are_both_timed = matches!((first.what, second.what), (What::Timed(_), What::Timed(_)));
     let interfere = first.footprint.interferes_with(&second.footprint);
     if are_both_timed || !interfere || judge.settings.allows_simultaneous_reads {
         return Ok(());
     }
-    // The later one is to blame, unless it is not of the plan.
+    // The later happening is reported, unless it does not belong to the plan.
     let blamed = second.what.step().or(first.what.step());
     let mistake = Mistake::Interference {
         first: judge.occurrence(first.what, &first.time),
@@ -153,7 +156,7 @@ fn compare<'a>(
     Err(judge.violation(&second.time, blamed, mistake))
 }
 
-/// The first fact or fluent over which two footprints interfere.
+/// Returns the first fact or fluent over which two footprints interfere.
 pub(super) fn over(task: &Task, a: &Footprint, b: &Footprint) -> String {
     for (writer, other) in [(a, b), (b, a)] {
         let facts = writer

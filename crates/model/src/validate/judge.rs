@@ -1,4 +1,4 @@
-//! The plan is carried out, happening group by happening group.
+//! Execution of the plan, happening group by happening group.
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -25,40 +25,40 @@ use crate::task::Task;
 
 static NO_SLACK: Rational = Rational::ZERO;
 
-/// The course of events up to some moment.
+/// State of the validation at some moment.
 pub(super) struct Judge<'a> {
     pub(super) task: &'a Task,
     pub(super) plan: &'a TimeTriggeredPlan,
     pub(super) settings: &'a Settings,
     pub(super) derivation: Derivation,
     pub(super) now: Now,
-    /// The derived facts that hold in `now`, once something has asked for them.
+    /// Derived facts that hold in `now`, computed on demand.
     pub(super) derived: OnceCell<Derived<Fault>>,
     /// Steps that have started and not ended.
     pub(super) running: BTreeMap<usize, Running>,
-    /// The last change of each fact: time and happening.
+    /// Last change of each fact: time and happening.
     pub(super) since: BTreeMap<FactId, (Rational, What<'a>)>,
     pub(super) margins: Margins,
-    /// What the constraints on the course say; `None` if there are none.
+    /// Constraints on the course; `None` if there are none.
     pub(super) course: Option<Course<'a>>,
-    /// The preferences among the conditions of actions.
+    /// Preferences among the conditions of actions.
     pub(super) preferences: OfActions,
     /// Processes and events; `None` if there are none.
     pub(super) nature: Option<Nature>,
 }
 
-/// A durative action under way.
+/// A running durative action.
 #[derive(Clone, Debug)]
 pub(super) struct Running {
-    /// Whether no happening group has passed since it started.
+    /// `true` if no happening group has passed since it started.
     pub(super) is_new: bool,
-    /// For each end effect, whether its guard may still come true.
+    /// For each end effect, `true` if its guard may still become true.
     pub(super) end_guards: Vec<bool>,
-    /// For each continuous effect, whether it takes place.
+    /// For each continuous effect, `true` if it takes place.
     pub(super) continuous: Vec<bool>,
 }
 
-/// The actions under way in mid-execution, by the position of the step that continues each.
+/// Returns the running actions of a situation, by the position of the step that continues each.
 pub(super) fn running(situation: &Situation) -> BTreeMap<usize, Running> {
     let under_way = situation.running.iter().enumerate();
     under_way
@@ -75,8 +75,8 @@ pub(super) fn running(situation: &Situation) -> BTreeMap<usize, Running> {
 }
 
 impl<'a> Judge<'a> {
-    /// Lives through all groups, then looks at the goal. With `from`, things are under way
-    /// already at that time.
+    /// Processes all groups, then checks the goal. With `from`, actions are already running at that
+    /// time.
     pub(super) fn run(
         &mut self,
         from: Option<&Rational>,
@@ -117,7 +117,7 @@ impl<'a> Judge<'a> {
         self.require(self.task.goal(), When::Goal, None, &at_end)
     }
 
-    /// Notes the state from `time` on for the constraints on the course.
+    /// Records the state from `time` on for the constraints on the course.
     fn note_state(&mut self, time: &Rational) -> Result<(), Stop> {
         let Some(mut course) = self.course.take() else {
             return Ok(());
@@ -127,7 +127,7 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// From just after the group at `from` to the arrival at the next one.
+    /// Advances from just after the group at `from` to the arrival at the next one.
     fn pass(&mut self, from: &Rational, to: &Rational) -> Result<(), Stop> {
         let rates = effects::rates(self);
         let motion = Motion::from(&self.now, &rates)
@@ -143,8 +143,8 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// Notes for the constraints on the course what changes until `length` later, in the part that
-    /// is given.
+    /// Records the changes until `length` later for the constraints on the course, in the given
+    /// part.
     pub(super) fn watch_course(
         &mut self,
         from: &Rational,
@@ -171,9 +171,8 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// Checks the over-all conditions of running actions, and the over-all guards of their
-    /// effects, at every moment from the group at `from` until `length` later, in the part that is
-    /// given.
+    /// Checks the over-all conditions of running actions, and the over-all guards of their effects,
+    /// at every moment from the group at `from` until `length` later, in the given part.
     pub(super) fn watch_over_all(
         &mut self,
         from: &Rational,
@@ -275,7 +274,7 @@ impl<'a> Judge<'a> {
         self.preferences = preferences;
     }
 
-    /// Reads, at its start, which effects an action may have.
+    /// Evaluates, at its start, the guards of the effects of an action.
     fn begin(&self, position: usize, time: &Rational) -> Result<Running, Stop> {
         let (_, body) = self.durative(position);
         let read = |guard: &Condition| {
@@ -365,7 +364,7 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// By how much comparisons may fail in such a condition.
+    /// Returns the tolerance of comparisons in such a condition.
     fn slack(&self, when: When) -> &'a Rational {
         match when {
             When::OverAll => &NO_SLACK,
@@ -373,7 +372,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Whether a condition of a step, or the goal, holds in the current state.
+    /// Returns `true` if a condition of a step, or the goal, holds in the current state.
     pub(super) fn reads(&self, condition: &Condition, step: Option<usize>) -> Result<bool, Fault> {
         let current = (&self.now, &self.derived);
         let reader = (step, &self.settings.slack);
@@ -382,7 +381,7 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Numbers in the current state as a step reads them.
+    /// Returns the numbers in the current state as a step reads them.
     pub(super) fn reading(&self, step: Option<usize>) -> Reading<'_> {
         self.reading_of(&self.now, (step, &self.settings.slack))
     }
@@ -400,7 +399,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Hands `look` the moment `now`, with its derived facts if the condition needs them.
+    /// Calls `look` with the moment `now`, with its derived facts if the condition needs them.
     fn with_moment<T>(
         &self,
         condition: &Condition,
@@ -410,7 +409,7 @@ impl<'a> Judge<'a> {
     ) -> T {
         let reading = self.reading_of(now, (step, slack));
         if self.derivation.is_read_by(condition) {
-            // Rules know no `?duration`.
+            // Rules cannot read `?duration`.
             let derive = || self.derivation.derive(&self.reading_of(now, (None, slack)));
             let derived = derived.get_or_init(derive);
             look(&reading, &self.derivation.on_top_of(&reading, derived))
@@ -419,7 +418,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The reasons why a condition is false in `now`.
+    /// Returns the reasons why a condition is false in `now`.
     pub(super) fn explain(
         &self,
         condition: &Condition,
@@ -446,7 +445,7 @@ impl<'a> Judge<'a> {
         )
     }
 
-    /// The step and its durative body; only asked for steps that have one.
+    /// Returns the step and its durative body. The step must be durative.
     pub(super) fn durative(&self, position: usize) -> (&'a Step, &'a DurativeBody) {
         let step = &self.plan.steps[position];
         (
@@ -457,7 +456,7 @@ impl<'a> Judge<'a> {
         )
     }
 
-    /// The effects of a happening of the plan; `None` for all others.
+    /// Returns the effects of a happening of the plan; `None` for all others.
     pub(super) fn snap(&self, what: What<'a>) -> Option<&'a SnapAction> {
         let action = &self.plan.steps[what.step()?].action;
         match (&action.body, what) {

@@ -1,4 +1,4 @@
-//! How far a valid plan is from violating each of its numeric conditions.
+//! Margins of a valid plan's numeric conditions.
 
 use std::collections::BTreeMap;
 
@@ -11,21 +11,21 @@ use super::violation::{ActionInstance, When};
 use crate::ground::{Condition, Expression};
 use crate::problem::Comparison;
 
-/// The margin by which a comparison of an action or of the goal holds.
+/// Margin of a comparison that an action or the goal needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Margin {
     /// The action; `None` for the goal.
     pub action: Option<ActionInstance>,
-    /// Which of its conditions.
+    /// Condition of the action that contains it.
     pub when: When,
-    /// The comparison as PDDL writes it.
+    /// The comparison in PDDL notation.
     pub condition: String,
-    /// By how much the greater side exceeded the smaller one at the tightest moment; 0 for
-    /// equations. For over-all conditions the limit at the ends counts.
+    /// Difference of the greater and the smaller side at the tightest moment; 0 for equations. For
+    /// over-all conditions, the limit at the ends counts.
     pub margin: Rational,
-    /// That moment.
+    /// Tightest moment.
     pub time: Rational,
-    /// Whether a margin of 0 would be a violation.
+    /// `true` if a margin of 0 would be a violation.
     pub is_strict: bool,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct Demand<'a> {
 }
 
 impl<'a> Demand<'a> {
-    /// The demand that a conjunct makes; `None` if it is not a comparison, negated or not.
+    /// Returns the demand of a conjunct; `None` if it is not a comparison, negated or not.
     pub(super) fn of(conjunct: &'a Condition) -> Option<Self> {
         let (comparison, left, right) = match conjunct {
             Condition::Compare(comparison, left, right) => (*comparison, left, right),
@@ -63,7 +63,7 @@ impl<'a> Demand<'a> {
     }
 }
 
-/// The comparison that holds when this one does not; `!=` has none.
+/// Returns the comparison that holds when this one does not; `!=` has none.
 fn opposite(comparison: Comparison) -> Option<Comparison> {
     match comparison {
         Comparison::Less => Some(Comparison::AtLeast),
@@ -74,15 +74,15 @@ fn opposite(comparison: Comparison) -> Option<Comparison> {
     }
 }
 
-/// Step (none: the goal), kind, and position among the conjuncts.
+/// Step (`None`: the goal), kind, and position among the conjuncts.
 type Key = (Option<usize>, When, usize);
 
-/// The tightest margins met so far.
+/// Tightest margins until now.
 #[derive(Debug, Default)]
 pub(super) struct Margins(BTreeMap<Key, (Rational, Rational)>);
 
 impl Margins {
-    /// Notes the margin of a demand that is read once, at `time`.
+    /// Records the margin of a demand that is read once, at `time`.
     pub(super) fn read(
         &mut self,
         key: Key,
@@ -102,7 +102,7 @@ impl Margins {
         }
     }
 
-    /// Notes the tightest margin of a demand throughout a piece that began at `time`.
+    /// Records the tightest margin of a demand throughout a piece that began at `time`.
     pub(super) fn watch(
         &mut self,
         key: Key,
@@ -133,14 +133,14 @@ impl Margins {
         }
     }
 
-    /// All margins with their keys, in the order of the plan's steps, the goal first.
+    /// Returns all margins with their keys, in the order of the plan's steps, the goal first.
     pub(super) fn into_entries(self) -> impl Iterator<Item = (Key, (Rational, Rational))> {
         self.0.into_iter()
     }
 }
 
-/// Where a polynomial may have its minimum on a piece; beyond the second degree, or where the piece
-/// has irrational ends, within a millionth of there.
+/// Returns the positions of possible minima of a polynomial on a piece. Beyond the second degree,
+/// or if the piece has irrational ends, they are approximated within a millionth.
 fn extremes(polynomial: &Polynomial, piece: &Piece<'_>) -> Vec<Rational> {
     let (from, to) = piece.ends();
     let mut offsets = vec![from.clone()];

@@ -1,4 +1,4 @@
-//! What the problem's metric is worth at the end of a plan.
+//! Value of the problem's metric at the end of a plan.
 
 use elbowroom_num::Rational;
 
@@ -7,11 +7,11 @@ use crate::Task;
 use crate::problem::{Expression, ObjectId, Term};
 
 impl Report {
-    /// The value of the problem's `:metric`, as the problem writes it: with `maximize`, more is
-    /// better. `total-time` is the makespan.
+    /// Returns the value of the problem's `:metric`, without a change of sign: with `maximize`,
+    /// greater values are better. `total-time` is the makespan.
     ///
-    /// `None` if the problem has no metric, or one that reads a fluent that has no value when the
-    /// plan is over, or counts violations that cannot be decided.
+    /// Returns `None` if the problem has no metric, or one that reads a fluent without a final
+    /// value, or counts violations that cannot be decided.
     pub fn metric(&self, task: &Task) -> Option<Rational> {
         let expression = &task.problem().metric.as_ref()?.expression;
         expression.evaluate(&mut |leaf| match leaf {

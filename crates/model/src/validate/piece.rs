@@ -1,8 +1,9 @@
-//! The time between two happening groups, where facts stand still and numbers may move.
+//! The time between two happening groups: facts are constant and numbers may move.
 //!
-//! A condition is checked at every moment of such a piece by cutting the piece at the zeros of all
-//! differences that the condition compares: between two cuts no comparison changes, so one look
-//! at each cut and one between each two decide, whatever the condition's logical form.
+//! To check a condition at every moment of such a piece, the piece is cut at the zeros of all
+//! differences that the condition compares. No comparison changes between two cuts. So it is
+//! sufficient to evaluate the condition at each cut and once between neighbouring cuts, whatever
+//! its logical form.
 
 use elbowroom_num::Rational;
 
@@ -15,37 +16,38 @@ use crate::derivation::{Derivation, Moment, holds};
 use crate::ground::{Condition, Expression, FactId};
 use crate::problem::Comparison;
 
-/// The moments from one happening group until just before the next.
+/// Moments from one happening group until just before the next.
 pub(super) struct Piece<'a> {
-    /// The state right after the earlier group.
+    /// State right after the earlier group.
     pub(super) now: &'a Now,
     pub(super) motion: &'a Motion,
     pub(super) length: &'a Rational,
     pub(super) derivation: &'a Derivation,
     pub(super) slack: &'a Rational,
-    /// The part of the piece that is looked at; all of it if `None`.
+    /// Part of the piece to check; all of it if `None`.
     pub(super) part: Option<&'a Stretch>,
 }
 
-/// A part of a piece, throughout which the same processes are at work and no event happens.
+/// Part of a piece during which the same processes are active and no event happens.
 #[derive(Clone, Debug)]
 pub(super) struct Stretch {
-    /// Its beginning, by the clock of the piece.
+    /// Its beginning, on the clock of the piece.
     pub(super) from: Instant,
-    /// Its end, which does not belong to it; `None` if there is nothing but the beginning.
+    /// Its end, which does not belong to it; `None` if it consists of the beginning only.
     pub(super) to: Option<Instant>,
-    /// Whether the beginning does not belong to it: something happens right after that moment.
+    /// `true` if the beginning does not belong to it, because an event happens right after that
+    /// moment.
     pub(super) is_after: bool,
 }
 
-/// The moment at which a condition stops being true; times count from the beginning of the piece.
+/// Moment at which a condition becomes false. Times count from the beginning of the piece.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Break {
-    /// The earliest moment of falsehood, or the latest number known not to be above it.
+    /// The earliest moment of falsehood, or an approximation from below.
     pub(super) at: Rational,
-    /// Whether the condition still holds at that very moment, and fails right after it.
+    /// `true` if the condition still holds at that moment, and fails right after it.
     pub(super) is_after: bool,
-    /// Whether `at` is that moment itself; else the moment is irrational, and `at` within a
+    /// `true` if `at` is the exact moment. Otherwise the moment is irrational, and `at` is within a
     /// millionth below it.
     pub(super) is_exact: bool,
     /// A moment at which the condition is false, or the end of the piece, if it stays false.
@@ -53,27 +55,28 @@ pub(super) struct Break {
 }
 
 impl Break {
-    /// Whether this one comes first.
+    /// Returns `true` if this moment comes first.
     pub(super) fn is_before(&self, other: &Self) -> bool {
         (&self.at, self.is_after) < (&other.at, other.is_after)
     }
 }
 
-/// What is known about some conditions from a moment of a piece on.
+/// Truth values of some conditions from a moment of a piece on.
 pub(super) struct Known {
-    /// The moment, since the beginning of the piece; if it is irrational, up to a millionth less.
+    /// The moment, since the beginning of the piece. If it is irrational, it is up to a millionth
+    /// later.
     pub(super) at: Rational,
-    /// Whether `at` is that moment itself.
+    /// `true` if `at` is the exact moment.
     pub(super) is_exact: bool,
-    /// Whether it is so only right after that moment.
+    /// `true` if the values hold only right after that moment.
     pub(super) is_open: bool,
-    /// The truth of each condition.
+    /// Truth value of each condition.
     pub(super) holds: Vec<bool>,
 }
 
 impl Piece<'_> {
-    /// Where `condition`, of an action with this duration, first fails. The very beginning counts
-    /// only if `includes_start`.
+    /// Returns the first moment at which `condition`, of an action with this duration, fails. The
+    /// beginning of the piece counts only if `includes_start`.
     pub(super) fn first_break(
         &self,
         condition: &Condition,
@@ -115,14 +118,14 @@ impl Piece<'_> {
         Ok(None)
     }
 
-    /// The truth of several conditions, read by nobody in particular, in each cell between their
-    /// common cuts; in order, from the very beginning of the piece on.
+    /// Returns the truth values of several conditions, without `?duration`, in each cell between
+    /// their common cuts, in order from the beginning of the piece.
     pub(super) fn course(&self, conditions: &[&Condition]) -> Result<Vec<Known>, Fault> {
         let all = Condition::And(conditions.iter().copied().cloned().collect());
         let reads_derived = self.derivation.is_read_by(&all);
         if !self.concerns(&all, reads_derived) {
-            // The state at the beginning of a piece is known; at that of a part, facts may have
-            // changed.
+            // The state at the beginning of a piece is known. At the beginning of a part, facts may
+            // have changed.
             let Some(part) = self.part else {
                 return Ok(Vec::new());
             };
@@ -157,15 +160,15 @@ impl Piece<'_> {
         Ok(known)
     }
 
-    /// Whether the condition holds at a moment of the piece.
+    /// Returns `true` if the condition holds at a moment of the piece.
     pub(super) fn holds_at(&self, condition: &Condition, at: &Instant) -> Result<bool, Fault> {
         let reads_derived = self.derivation.is_read_by(condition);
         let view = self.view(None, Place::Instant(at.clone()));
         self.look(condition, &view, reads_derived)
     }
 
-    /// Whether the condition holds right after the beginning of the part, and the first moment
-    /// after that at which, or right after which, it is otherwise.
+    /// Returns the truth value of the condition right after the beginning of the part, and the
+    /// first moment after that at which, or right after which, it changes.
     pub(super) fn turn(&self, condition: &Condition) -> Result<(bool, Option<Instant>), Fault> {
         let reads_derived = self.derivation.is_read_by(condition);
         if !self.concerns(condition, reads_derived) {
@@ -192,7 +195,8 @@ impl Piece<'_> {
         Ok((first.unwrap_or(false), None))
     }
 
-    /// Beginning and end of the part; where they are irrational, within a millionth below them.
+    /// Returns the beginning and the end of the part. Irrational ends are approximated within a
+    /// millionth from below.
     pub(super) fn ends(&self) -> (Rational, Rational) {
         match self.part {
             None => (Rational::ZERO, self.length.clone()),
@@ -208,7 +212,7 @@ impl Piece<'_> {
         self.part.is_none_or(|part| part.from.as_exact().is_some())
     }
 
-    /// `left - right` as a function of the time since the piece began.
+    /// Returns `left - right` as a function of the time since the piece began.
     pub(super) fn difference(
         &self,
         left: &Expression,
@@ -233,7 +237,7 @@ impl Piece<'_> {
 
     fn look(&self, condition: &Condition, view: &View<'_>, derive: bool) -> Result<bool, Fault> {
         if derive {
-            // Rules know no `?duration`.
+            // Rules cannot read `?duration`.
             let plain = self.view(None, view.place.clone());
             let derived = self.derivation.derive(&plain);
             holds(condition, &self.derivation.on_top_of(view, &derived))
@@ -242,7 +246,7 @@ impl Piece<'_> {
         }
     }
 
-    /// Whether anything that the condition compares moves.
+    /// Returns `true` if a number that the condition compares moves.
     fn concerns(&self, condition: &Condition, reads_derived: bool) -> bool {
         if self.motion.is_still() {
             return false;
@@ -257,7 +261,7 @@ impl Piece<'_> {
         concerns
     }
 
-    /// The zeros of everything that the condition compares.
+    /// Returns the zeros of all differences that the condition compares.
     fn cuts(
         &self,
         condition: &Condition,
@@ -266,8 +270,8 @@ impl Piece<'_> {
     ) -> Cuts {
         let mut polynomials = Vec::new();
         let mut add = |left: &Expression, right: &Expression, duration: Option<&Rational>| {
-            // A comparison that says nothing cuts nothing: it says nothing in each cell, where the
-            // other parts of the condition decide whether that matters.
+            // An undefined comparison has no zeros. It is undefined in each cell, and the other
+            // parts of the condition decide whether that matters.
             let Ok(difference) = self.difference(left, right, duration) else {
                 return;
             };
@@ -284,7 +288,7 @@ impl Piece<'_> {
                 body.visit_comparisons(&mut |left, right| add(left, right, None));
             });
         }
-        // So that the cells begin and end with the part.
+        // The cells have to begin and end with the part.
         if let Some(part) = self.part {
             for end in [Some(&part.from), part.to.as_ref()].into_iter().flatten() {
                 polynomials.push(end.zero().clone());
@@ -304,7 +308,7 @@ impl Piece<'_> {
     }
 }
 
-/// The piece seen at one place.
+/// The piece at one place.
 struct View<'a> {
     piece: &'a Piece<'a>,
     duration: Option<&'a Rational>,

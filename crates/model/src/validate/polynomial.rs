@@ -1,29 +1,29 @@
-//! Polynomials in one variable with rational coefficients, and where they are zero.
+//! Polynomials in one variable with rational coefficients, and their zeros.
 
 use elbowroom_num::Rational;
 
-/// `c0 + c1 τ + c2 τ² + …`, the coefficients in that order, the last one not zero.
+/// `c0 + c1 τ + c2 τ² + …`: the coefficients in this order; the last one is not zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Polynomial(Vec<Rational>);
 
 /// A zero of a polynomial.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Root {
-    /// This number.
+    /// A rational number.
     Exact(Rational),
-    /// The only zero strictly between two numbers that are none.
+    /// The only zero strictly between two numbers that are not zeros.
     Between(Rational, Rational),
 }
 
 impl Root {
-    /// A number not above the root, and equal to it if the root is known exactly.
+    /// Returns a number not above the root, and equal to it if the root is known exactly.
     pub(super) fn lower(&self) -> &Rational {
         match self {
             Self::Exact(value) | Self::Between(value, _) => value,
         }
     }
 
-    /// A number not below the root, and equal to it if the root is known exactly.
+    /// Returns a number not below the root, and equal to it if the root is known exactly.
     pub(super) fn upper(&self) -> &Rational {
         match self {
             Self::Exact(value) | Self::Between(_, value) => value,
@@ -47,12 +47,12 @@ impl Polynomial {
         self.0.is_empty()
     }
 
-    /// 0 for constants, zero included.
+    /// Returns the degree; 0 for constants, including zero.
     pub(super) fn degree(&self) -> usize {
         self.0.len().saturating_sub(1)
     }
 
-    /// The value, if it is the same everywhere.
+    /// Returns the value, if the polynomial is constant.
     pub(super) fn as_constant(&self) -> Option<Rational> {
         match self.0.as_slice() {
             [] => Some(Rational::ZERO),
@@ -61,7 +61,7 @@ impl Polynomial {
         }
     }
 
-    /// The value at `at`.
+    /// Returns the value at `at`.
     pub(super) fn at(&self, at: &Rational) -> Rational {
         self.0
             .iter()
@@ -123,28 +123,30 @@ impl Polynomial {
         )
     }
 
-    /// The antiderivative whose value at 0 is `initial`.
+    /// Returns the antiderivative whose value at 0 is `initial`.
     pub(super) fn integral(&self, initial: Rational) -> Self {
         let powers = (1_i64..).map(Rational::from);
         let higher = self.0.iter().zip(powers).map(|(c, power)| c / &power);
         Self::new(std::iter::once(initial).chain(higher).collect())
     }
 
-    /// All zeros strictly between 0 and `length`, in order; none if this is zero everywhere.
+    /// Returns all zeros strictly between 0 and `length`, sorted; none for the zero polynomial.
     ///
-    /// Brackets share no point with each other, with exact roots, or with the two ends.
+    /// Brackets have no common points with each other, with exact roots, or with the two ends.
     pub(super) fn roots_within(&self, length: &Rational) -> Vec<Root> {
         self.roots_with(length, Vec::new())
     }
 
-    /// The same, given zeros between the two ends that are known already.
+    /// Like [`Self::roots_within`], with zeros strictly between the two ends that are already
+    /// known.
     pub(super) fn roots_with(&self, length: &Rational, mut exact: Vec<Rational>) -> Vec<Root> {
         let mut rest = self.square_free();
-        // The ends, so that no bracket can begin or stop at a zero.
+        // The ends are divided out as well, so that no bracket begins or ends at a zero.
         for known in [&Rational::ZERO, length].into_iter().chain(&exact) {
             rest.divide_out(known);
         }
-        // Zeros met on the way are divided out, and the search starts again without them.
+        // Exact zeros found during the search are divided out, and the search restarts without
+        // them.
         let brackets = loop {
             if let Some(root) = rest.only_root() {
                 rest = Self::constant(Rational::ONE);
@@ -173,8 +175,8 @@ impl Polynomial {
         roots
     }
 
-    /// Brackets for the zeros between the first and the last of `points`, none of which is a zero
-    /// nor an end of a bracket; or a zero that was met by chance.
+    /// Returns brackets of the zeros between the first and the last of `points`; no point is a zero
+    /// or an end of a bracket. Returns an exact zero as an error if one is found.
     fn isolate(&self, points: &[Rational]) -> Result<Vec<(Rational, Rational)>, Rational> {
         if self.degree() == 0 {
             return Ok(Vec::new());
@@ -206,10 +208,10 @@ impl Polynomial {
         Ok(found)
     }
 
-    /// The zero in a bracket, exact if it is rational.
+    /// Returns the zero in a bracket, exact if it is rational.
     fn recognised(&self, low: Rational, high: Rational) -> Root {
-        // Multiplied out to whole coefficients, the denominator of a rational zero divides the
-        // leading one: the zero is a multiple of `unit`.
+        // With integer coefficients, the denominator of a rational zero divides the leading one, so
+        // the zero is a multiple of `unit`.
         let whole = self
             .0
             .iter()
@@ -231,13 +233,13 @@ impl Polynomial {
         }
     }
 
-    /// The number of distinct zeros that lie strictly between two numbers that are none.
+    /// Returns the number of distinct zeros strictly between two numbers that are not zeros.
     pub(super) fn count_roots_between(&self, low: &Rational, high: &Rational) -> usize {
         let chain = self.square_free().sturm_chain();
         changes(&chain, low) - changes(&chain, high)
     }
 
-    /// A narrower bracket of the same zero, at most `width` wide; exact when met by chance.
+    /// Returns a bracket of the same zero, at most `width` wide; exact if the zero is found.
     pub(super) fn narrowed(&self, root: &Root, width: &Rational) -> Root {
         let Root::Between(low, high) = root else {
             return root.clone();
@@ -257,7 +259,7 @@ impl Polynomial {
         Root::Between(low, high)
     }
 
-    /// The polynomial with the same zeros, each once.
+    /// Returns the polynomial with the same zeros, each once.
     pub(super) fn square_free(&self) -> Self {
         let derivative = self.derivative();
         if derivative.is_zero() {
@@ -266,7 +268,7 @@ impl Polynomial {
         self.divided(&self.common_divisor(&derivative)).0
     }
 
-    /// The greatest common divisor, up to a factor.
+    /// Returns the greatest common divisor, up to a factor.
     pub(super) fn common_divisor(&self, other: &Self) -> Self {
         let (mut a, mut b) = (self.clone(), other.clone());
         while !b.is_zero() {
@@ -276,7 +278,7 @@ impl Polynomial {
         a
     }
 
-    /// Divided by its leading coefficient, to keep numbers small.
+    /// Divides by the leading coefficient, to keep numbers small.
     fn monic(&self) -> Self {
         match self.0.last().and_then(Rational::reciprocal) {
             Some(factor) => self.scaled(&factor),
@@ -284,7 +286,7 @@ impl Polynomial {
         }
     }
 
-    /// Quotient and remainder; `divisor` is not zero.
+    /// Returns quotient and remainder; `divisor` must not be zero.
     pub(super) fn divided(&self, divisor: &Self) -> (Self, Self) {
         let leading = divisor.0.last().expect("the divisor is not zero");
         let mut remainder = self.0.clone();
@@ -302,7 +304,7 @@ impl Polynomial {
         (Self::new(quotient), Self::new(remainder))
     }
 
-    /// The zero of a polynomial of the first degree.
+    /// Returns the zero of a polynomial of the first degree.
     pub(super) fn only_root(&self) -> Option<Rational> {
         match self.0.as_slice() {
             [c0, c1] => Some(-(c0 / c1)),
@@ -310,8 +312,8 @@ impl Polynomial {
         }
     }
 
-    /// The only zero strictly between 0 and `length` of a polynomial that has at most one beside
-    /// those two: told without a search.
+    /// Returns the only zero strictly between 0 and `length`, without a search, if the polynomial
+    /// has at most one zero other than 0 and `length`.
     pub(super) fn plain_root_within(&self, length: &Rational) -> Option<Rational> {
         let mut rest = self.clone();
         rest.divide_out(&Rational::ZERO);
@@ -327,14 +329,14 @@ impl Polynomial {
         }
     }
 
-    /// Sturm's sequence: this, its derivative, then negated remainders.
+    /// Returns Sturm's sequence: the polynomial, its derivative, then negated remainders.
     fn sturm_chain(&self) -> Vec<Self> {
         let mut chain = vec![self.clone(), self.derivative()];
         while let [.., before, last] = chain.as_slice()
             && !last.is_zero()
         {
             let remainder = before.divided(last).1.negated();
-            // Only signs matter: scaled down by a positive number.
+            // Only signs matter, so remainders are scaled by a positive number.
             let scale = remainder.0.last().and_then(|c| c.abs().reciprocal());
             chain.push(scale.map_or_else(|| remainder.clone(), |scale| remainder.scaled(&scale)));
         }
@@ -342,7 +344,7 @@ impl Polynomial {
     }
 }
 
-/// How often the sign changes along the chain's values at `at`, zeros left out.
+/// Returns the number of sign changes of the chain's values at `at`, without zeros.
 fn changes(chain: &[Polynomial], at: &Rational) -> usize {
     let signs: Vec<_> = chain
         .iter()

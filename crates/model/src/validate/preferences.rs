@@ -1,4 +1,4 @@
-//! Preferences: how often a plan violates each.
+//! Preferences: number of violations of each.
 
 use elbowroom_num::Rational;
 
@@ -11,31 +11,32 @@ use crate::plan::TimeTriggeredPlan;
 use crate::problem::PreferenceId;
 use crate::task::Task;
 
-/// What a plan violates of the preferences.
+/// Preferences that a plan violates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Preferences {
-    /// Each violated instance: first those of actions, by step, then those of the goal and of the
+    /// Violated instances: first those of actions, by step, then those of the goal and of the
     /// constraints.
     pub violated: Vec<ViolatedPreference>,
-    /// The instances of which it is not known whether they are violated.
+    /// Instances whose violation is undecided.
     pub undecided: Vec<(PreferenceId, Undecided)>,
 }
 
 /// An instance of a preference that a plan violates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViolatedPreference {
-    /// Which one.
+    /// The preference.
     pub preference: PreferenceId,
-    /// Since when.
+    /// Time of the violation.
     pub time: Rational,
-    /// The action among whose conditions it stands.
+    /// The action whose conditions contain it.
     pub action: Option<ActionInstance>,
-    /// What is violated, and why.
+    /// Violated condition and reason, in words.
     pub why: String,
 }
 
 impl Preferences {
-    /// `(is-violated …)`: how many instances the plan violates; `None` where that is not known.
+    /// Returns the value of `(is-violated …)`: the number of violated instances. Returns `None` if
+    /// it is undecided.
     pub fn violations(&self, preference: PreferenceId) -> Option<usize> {
         let is_known = self.undecided.iter().all(|(other, _)| *other != preference);
         let same = self.violated.iter().filter(|v| v.preference == preference);
@@ -43,23 +44,23 @@ impl Preferences {
     }
 }
 
-/// The preferences among the conditions of a plan's actions.
+/// Preferences among the conditions of a plan's actions.
 #[derive(Debug, Default)]
 pub(super) struct OfActions {
     /// By step; empty if no action has any.
     steps: Vec<Vec<Instance>>,
-    /// Of steps before this one, the start has not been seen.
+    /// The starts of steps before this one are not part of the plan.
     running: usize,
 }
 
 #[derive(Debug)]
 struct Instance {
     soft: SoftCondition,
-    /// Since when it is violated.
+    /// Time of the violation, and reason.
     broken: Option<(Rational, String)>,
 }
 
-/// Which part of a soft condition is read.
+/// Part of a soft condition that is read.
 #[derive(Clone, Copy)]
 pub(super) enum Part {
     Start,
@@ -90,7 +91,7 @@ impl OfActions {
         }
     }
 
-    /// Reads, on arrival at a step's start or end, what belongs there.
+    /// Reads the parts that belong to a step's start or end, on arrival.
     pub(super) fn read(&mut self, judge: &Judge<'_>, step: usize, part: Part, time: &Rational) {
         for instance in self.steps.get_mut(step).into_iter().flatten() {
             let condition = match part {
@@ -105,7 +106,7 @@ impl OfActions {
         }
     }
 
-    /// Watches what belongs to all of a running step throughout a piece of time.
+    /// Checks the parts that belong to the whole of a running step throughout a piece of time.
     pub(super) fn watch(
         &mut self,
         piece: &Piece<'_>,
@@ -121,7 +122,7 @@ impl OfActions {
             let broken = match found {
                 Ok(None) => continue,
                 Ok(Some(broken)) => from + broken.at,
-                // What says nothing does not hold.
+                // An undefined condition does not hold.
                 Err(_) => from.clone(),
             };
             let why = task.describe_condition(condition);
@@ -129,7 +130,7 @@ impl OfActions {
         }
     }
 
-    /// All that is violated.
+    /// Returns all violations.
     pub(super) fn into_preferences(self, plan: &TimeTriggeredPlan) -> Preferences {
         let mut preferences = Preferences::default();
         for (position, instances) in self.steps.into_iter().enumerate() {
@@ -158,7 +159,7 @@ impl OfActions {
 }
 
 impl<'a> Judge<'a> {
-    /// All that the plan violates of the preferences, now that it is over.
+    /// Returns all violations of preferences, at the end of the plan.
     pub(super) fn preferences_of(&mut self, groups: &[super::timeline::Group<'a>]) -> Preferences {
         let of_actions = std::mem::take(&mut self.preferences);
         let mut preferences = of_actions.into_preferences(self.plan);

@@ -1,4 +1,4 @@
-//! What an expression says at one moment.
+//! Values of expressions at one moment.
 
 use elbowroom_num::Rational;
 
@@ -6,32 +6,32 @@ use super::polynomial::Polynomial;
 use crate::ground::{Expression, FluentId};
 use crate::problem::{Comparison, Unknown};
 
-/// Why a condition or an expression says nothing.
+/// Reason why a condition or an expression is undefined.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Fault {
     /// It reads a fluent that has no value.
     Undefined(FluentId),
-    /// It divides by zero; this is the divisor.
+    /// It divides by zero, with this divisor.
     DivisionByZero(Expression),
-    /// It depends on a number left open.
+    /// It depends on an open number.
     Open(Unknown),
-    /// It mentions `?duration` where there is no action, or `total-time`.
+    /// It mentions `?duration` outside of an action, or `total-time`.
     Misplaced(Expression),
-    /// It divides by something that changes continuously.
+    /// It divides by an expression that changes continuously.
     Quotient(Expression),
     /// It reads a fluent whose value is irrational.
     Irrational(FluentId),
-    /// It reads a fluent whose rate of change depends, in the end, on the fluent itself.
+    /// It reads a fluent whose rate of change depends, possibly indirectly, on the fluent itself.
     Circular(FluentId),
 }
 
-/// Numbers, or numbers that change with time.
+/// Numbers, or functions of time.
 pub(super) trait Quantity: Sized + Clone {
     fn constant(value: &Rational) -> Self;
     fn plus(&self, other: &Self) -> Self;
     fn minus(&self, other: &Self) -> Self;
     fn times(&self, other: &Self) -> Self;
-    /// `divisor` is what `other` was computed from, for the fault.
+    /// Returns the quotient. `divisor` is the expression of `other`, for the fault.
     fn over(&self, other: &Self, divisor: &Expression) -> Result<Self, Fault>;
 }
 
@@ -78,7 +78,7 @@ impl Quantity for Polynomial {
     }
 }
 
-/// The value of an expression whose fluents have the values that `fluent` gives.
+/// Returns the value of an expression, with values of fluents from `fluent`.
 pub(super) fn evaluate<Q: Quantity>(
     expression: &Expression,
     duration: Option<&Rational>,
@@ -116,7 +116,7 @@ pub(super) fn evaluate<Q: Quantity>(
     }
 }
 
-/// Whether `difference comparison 0`, given the signs of `difference + slack` and
+/// Returns `true` if `difference comparison 0`, given the signs of `difference + slack` and
 /// `difference - slack`; see [`Settings::slack`](super::Settings::slack).
 pub(super) fn compare_signs(comparison: Comparison, raised: i32, lowered: i32) -> bool {
     match comparison {

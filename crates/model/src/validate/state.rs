@@ -1,4 +1,4 @@
-//! The state at one moment, and how it moves until the next happening.
+//! State at one moment, and its motion until the next happening.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,8 +18,7 @@ use crate::task::Task;
 pub(super) struct Now {
     pub(super) facts: Vec<bool>,
     pub(super) values: Vec<Option<Rational>>,
-    /// Fluents that have a value, but an irrational one, which is not kept: they stopped at an
-    /// irrational moment.
+    /// Fluents with an irrational value, which is not stored: they stopped at an irrational moment.
     irrational: BTreeSet<FluentId>,
 }
 
@@ -50,7 +49,7 @@ impl Now {
         })
     }
 
-    /// Gives a fluent a value; `None`: an irrational one.
+    /// Sets the value of a fluent; `None` is an irrational value.
     pub(super) fn set(&mut self, fluent: FluentId, value: Option<Rational>) {
         if value.is_none() {
             self.irrational.insert(fluent);
@@ -58,7 +57,7 @@ impl Now {
         self.values[fluent.index()] = value;
     }
 
-    /// As the rest of the crate writes states.
+    /// Converts the state to the public type.
     pub(super) fn to_state(&self) -> State {
         let position = |index: usize| u32::try_from(index).expect("ids are 32 bits wide");
         State {
@@ -106,12 +105,12 @@ impl Moment<Fault> for Reading<'_> {
     }
 }
 
-/// How values change between two happening groups: each one a polynomial in the time since the
-/// earlier group. What is not listed does not change.
+/// Motion of values between two happening groups: each one is a polynomial in the time since the
+/// earlier group. Fluents that are not listed are constant.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motion(BTreeMap<FluentId, Polynomial>);
 
-/// `d fluent / dt` has the term `per_time`, of a step with this duration, or of a process.
+/// Term `per_time` of `d fluent / dt`, of a step with this duration, or of a process.
 pub(super) struct Rate<'a> {
     pub(super) step: Option<usize>,
     pub(super) fluent: FluentId,
@@ -119,14 +118,14 @@ pub(super) struct Rate<'a> {
     pub(super) duration: Option<&'a Rational>,
 }
 
-/// What goes wrong with a motion, and the step to blame if it is one.
+/// Fault of a motion, and the step to report if there is one.
 type Blamed = (Option<usize>, Fault);
 
 impl Motion {
-    /// The motion from `now` on.
+    /// Returns the motion from `now` on.
     ///
-    /// A rate may itself read fluents that move (the values are then polynomials of a higher
-    /// degree), as long as no fluent's rate depends on the fluent itself.
+    /// A rate may itself read fluents that move; the values are then polynomials of a higher
+    /// degree. No fluent's rate may depend on the fluent itself.
     pub(super) fn from(now: &Now, rates: &[Rate<'_>]) -> Result<Self, Blamed> {
         let mut motion = Self::default();
         for (fluent, rates) in in_order(rates)? {
@@ -138,9 +137,9 @@ impl Motion {
         Ok(motion)
     }
 
-    /// The motion from the moment `at` on, at which that of `before` ends, by the same clock. What
-    /// stands still from then on gets its value in `now`. Where a coefficient would be irrational,
-    /// the fluent's value is lost.
+    /// Returns the motion from the moment `at` on, the end of the motion `before`, on the same
+    /// clock. Fluents that no longer move get their values in `now`. If a coefficient would be
+    /// irrational, the fluent has no value any more.
     pub(super) fn resumed(
         now: &mut Now,
         before: &Self,
@@ -175,7 +174,7 @@ impl Motion {
         Ok(motion)
     }
 
-    /// The sum of some rates of one fluent, and the last of their steps.
+    /// Returns the sum of some rates of one fluent, and the last of their steps.
     fn speed(&self, now: &Now, rates: &[&Rate<'_>]) -> Result<(Polynomial, Option<usize>), Blamed> {
         let mut speed = Polynomial::constant(Rational::ZERO);
         let mut step = None;
@@ -188,7 +187,7 @@ impl Motion {
         Ok((speed, step))
     }
 
-    /// Lets a fluent have the value of a polynomial, by the clock of the motion.
+    /// Sets a fluent to the value of a polynomial on the clock of the motion.
     pub(super) fn put(&mut self, now: &mut Now, fluent: FluentId, polynomial: Polynomial) {
         if let Some(value) = polynomial.as_constant() {
             self.0.remove(&fluent);
@@ -206,7 +205,7 @@ impl Motion {
         self.0.contains_key(&fluent)
     }
 
-    /// The value as a function of the time since `now`.
+    /// Returns the value as a function of the time since `now`.
     pub(super) fn value(&self, now: &Now, fluent: FluentId) -> Result<Polynomial, Fault> {
         match self.0.get(&fluent) {
             Some(polynomial) => Ok(polynomial.clone()),
@@ -214,7 +213,7 @@ impl Motion {
         }
     }
 
-    /// The state that this motion leads to after `elapsed`.
+    /// Advances the state by `elapsed`.
     pub(super) fn carry(&self, now: &mut Now, elapsed: &Rational) {
         for (fluent, polynomial) in &self.0 {
             now.values[fluent.index()] = Some(polynomial.at(elapsed));
@@ -222,7 +221,7 @@ impl Motion {
     }
 }
 
-/// The rates by fluent, those that others read first.
+/// Returns the rates by fluent, sorted so that those that others read come first.
 fn in_order<'r, 'a>(rates: &'r [Rate<'a>]) -> Result<Vec<(FluentId, Vec<&'r Rate<'a>>)>, Blamed> {
     let mut terms: BTreeMap<FluentId, Vec<&Rate<'_>>> = BTreeMap::new();
     for rate in rates {

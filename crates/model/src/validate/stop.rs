@@ -1,4 +1,4 @@
-//! Where and why the judge stops before the end of the plan.
+//! Results that stop the validation before the end of the plan.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +15,7 @@ use super::violation::{
 use crate::ground::{Change, Condition, DurationConstraint, Expression, FluentId};
 use crate::task::Task;
 
-/// The end of the matter; boxed, because nearly all calls return nothing of the kind.
+/// Reason for the stop; boxed, because most calls succeed.
 #[derive(Debug)]
 pub(super) enum Stop {
     Violation(Box<Violation>),
@@ -32,7 +32,7 @@ impl Stop {
         }))
     }
 
-    /// The same, with the happenings that make the violated condition true after it is read.
+    /// Returns the stop with the happenings that make the violated condition true after it is read.
     pub(super) fn with_late_changes(mut self, late: Vec<Occurrence>) -> Self {
         if let Self::Violation(violation) = &mut self
             && let Mistake::Condition { too_late, .. } = &mut violation.mistake
@@ -97,7 +97,7 @@ impl<'a> Place<'a> {
 }
 
 impl<'a> Judge<'a> {
-    /// The violation that a step, or the goal, commits.
+    /// Returns a violation of a step, or of the goal.
     pub(super) fn violation(&self, time: &Rational, step: Option<usize>, mistake: Mistake) -> Stop {
         let action = step.map(|position| self.instance(position));
         Stop::Violation(Box::new(Violation {
@@ -129,8 +129,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The violation that the condition at `place` is false in the state `then`; for over-all
-    /// conditions, from the moment that `broken` says.
+    /// Returns the violation for a condition at `place` that is false in the state `then`; for
+    /// over-all conditions, from the moment `broken` on.
     pub(super) fn fails(&self, place: &Place<'_>, then: &Now, broken: Option<&Break>) -> Stop {
         let Subject::Condition(when, condition) = place.subject else {
             unreachable!("only conditions fail");
@@ -190,13 +190,13 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The condition of a step, or the goal, as PDDL writes it.
+    /// Returns the condition of a step, or the goal, in PDDL notation.
     fn as_written(&self, condition: &Condition, step: Option<usize>) -> String {
         let action = step.map(|position| &*self.plan.steps[position].action);
         self.task.describe_condition_of(action, condition)
     }
 
-    /// The consequence of something that cannot be read.
+    /// Converts a fault to a violation or an undecided result.
     pub(super) fn stop(&self, fault: Fault, place: &Place<'_>) -> Stop {
         let within = match place.subject {
             Subject::Condition(_, condition) => self.task.describe_condition(condition),

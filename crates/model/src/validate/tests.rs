@@ -1,4 +1,4 @@
-//! Each sentence of the definition of a valid plan, as a small plan.
+//! Tests of each sentence of the definition of a valid plan, with small plans.
 
 mod conditions;
 mod constraints;

@@ -13,20 +13,20 @@ use crate::task::Task;
 /// The event of a happening.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum What<'a> {
-    /// The start of the plan's step of this position.
+    /// Start of the step at this position.
     Start(usize),
-    /// The end of that step.
+    /// End of the step at this position.
     End(usize),
-    /// That step, which takes no time.
+    /// The step at this position, which takes no time.
     Instant(usize),
     /// Timed initial literals and fluents.
     Timed(&'a TimedHappening),
-    /// The event of this position among the task's.
+    /// The task's event at this position.
     Event(usize),
 }
 
 impl What<'_> {
-    /// The position of the step it belongs to.
+    /// Returns the position of the step that it belongs to.
     pub(super) fn step(&self) -> Option<usize> {
         match self {
             Self::Start(step) | Self::End(step) | Self::Instant(step) => Some(*step),
@@ -35,7 +35,7 @@ impl What<'_> {
     }
 }
 
-/// Something that happens, when, and what it reads and writes.
+/// A happening with its time and footprint.
 #[derive(Clone, Debug)]
 pub(super) struct Happening<'a> {
     pub(super) what: What<'a>,
@@ -43,17 +43,17 @@ pub(super) struct Happening<'a> {
     pub(super) footprint: Footprint,
 }
 
-/// All that happens at one time.
+/// All happenings at one time.
 #[derive(Clone, Debug)]
 pub(super) struct Group<'a> {
     pub(super) time: Rational,
     pub(super) happenings: Vec<Happening<'a>>,
 }
 
-/// All happenings by time; those that the tolerance does not tell apart form one group.
+/// Returns all happenings by time. Those that are equal within the tolerance form one group.
 ///
-/// Timed initials after the last happening of the plan are left out if they do not count, and so is
-/// all that has happened when the plan begins in mid-execution.
+/// Timed initials after the last happening of the plan are left out if they do not count.
+/// Happenings before the beginning of a plan that continues a situation are left out as well.
 pub(super) fn timeline<'a>(
     task: &'a Task,
     situation: Option<&Situation>,

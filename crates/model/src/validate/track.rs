@@ -1,4 +1,5 @@
-//! One constraint on the course of a plan: when its conditions held, and whether that keeps it.
+//! Track of one constraint on the course of a plan: when its conditions hold, and whether it is
+//! satisfied.
 
 use std::cmp::Ordering;
 
@@ -10,17 +11,17 @@ use crate::describe::decimal;
 use crate::ground::Condition;
 use crate::task::Task;
 
-/// How close the beginning of a phase is known that is irrational.
+/// Precision of the irrational beginning of a phase.
 const CLOSE: (i64, i64) = (1, 1_000_000);
 
-/// When a phase begins.
+/// Beginning of a phase.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Beginning {
-    /// The time; if it is irrational, up to a millionth less.
+    /// The time. An irrational time is up to a millionth later.
     pub(super) time: Rational,
-    /// Whether `time` is the time itself.
+    /// `true` if `time` is exact.
     pub(super) is_exact: bool,
-    /// Whether the phase begins right after that moment, which does not belong to it.
+    /// `true` if the phase begins right after that moment, which does not belong to it.
     pub(super) is_after: bool,
 }
 
@@ -33,7 +34,7 @@ impl Beginning {
         }
     }
 
-    /// The latest that the time can be.
+    /// Returns an upper bound of the time.
     fn latest(&self) -> Rational {
         if self.is_exact {
             self.time.clone()
@@ -42,10 +43,10 @@ impl Beginning {
         }
     }
 
-    /// How the first moments of the phase compare to a time; `None` where that is not known.
+    /// Compares the first moments of the phase to a time; `None` if undecided.
     fn order(&self, time: &Rational) -> Option<Ordering> {
         if !self.is_exact {
-            // It lies strictly between the two.
+            // The beginning lies strictly between the two.
             return if *time <= self.time {
                 Some(Ordering::Greater)
             } else if *time >= self.latest() {
@@ -61,32 +62,32 @@ impl Beginning {
     }
 }
 
-/// A time throughout which the conditions of a constraint do not change.
+/// Interval during which the conditions of a constraint do not change.
 #[derive(Clone, Debug)]
 pub(super) struct Phase {
     from: Beginning,
-    /// The truth of the conditions; of the second, false if there is only one.
+    /// Truth values of the conditions; the second is `false` if there is only one.
     holds: [bool; 2],
-    /// Why the first condition is false, where that may be a violation.
+    /// Reasons why the first condition is false, if that may be a violation.
     reasons: Vec<Reason>,
 }
 
-/// The phases of one constraint.
+/// Phases of one constraint.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Track(Vec<Phase>);
 
-/// Whether a constraint is kept.
+/// Result for a constraint.
 #[derive(Debug)]
 pub(super) enum Finding {
     Kept,
-    /// From when on, why, and why the condition is false then.
+    /// Beginning of the violation, reason, and reasons why the condition is false then.
     Broken(Beginning, String, Vec<Reason>),
-    /// Two times are too close to each other to be told apart.
+    /// Two times are too close to each other for a decision.
     Unclear(Rational),
 }
 
 impl Track {
-    /// Notes what the conditions are from a moment on.
+    /// Records the truth values of the conditions from a moment on.
     pub(super) fn push(
         &mut self,
         from: Beginning,
@@ -104,7 +105,7 @@ impl Track {
         });
     }
 
-    /// Whether the constraint is kept by a plan that is over at `end`.
+    /// Evaluates the constraint for a plan that ends at `end`.
     pub(super) fn finding(&self, task: &Task, modal: &Modal<Condition>, end: &Rational) -> Finding {
         let text = |condition| task.describe_condition(condition);
         let broken = |phase: &Phase, why: String| {
@@ -153,7 +154,7 @@ impl Track {
                     return Finding::Kept;
                 };
                 let phase = &self.0[position];
-                // A phase without a first moment has an earlier one before each of its moments.
+                // In a phase without a first moment, each moment has an earlier one in the phase.
                 let is_before = phase.from.is_after && phase.holds[1];
                 if is_before || self.0[..position].iter().any(|phase| phase.holds[1]) {
                     return Finding::Kept;
@@ -177,9 +178,10 @@ impl Track {
         }
     }
 
-    /// Whether the first condition holds at a moment no later than `time`; `None`: it does not.
+    /// Checks that the first condition holds at a moment no later than `time`; `None` if it does
+    /// not.
     fn within(&self, time: &Rational) -> Option<Finding> {
-        // The first phase in which it holds is the earliest.
+        // The first phase that satisfies the condition is the earliest.
         let phase = self.0.iter().find(|phase| phase.holds[0])?;
         match phase.from.order(time) {
             Some(Ordering::Greater) => None,
@@ -191,7 +193,7 @@ impl Track {
     fn always_within(&self, time: &Rational, why: &dyn Fn() -> String) -> Finding {
         let mut unclear = None;
         for (position, phase) in self.0.iter().enumerate() {
-            // The first moment of a phase waits longest.
+            // The first moment of a phase has the longest wait.
             if !phase.holds[0] || phase.holds[1] {
                 continue;
             }
@@ -199,8 +201,8 @@ impl Track {
             let is_kept = answered.map_or(Some(false), |later| {
                 let (from, to) = (&phase.from, &later.from);
                 if from.is_exact && to.is_exact {
-                    // Without a first moment, the answer comes later than any wait that begins
-                    // with one.
+                    // If the phase with the response has no first moment, the response comes later
+                    // than any wait that begins at a first moment.
                     let is_later = to.is_after && !from.is_after;
                     return Some(match (&to.time - &from.time).cmp(time) {
                         Ordering::Less => true,
@@ -228,7 +230,7 @@ impl Track {
         unclear.map_or(Finding::Kept, Finding::Unclear)
     }
 
-    /// Whether the first condition holds at each moment from `from` until before `until`.
+    /// Checks that the first condition holds at each moment from `from` until before `until`.
     fn throughout(&self, from: &Rational, until: Option<&Rational>, why: &str) -> Finding {
         if until.is_some_and(|until| until <= from) {
             return Finding::Kept;

@@ -1,10 +1,10 @@
-//! Constraints on the course of a plan: which of them it keeps.
+//! Constraints on the course of a plan: evaluation.
 //!
-//! For each constraint the judge notes what its conditions are at the beginning, after each
-//! happening group, and, while numbers move, in each cell between two cuts (see
-//! [`piece`](super::piece)). Only changes are kept: a [`Phase`] begins where a condition's truth
-//! changes and goes on until the next one, the last one for ever. That loses nothing: each
-//! constraint is decided by the first moments of phases.
+//! For each constraint, the validator records the truth values of its conditions at the beginning,
+//! after each happening group, and, while numbers move, in each cell between two cuts (see
+//! [`piece`](super::piece)). Only changes are stored: a [`Phase`] begins when the truth value of a
+//! condition changes and lasts until the next change; the last one lasts forever. This is
+//! sufficient, because the first moments of phases decide each constraint.
 
 use elbowroom_num::Rational;
 
@@ -17,7 +17,7 @@ use super::violation::{Difficulty, Mistake, Undecided, When};
 use crate::constraint::{Constraints, Modal};
 use crate::ground::Condition;
 
-/// The phases of all constraints of a task.
+/// Phases of all constraints of a task.
 #[derive(Debug)]
 pub(super) struct Course<'a> {
     constraints: &'a Constraints,
@@ -39,7 +39,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Calls `visit` for each constraint with its track, and whether it is hard.
+    /// Calls `visit` for each constraint with its track, and `true` if it is hard.
     fn visit(
         &mut self,
         mut visit: impl FnMut(&'a Modal<Condition>, &mut Track, bool) -> Result<(), Stop>,
@@ -55,7 +55,7 @@ impl<'a> Course<'a> {
         Ok(())
     }
 
-    /// Notes the present state, which begins at `time`.
+    /// Records the present state, which begins at `time`.
     pub(super) fn note(&mut self, judge: &Judge<'_>, time: &Rational) -> Result<(), Stop> {
         self.visit(|modal, track, is_hard| {
             let mut holds = [false; 2];
@@ -80,7 +80,7 @@ impl<'a> Course<'a> {
         })
     }
 
-    /// Notes what changes while numbers move, from the group at `from` on.
+    /// Records the changes while numbers move, from the group at `from` on.
     pub(super) fn note_motion(
         &mut self,
         judge: &Judge<'_>,
@@ -114,7 +114,7 @@ impl<'a> Course<'a> {
         })
     }
 
-    /// The first violation of a hard constraint, when the plan is over at `end`.
+    /// Returns the first violation of a hard constraint, for a plan that ends at `end`.
     pub(super) fn violation(&self, judge: &Judge<'_>, end: &Rational) -> Result<(), Stop> {
         if self.constraints.is_past_lost && !self.constraints.hard.is_empty() {
             return Err(undecided(None, Difficulty::Past));
@@ -155,8 +155,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// For each soft constraint, whether it is violated, and by what: `Err` where that is not
-    /// known.
+    /// Returns, for each soft constraint, the violation, if there is one; `Err` if it is undecided.
     pub(super) fn soft(
         &self,
         judge: &Judge<'_>,
@@ -199,7 +198,7 @@ fn undecided(time: Option<Rational>, difficulty: Difficulty) -> Stop {
     Stop::Undecided(Box::new(Undecided { time, difficulty }))
 }
 
-/// What was read; a soft condition that says nothing does not hold.
+/// Returns the truth value. An undefined soft condition does not hold.
 fn truth(
     judge: &Judge<'_>,
     read: Result<bool, Fault>,
@@ -217,7 +216,7 @@ fn truth(
     }
 }
 
-/// Whether the falsehood of its condition is what violates a constraint.
+/// Returns `true` if the false condition itself is the violation of the constraint.
 fn explains(modal: &Modal<Condition>) -> bool {
     matches!(
         modal,

@@ -1,18 +1,18 @@
-//! Why a plan is not valid, or why that cannot be decided.
+//! Reasons why a plan is invalid, or cannot be decided.
 
 use elbowroom_num::{Interval, Rational};
 
 use crate::plan::TimeTriggeredPlan;
 use crate::problem::Comparison;
 
-/// The first thing that is wrong with a plan.
+/// First violation of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
     /// The time.
     pub time: Rational,
-    /// The action to blame; `None` for the goal.
+    /// The responsible action; `None` for the goal.
     pub action: Option<ActionInstance>,
-    /// The mistake.
+    /// Kind of violation.
     pub mistake: Mistake,
 }
 
@@ -23,7 +23,7 @@ pub struct ActionInstance {
     pub step: usize,
     /// `(name arg …)`
     pub name: String,
-    /// When it starts, or happens.
+    /// Its start time.
     pub start: Rational,
 }
 
@@ -41,15 +41,15 @@ impl ActionInstance {
 /// A kind of violation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mistake {
-    /// An action starts before the plan begins, at this time.
+    /// An action starts at this time, before the plan begins.
     TooEarly(Rational),
-    /// The plan does not go on with this action, which is running when it begins.
+    /// The plan does not continue this action, which is running when the plan begins.
     Abandoned(String),
     /// An action that is running when the plan begins can no longer have this duration.
     Elapsed {
         /// The duration in the plan.
         duration: Rational,
-        /// Those it may have, as far as they do not end before `now`.
+        /// Possible durations, as far as they do not end before `now`.
         possible: Interval,
         /// The time at which the plan begins.
         now: Rational,
@@ -58,46 +58,46 @@ pub enum Mistake {
     NoDuration,
     /// A duration is below 0.
     NegativeDuration(Rational),
-    /// A duration does not satisfy the domain.
+    /// A duration violates a bound of the domain.
     Duration {
         /// The duration in the plan.
         duration: Rational,
-        /// How it should compare to the bound.
+        /// Comparison of duration and bound that does not hold.
         comparison: Comparison,
-        /// The bound as PDDL writes it.
+        /// The bound in PDDL notation.
         bound: String,
         /// The bound's value.
         value: Rational,
     },
     /// A condition does not hold.
     Condition {
-        /// Which kind.
+        /// Kind of condition.
         when: When,
-        /// As PDDL writes it.
+        /// The condition in PDDL notation.
         condition: String,
-        /// Whether it still holds at the time given, and fails right after it.
+        /// `true` if it still holds at the given time, and fails right after it.
         is_after: bool,
-        /// Whether the time given is exact; else it is within a millionth below the true one,
-        /// which is irrational.
+        /// `true` if the given time is exact. Otherwise the true time is irrational, and the given
+        /// one is within a millionth below it.
         is_exact: bool,
-        /// The reasons why it is false.
+        /// Reasons why it is false.
         reasons: Vec<Reason>,
-        /// Happenings of the same time that may make it true, but too late: conditions read the
+        /// Happenings at the same time that may make it true, but too late: conditions read the
         /// state before them.
         too_late: Vec<Occurrence>,
     },
-    /// A constraint on the course of the plan is not kept.
+    /// A constraint on the course of the plan is violated.
     Constraint {
-        /// As PDDL writes it.
+        /// The constraint in PDDL notation.
         constraint: String,
-        /// Why, in words.
+        /// Reason, in words.
         why: String,
-        /// Whether it is still kept at the time given, and broken right after it.
+        /// `true` if it is still satisfied at the given time, and violated right after it.
         is_after: bool,
-        /// Whether the time given is exact; else it is within a millionth below the true one,
-        /// which is irrational.
+        /// `true` if the given time is exact. Otherwise the true time is irrational, and the given
+        /// one is within a millionth below it.
         is_exact: bool,
-        /// The reasons why a condition that should hold is false.
+        /// Reasons why a required condition is false.
         reasons: Vec<Reason>,
     },
     /// Two happenings that interfere are too close to each other.
@@ -108,15 +108,15 @@ pub enum Mistake {
         second: Occurrence,
         /// The fact or fluent over which they interfere.
         over: String,
-        /// How far apart they would have to be; `None`: not at the same time.
+        /// Required separation; `None`: they must not be simultaneous.
         separation: Option<Rational>,
     },
-    /// An event happens again at the moment at which it happened: its effects, or those of other
-    /// events, leave its precondition true, or make it so again. There is no end to that.
+    /// An event happens again at the same moment: its effects, or those of other events, leave its
+    /// precondition true, or make it true again. This would not terminate.
     EndlessEvent {
         /// `(name arg …)`.
         event: String,
-        /// Whether no other event happened in between.
+        /// `true` if no other event happened in between.
         is_alone: bool,
     },
     /// One happening gives a fluent several values at once.
@@ -124,7 +124,7 @@ pub enum Mistake {
         /// The fluent.
         fluent: String,
     },
-    /// A fluent is read that has no value.
+    /// A fluent without a value is read.
     Undefined {
         /// The fluent.
         fluent: String,
@@ -140,10 +140,10 @@ pub enum Mistake {
     },
 }
 
-/// The condition of an action, by its time specifier, or the goal.
+/// Condition of an action, by its time specifier, or the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum When {
-    /// Of an instantaneous action.
+    /// Condition of an instantaneous action.
     Now,
     /// At start.
     Start,
@@ -153,24 +153,24 @@ pub enum When {
     End,
     /// The goal.
     Goal,
-    /// Of a constraint on the course of the plan.
+    /// Constraint on the course of the plan.
     Course,
 }
 
-/// Why a condition is false: one of its parts.
+/// Reason why a condition is false: one of its parts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reason {
-    /// A fact does not have the truth it should have.
+    /// A fact has the wrong truth value.
     Fact {
         /// The fact.
         fact: String,
-        /// Its truth.
+        /// Its truth value.
         is_true: bool,
-        /// The last change that made it so; `None` if it has been so from the beginning, or is
-        /// derived.
+        /// The last change of its truth value; `None` if it has not changed since the beginning, or
+        /// is derived.
         since: Option<Occurrence>,
     },
-    /// A comparison does not have the truth it should have.
+    /// A comparison has the wrong truth value.
     Comparison {
         /// The comparison.
         comparison: String,
@@ -182,12 +182,12 @@ pub enum Reason {
         left: Rational,
         /// The value of its right side.
         right: Rational,
-        /// Its truth.
+        /// Its truth value.
         is_true: bool,
     },
 }
 
-/// Something that happens.
+/// A happening.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Occurrence {
     /// The time.
@@ -200,7 +200,7 @@ pub struct Occurrence {
     pub event: Option<String>,
 }
 
-/// The part of an action that a happening is: its start, its end, or all of it.
+/// Part of an action at which a happening occurs: its start, its end, or all of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Point {
     /// The start of a durative action.
@@ -215,26 +215,26 @@ pub enum Point {
     Event,
 }
 
-/// Why it cannot be decided whether a plan is valid.
+/// Reason why the validity of a plan cannot be decided.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Undecided {
-    /// The time at which the difficulty arises; `None` if before anything happens.
+    /// Time at which the difficulty arises; `None` if it is before any happening.
     pub time: Option<Rational>,
     /// The difficulty.
     pub difficulty: Difficulty,
 }
 
-/// The reason why the validator cannot evaluate a condition.
+/// Reason why the validator cannot evaluate a condition.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Difficulty {
-    /// A number is left open.
+    /// An open number is read.
     Open {
         /// Its name.
         unknown: String,
-        /// Where it is read.
+        /// Expression that reads it.
         within: String,
     },
-    /// A fluent's rate of change depends on the fluent itself, so that its value is no
+    /// A fluent's rate of change depends on the fluent itself, so that its value is not a
     /// polynomial in time.
     Nonlinear {
         /// The fluent.
@@ -247,46 +247,46 @@ pub enum Difficulty {
         /// The expression that it occurs in.
         within: String,
     },
-    /// `?duration` or `total-time` stands where it means nothing.
+    /// `?duration` or `total-time` occurs where it has no meaning.
     Misplaced {
-        /// Which of the two.
+        /// The misplaced expression.
         expression: String,
         /// The expression that it occurs in.
         within: String,
     },
-    /// A continuous effect depends on an over-all condition, whose truth lies in the future.
+    /// A continuous effect depends on an over-all condition, whose truth value lies in the future.
     ContinuousGuard {
         /// The fluent that the effect changes.
         fluent: String,
     },
-    /// Whether a constraint on the whole course is kept depends on states before the plan begins.
+    /// A constraint on the whole course depends on states before the plan begins.
     Past,
-    /// Whether a constraint is kept depends on two times that are less than a millionth apart, one
-    /// of them irrational.
+    /// A constraint depends on the order of two times that are less than a millionth apart, one of
+    /// them irrational.
     CloseTimes {
         /// The constraint.
         constraint: String,
     },
     /// A derived fact depends on its own negation.
     Unstratified,
-    /// A fluent that is read stopped moving, or changed its course, at an irrational moment, where
-    /// its value is irrational, too.
+    /// A fluent is read that stopped moving, or changed its rate, at an irrational moment, with an
+    /// irrational value.
     Irrational {
         /// The fluent.
         fluent: String,
-        /// Where it is read.
+        /// Expression that reads it.
         within: String,
     },
-    /// A process would start and stop without end at one moment: at work, it makes its condition
-    /// false, and else it is true.
+    /// A process would start and stop without end at one moment: its condition is false while it is
+    /// active, and true otherwise.
     Chattering {
         /// `(name arg …)`.
         process: String,
     },
-    /// Events happen, or processes start and stop, more often between two happenings than is looked
-    /// at.
+    /// The number of events, starts and stops of processes between two happenings exceeds the
+    /// limit.
     ManyChanges {
-        /// How often.
+        /// The limit.
         most: usize,
     },
 }

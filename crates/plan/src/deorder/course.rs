@@ -1,10 +1,10 @@
-//! Constraints on the course of a plan as orders and bounds.
+//! Orders and bounds for constraints on the course of a plan.
 //!
-//! What a constraint reads changes at some happenings of the plan. They keep their order, and those
-//! that fall together stay together: then its conditions are true and false in the same turns in
-//! each schedule, which is all that `always`, `sometime`, `at-most-once`, `sometime-after`,
-//! `sometime-before` and `at end` look at. The others bound the time of a turn, or from one turn to
-//! another. More would do in some cases; this never does too little.
+//! The facts that a constraint reads change at some happenings of the plan. These keep their order,
+//! and simultaneous ones stay together. So the constraint's conditions are true and false in the
+//! same turns in each schedule. `always`, `sometime`, `at-most-once`, `sometime-after`,
+//! `sometime-before` and `at end` depend on nothing else. The other constraints bound the time of a
+//! turn, or the time between two turns. The result may be too strict, but is never too weak.
 
 use std::collections::BTreeSet;
 
@@ -16,15 +16,15 @@ use super::DeorderError;
 use crate::network::Schedule;
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 
-/// A time during which the conditions of a constraint do not change, from this happening on.
+/// Interval during which the conditions of a constraint do not change, from this happening on.
 struct Phase {
     node: NodeId,
     time: Rational,
-    /// The truth of the conditions; of the second, false if there is only one.
+    /// Truth values of the conditions; the second is `false` if there is only one.
     holds: [bool; 2],
 }
 
-/// The constraints between happenings that keep those on the course of a valid plan.
+/// Returns constraints between happenings that imply the constraints on the course of a valid plan.
 ///
 /// `footprints` and `times` are by node.
 pub(super) fn constraints(
@@ -56,7 +56,7 @@ fn unsupported(feature: &'static str) -> DeorderError {
     DeorderError::Unsupported { feature }
 }
 
-/// The happenings that change what a constraint reads, by time; those of one time together.
+/// Returns the happenings that change facts of a constraint, grouped by time.
 fn turns(
     task: &Task,
     plan: &StnPlan,
@@ -115,7 +115,7 @@ fn effects(plan: &StnPlan, node: NodeId) -> &[Effect] {
     }
 }
 
-/// Keeps turns in their order, and those of one time together.
+/// Keeps turns in their order, and simultaneous ones together.
 fn keep_order(task: &Task, groups: &[Vec<NodeId>], times: &Schedule, found: &mut Vec<Constraint>) {
     for group in groups {
         for pair in group.windows(2) {
@@ -129,7 +129,7 @@ fn keep_order(task: &Task, groups: &[Vec<NodeId>], times: &Schedule, found: &mut
     }
     for pair in groups.windows(2) {
         let (from, to) = (pair[0][0], pair[1][0]);
-        // What does not interfere may be closer to each other than ε.
+        // Happenings that do not interfere may be closer to each other than ε.
         let gap = &times[to] - &times[from];
         let least = gap.min(task.epsilon().clone());
         found.push(between(from, to, Some(least), None));
@@ -152,7 +152,7 @@ fn between(
     }
 }
 
-/// The phases of a constraint; the first begins with the initial state.
+/// Returns the phases of a constraint; the first begins with the initial state.
 fn phases(
     task: &Task,
     modal: &Modal<Condition>,
@@ -194,7 +194,7 @@ fn phases(
     phases
 }
 
-/// The truth of a condition that compares no numbers.
+/// Returns the truth value of a condition that compares no numbers.
 fn is_true(condition: &Condition, facts: &BTreeSet<FactId>) -> bool {
     match condition {
         Condition::Fact(fact) => facts.contains(fact),
@@ -205,7 +205,7 @@ fn is_true(condition: &Condition, facts: &BTreeSet<FactId>) -> bool {
     }
 }
 
-/// Bounds the times of turns; `None` if the plan does not keep the constraint.
+/// Bounds the times of turns. Returns `None` if the plan violates the constraint.
 fn bounds(modal: &Modal<Condition>, phases: &[Phase], found: &mut Vec<Constraint>) -> Option<()> {
     let zero = NodeId::ZERO;
     match modal {
@@ -243,8 +243,8 @@ fn bounds(modal: &Modal<Condition>, phases: &[Phase], found: &mut Vec<Constraint
     Some(())
 }
 
-/// Keeps the phases in which the first condition is false out of a window, on the side where they
-/// are.
+/// Keeps the phases where the first condition is false out of a window, on the side of the window
+/// where they are in the plan.
 fn throughout(
     phases: &[Phase],
     from: &Rational,

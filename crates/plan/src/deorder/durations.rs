@@ -1,7 +1,7 @@
-//! What durations the domain allows, wherever that is the same in all schedules.
+//! Durations that the domain allows, if they are the same in all schedules.
 //!
-//! Duration bounds may read fluents. Happenings that write such a fluent keep their order with
-//! the one that reads it, so its value is the same in all schedules unless it was changed
+//! Duration bounds may read fluents. Happenings that write such a fluent keep their order with the
+//! happening that reads it. So its value is the same in all schedules unless it changed
 //! continuously, or by an amount that itself depends on the schedule.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,8 +18,8 @@ use crate::durations::allowed;
 use crate::network::Schedule;
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
 
-/// A constraint for the duration of each durative instance: the domain's bounds, or the original
-/// duration where these depend on the schedule.
+/// Returns a constraint for the duration of each durative instance: the domain's bounds, or the
+/// original duration if these depend on the schedule.
 pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<Constraint> {
     let intervals = intervals(task, plan, times);
     let mut nodes = vec![(NodeId::ZERO, NodeId::ZERO); plan.instances.len()];
@@ -35,7 +35,7 @@ pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<
         plan.instance(id).action.durative()?;
         let (from, to) = nodes[index];
         let original = &times[to] - &times[from];
-        // Nobody has checked an over-all condition that had no time to hold.
+        // In the original plan, the over-all condition was vacuous and has not been checked.
         let is_unchecked = original.is_zero() && over_all::has_any(plan, id);
         let bounds = interval.filter(|_| !is_unchecked).and_then(bounds);
         let (lower, upper, reason) = match bounds {
@@ -57,8 +57,8 @@ pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<
         .collect()
 }
 
-/// A constraint for the duration of each durative instance: the domain's bounds, where these read
-/// nothing that ever changes; else only that it is not negative.
+/// Returns a constraint for the duration of each durative instance: the domain's bounds if they
+/// read no changing fluent, else only that it is not negative.
 pub(crate) fn steady(task: &Task, plan: &StnPlan, footprints: &[Footprint]) -> Vec<Constraint> {
     let mut changing: BTreeSet<FluentId> = BTreeSet::new();
     for footprint in footprints {
@@ -87,7 +87,7 @@ pub(crate) fn steady(task: &Task, plan: &StnPlan, footprints: &[Footprint]) -> V
     instances.filter_map(constraint).collect()
 }
 
-/// The interval as bounds, unless an end is open.
+/// Returns the interval as bounds, unless an end is open.
 fn bounds(interval: Interval) -> Option<(Bound, Bound)> {
     let bound = |end| match end {
         End::Closed(value) => Some(Bound::Finite(value)),
@@ -97,7 +97,7 @@ fn bounds(interval: Interval) -> Option<(Bound, Bound)> {
     Some((bound(interval.lower)?, bound(interval.upper)?))
 }
 
-/// The durations that each instance may have, `None` where that depends on the schedule.
+/// Returns the possible durations of each instance; `None` if they depend on the schedule.
 pub(super) fn intervals(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<Option<Interval>> {
     let mut nodes: Vec<(NodeId, Node)> = plan.nodes().collect();
     nodes.sort_by(|(a, _), (b, _)| times[*a].cmp(&times[*b]));
@@ -113,7 +113,7 @@ pub(super) fn intervals(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<Op
     intervals
 }
 
-/// Intersects the instance's interval with the bounds that are read at this happening.
+/// Intersects the instance's interval with the bounds that this happening reads.
 fn read_bounds(plan: &StnPlan, what: Node, arrival: &Values, intervals: &mut [Option<Interval>]) {
     let (Node::Start(id) | Node::End(id)) = what else {
         return;
@@ -167,7 +167,7 @@ fn write_effects(
     }
 }
 
-/// The duration, if the domain leaves no choice.
+/// Returns the duration, if the domain leaves no choice.
 fn fixed(interval: Option<&Interval>) -> Option<&Rational> {
     match interval {
         Some(Interval {
@@ -182,7 +182,7 @@ fn fixed(interval: Option<&Interval>) -> Option<&Rational> {
 #[derive(Clone)]
 struct Values {
     known: BTreeMap<FluentId, Rational>,
-    /// How many continuous effects run on each fluent.
+    /// Number of running continuous effects on each fluent.
     running: BTreeMap<FluentId, usize>,
 }
 
@@ -202,7 +202,7 @@ impl Values {
         }
     }
 
-    /// A continuous effect begins or stops. What it has done so far stays unknown.
+    /// Starts or stops a continuous effect. The value of the fluent becomes unknown.
     fn run(&mut self, fluent: FluentId, begins: bool) {
         self.known.remove(&fluent);
         let count = self.running.entry(fluent).or_default();
@@ -213,7 +213,7 @@ impl Values {
         };
     }
 
-    /// An effect happens, or, if it is not certain to, may happen.
+    /// Applies an effect. Without `is_certain`, it may also not happen.
     fn change(
         &mut self,
         change: &Change,
@@ -230,7 +230,7 @@ impl Values {
             return;
         };
         let amount = value.evaluate(&mut |leaf| arrival.value(leaf, duration));
-        // Increases of one fluent at one time add up, so the present value counts.
+        // Simultaneous increases of one fluent add up, so the present value counts.
         let present = self.known.remove(fluent);
         if !is_certain || self.running.get(fluent).is_some_and(|&count| count > 0) {
             return;

@@ -1,4 +1,4 @@
-//! Leaves out constraints that others imply.
+//! Removal of constraints that others imply.
 
 use elbowroom_num::{CommonDenominator, Delta, Rational};
 use elbowroom_stn::{ConsistentNetwork, Network, Weight};
@@ -6,21 +6,21 @@ use elbowroom_stn::{ConsistentNetwork, Network, Weight};
 use crate::network::{Schedule, network_node};
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 
-/// The plan without the bounds that its other constraints imply whatever its durations and
-/// timed initials are.
+/// Returns the plan without the bounds that its other constraints imply for all durations and times
+/// of timed initials.
 ///
-/// Durations and times of timed initials stay, and count only as not negative here: either may
-/// become a parameter later, and then what it alone implied would be lost. A plan of which these times are no
-/// schedule is returned as it is.
+/// Durations and times of timed initials are kept, and count only as not negative: either may
+/// become a parameter later, so nothing may depend on their values. If `times` is not a schedule of
+/// the plan, the plan is returned unchanged.
 ///
-/// What is left is the same for all schedules; how soon it is found is not. In a schedule in which actions take their
-/// time, what a constraint of a long plan may follow from is near it. In one in which nothing takes time, all of the plan
-/// is, and each constraint would be looked for in all of it.
+/// The result does not depend on the schedule, but the running time does. If actions take time in
+/// the schedule, the constraints that imply a given one are close to it, also in a long plan. If
+/// nothing takes time, each constraint has to be compared with the whole plan.
 #[must_use]
 pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {
     let Drafted { drafts, bounds } = drafted(&plan);
-    // Whole numbers are several times faster. The others are those that envelopes compute with, too, so that the
-    // search is compiled for these two alone.
+    // Integers are several times faster. The other case uses the number type of envelopes, so that
+    // the search is compiled for these two types only.
     let implied = if let Some((drafts, times)) = whole(&drafts, times) {
         implied_in(plan.nodes.len(), drafts, times)
     } else {
@@ -43,21 +43,21 @@ pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {
         (&constraint.lower, &constraint.upper) != (&Bound::Infinite, &Bound::Infinite)
             || matches!(constraint.reason, Reason::Duration(_))
     });
-    // Most are implied.
+    // Most constraints are implied.
     plan.constraints.shrink_to_fit();
     plan
 }
 
-/// A constraint of a network, and whether it has to stay.
+/// A constraint of a network; `true` if it has to be kept.
 struct Draft<W> {
     constraint: elbowroom_stn::Constraint<W>,
     stays: bool,
 }
 
-/// The network of a plan in which durations and times of timed initials may become anything.
+/// Network of a plan with arbitrary durations and times of timed initials.
 struct Drafted {
     drafts: Vec<Draft<Rational>>,
-    /// Of each of the plan's constraints, which drafts its two bounds are.
+    /// For each of the plan's constraints, the positions of its two bounds among the drafts.
     bounds: Vec<[Option<usize>; 2]>,
 }
 
@@ -102,7 +102,8 @@ fn finite(bound: &Bound) -> Option<Rational> {
     }
 }
 
-/// Of each constraint, whether the others imply it; `None` if the times are no schedule.
+/// Returns, for each constraint, `true` if the others imply it. Returns `None` if the times are not
+/// a schedule.
 fn implied_in<W: Weight>(
     node_count: usize,
     drafts: Vec<Draft<W>>,
@@ -122,15 +123,15 @@ fn implied_in<W: Weight>(
     Some(is_implied)
 }
 
-/// All bounds and times multiplied by their common denominator, if that leaves them so small that no
-/// sum of them overflows.
+/// Multiplies all bounds and times by their common denominator. Returns `None` if a sum of the
+/// results might overflow.
 fn whole(drafts: &[Draft<Rational>], times: &Schedule) -> Option<(Vec<Draft<i128>>, Vec<i128>)> {
     let bounds = drafts.iter().map(|draft| &draft.constraint.bound);
     let unit = CommonDenominator::of(bounds.chain(times.iter()))?;
     in_terms(drafts, times, &|number| unit.whole(number).map(i128::from))
 }
 
-/// All bounds and times as other numbers, if they can be that.
+/// Converts all bounds and times to another number type, if it can represent them.
 fn in_terms<W>(
     drafts: &[Draft<Rational>],
     times: &Schedule,
@@ -153,12 +154,13 @@ fn in_terms<W>(
     ))
 }
 
-/// The plan with those of the sides that its other constraints do not imply.
+/// Returns the plan with the sides that its other constraints do not imply.
 pub(super) fn with_sides(mut plan: StnPlan, mut sides: Vec<Constraint>) -> StnPlan {
     if sides.is_empty() {
         return plan;
     }
-    // As above, but sides are least distances and may be given up: none makes another needless.
+    // As above, except that sides are least distances and may be dropped later: no side makes
+    // another one redundant.
     let mut network = Network::with_nodes(plan.nodes.len());
     for constraint in &plan.constraints {
         let (from, to) = (network_node(constraint.from), network_node(constraint.to));
@@ -182,7 +184,7 @@ pub(super) fn with_sides(mut plan: StnPlan, mut sides: Vec<Constraint>) -> StnPl
     plan
 }
 
-/// Whether the constraint says how long an action takes or when a timed initial happens.
+/// Returns `true` if the constraint sets the duration of an action or the time of a timed initial.
 fn is_set(plan: &StnPlan, constraint: &Constraint) -> bool {
     match constraint.reason {
         Reason::Duration(_) | Reason::Timed(_) => true,

@@ -1,4 +1,4 @@
-//! Whether deordering alone has kept all that a plan needs: [`keeps_all_that_is_read`].
+//! Check that deordering alone keeps everything that a plan needs: [`keeps_all_that_is_read`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,17 +12,17 @@ use crate::network::Schedule;
 use crate::parameter::{ParameterKind, ParametrizedPlan};
 use crate::stn_plan::{InstanceId, Node, NodeId, Reason};
 
-/// Whether every schedule of a deordered plan is known to work, without a look at its conditions one by
-/// one; `nominal` is one of its schedules.
+/// Returns `true` if every schedule of a deordered plan is known to be valid, without checking its
+/// conditions one by one; `nominal` is one of its schedules.
 ///
-/// Where this is so, nothing happens without the plan, and each happening reads in every schedule what
-/// it reads in `nominal`: the facts and fluents that it reads were written by the same happenings, and what these write does not depend on when
-/// they are. So numbers may change, but not continuously, not by amounts that depend on durations or on
-/// parameters, and not only under conditions. An over-all condition reads all states in its action's time;
-/// their order is kept where it is about one fact, or where at most one change of the fluents that it
-/// compares can be in that time.
+/// In this case there are no processes or events, and each happening reads the same state in every
+/// schedule as in `nominal`: the same happenings wrote the facts and fluents that it reads, and the
+/// written values do not depend on times. So numbers may change, but not continuously, not by
+/// amounts that depend on durations or on parameters, and not under conditions. An over-all
+/// condition reads all states during its action. Their order is fixed if the condition is about one
+/// fact, or if at most one change of the fluents that it compares can happen during the action.
 ///
-/// No is the answer in case of doubt: the soundness check can tell.
+/// `false` means that the result is unknown; the soundness check decides then.
 pub fn keeps_all_that_is_read(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> bool {
     let is_time =
         |kind: ParameterKind| matches!(kind, ParameterKind::Duration(_) | ParameterKind::Timed(_));
@@ -51,7 +51,8 @@ pub fn keeps_all_that_is_read(task: &Task, plan: &ParametrizedPlan, nominal: &Sc
             return true;
         };
         let ends = ends[InstanceId::from(index).index()];
-        // A condition over no time may be false, and is broken as soon as the action takes time.
+        // The over-all condition of an action with duration 0 may be false. It is violated as soon
+        // as the action takes time.
         let is_vacuous = nominal[ends.0] == nominal[ends.1] && !body.over_all.is_trivial();
         let mut conjuncts = body.over_all.conjuncts().into_iter();
         !is_vacuous
@@ -60,7 +61,7 @@ pub fn keeps_all_that_is_read(task: &Task, plan: &ParametrizedPlan, nominal: &Sc
     })
 }
 
-/// Whether the condition reads nothing but facts, and fluents that it compares itself.
+/// Returns `true` if the condition reads only facts, and fluents that it compares itself.
 fn is_plain(task: &Task, condition: &Condition) -> bool {
     let (mut own, mut all, mut is_plain) = (0_usize, 0_usize, true);
     condition.visit_fluents(&mut |_| own += 1);
@@ -69,7 +70,7 @@ fn is_plain(task: &Task, condition: &Condition) -> bool {
     is_plain && own == all
 }
 
-/// Whether the expression has a value in a state, whatever the times are.
+/// Returns `true` if the value of the expression depends only on the state, not on times.
 fn is_steady(expression: &Expression) -> bool {
     let mut is_steady = true;
     expression.visit_leaves(&mut |leaf| {
@@ -100,7 +101,7 @@ fn effects(action: &Action) -> impl Iterator<Item = &Effect> {
     start.iter().chain(end)
 }
 
-/// Whether the effect always happens, and is the same in the same state.
+/// Returns `true` if the effect is unconditional and depends only on the state.
 fn is_fixed(effect: &Effect) -> bool {
     let is_steady = match &effect.change {
         Change::Add(_) | Change::Delete(_) => true,
@@ -109,7 +110,7 @@ fn is_fixed(effect: &Effect) -> bool {
     is_steady && effect.guard.is_trivial()
 }
 
-/// Whose start or end a node is.
+/// Returns the instance whose start or end the node is.
 fn ends_of(node: Node) -> Option<InstanceId> {
     match node {
         Node::Start(id) | Node::End(id) | Node::Instant(id) => Some(id),
@@ -117,10 +118,10 @@ fn ends_of(node: Node) -> Option<InstanceId> {
     }
 }
 
-/// When fluents change.
+/// Times of changes of fluents.
 struct Changes<'a> {
     nominal: &'a Schedule,
-    /// The happenings that change each fluent, by time.
+    /// Happenings that change each fluent, by time.
     nodes: BTreeMap<FluentId, Vec<NodeId>>,
 }
 
@@ -156,7 +157,7 @@ impl<'a> Changes<'a> {
         Self { nominal, nodes }
     }
 
-    /// Whether the bounds of the action's duration are the same whenever they are read.
+    /// Returns `true` if the bounds of the action's duration never change.
     fn keep_durations(&self, body: &DurativeBody) -> bool {
         let mut is_kept = true;
         for constraint in &body.duration {
@@ -166,7 +167,8 @@ impl<'a> Changes<'a> {
         is_kept
     }
 
-    /// Whether a condition that must hold between those two nodes does so in every schedule.
+    /// Returns `true` if a condition that must hold between those two nodes does so in every
+    /// schedule.
     fn keep(&self, task: &Task, conjunct: &Condition, (start, end): (NodeId, NodeId)) -> bool {
         let literal = match conjunct {
             Condition::Not(part) => part,
@@ -179,7 +181,8 @@ impl<'a> Changes<'a> {
                 literal.visit_fluents(&mut |fluent| {
                     read.insert(fluent);
                 });
-                // Of those that fall together with the start or the end, some may be inside elsewhere.
+                // A change that is simultaneous with the start or the end may be inside the action
+                // in another schedule.
                 let mut inside: BTreeSet<NodeId> = BTreeSet::new();
                 for nodes in read.iter().filter_map(|fluent| self.nodes.get(fluent)) {
                     let others = self.during(nodes, start, end).iter().copied();
@@ -188,7 +191,7 @@ impl<'a> Changes<'a> {
                 }
                 inside.len() <= 1
             }
-            // Several facts may change in one order or another.
+            // Several facts may change in different orders.
             _ => false,
         }
     }

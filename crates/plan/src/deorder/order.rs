@@ -1,9 +1,9 @@
-//! Which happenings interfere, fact by fact and fluent by fluent.
+//! Orders of interfering happenings, fact by fact and fluent by fluent.
 //!
-//! What a happening does to one fact or fluent is its *use* of it. Uses of the same kind commute,
-//! except assignments; all others interfere. So the uses of one fact, in order of time, fall into
-//! runs of commuting ones, and it is enough to keep each run after the one before it: the rest
-//! follows. That makes about as many constraints as uses, where pairs would make their square.
+//! The access of a happening to one fact or fluent is its *use*. Uses of the same kind commute,
+//! except assignments; all others interfere. So the uses of one fact, in order of time, form runs
+//! of commuting uses. It is sufficient to order each run after the previous one. This needs about
+//! as many constraints as uses, whereas pairs would need a quadratic number.
 
 use std::collections::BTreeMap;
 
@@ -14,14 +14,14 @@ use elbowroom_num::Rational;
 use crate::network::Schedule;
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 
-/// Constraints `to - from >= distance`, the strongest for each pair.
+/// Constraints `to - from >= distance`, the strongest one for each pair.
 #[derive(Debug, Default)]
 pub(super) struct Order {
     distances: BTreeMap<(NodeId, NodeId), (Rational, Reason)>,
 }
 
 impl Order {
-    /// Demands that `to` come at least `distance` after `from`.
+    /// Adds the constraint that `to` comes at least `distance` after `from`.
     pub(super) fn demand(&mut self, from: NodeId, to: NodeId, distance: Rational, reason: Reason) {
         if from == to {
             return;
@@ -32,7 +32,7 @@ impl Order {
         }
     }
 
-    /// The constraints, by nodes.
+    /// Returns the constraints, sorted by nodes.
     pub(super) fn into_constraints(self) -> impl Iterator<Item = Constraint> {
         self.distances
             .into_iter()
@@ -53,7 +53,7 @@ pub(super) enum Quantity {
     Fluent(FluentId),
 }
 
-/// The uses of a quantity by happenings, as a bit set.
+/// Uses of a quantity by a happening, as a bit set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Use(u8);
 
@@ -70,20 +70,20 @@ impl Use {
         self.0 != Self::READ
     }
 
-    /// Whether two uses may fall together in either order.
+    /// Returns `true` if two uses may be simultaneous in either order.
     fn commutes_with(self, other: Self) -> bool {
         self == other && matches!(self.0, Self::READ | Self::ADD | Self::DELETE)
     }
 }
 
-/// The uses of each quantity in order of time.
+/// Uses of each quantity in order of time.
 pub(super) struct Timeline<'a> {
     times: &'a Schedule,
     uses: BTreeMap<Quantity, Vec<(NodeId, Use)>>,
 }
 
 impl<'a> Timeline<'a> {
-    /// `times` and `footprints` are by node.
+    /// Creates a timeline; `times` and `footprints` are by node.
     pub(super) fn new(times: &'a Schedule, footprints: &[Footprint]) -> Self {
         let mut nodes: Vec<NodeId> = (0..times.len()).map(NodeId::from).collect();
         nodes.sort_by(|a, b| times[*a].cmp(&times[*b]));
@@ -96,14 +96,14 @@ impl<'a> Timeline<'a> {
         Self { times, uses }
     }
 
-    /// The time of a node.
+    /// Returns the time of a node.
     pub(super) fn time(&self, node: NodeId) -> &Rational {
         &self.times[node]
     }
 
-    /// Demands that interfering happenings keep their order.
+    /// Adds constraints that keep the order of interfering happenings.
     ///
-    /// On failure, two of them that have none.
+    /// Returns two of them as an error if they are simultaneous.
     pub(super) fn interference(
         &self,
         plan: &StnPlan,
@@ -129,7 +129,7 @@ impl<'a> Timeline<'a> {
         Ok(())
     }
 
-    /// The writers of a quantity in order of time.
+    /// Returns the writers of a quantity in order of time.
     pub(super) fn writers(&self, quantity: Quantity) -> Vec<Writer> {
         let uses = self.uses.get(&quantity).into_iter().flatten();
         let writers: Vec<_> = uses.copied().filter(|(_, what)| what.writes()).collect();
@@ -142,7 +142,7 @@ impl<'a> Timeline<'a> {
     }
 }
 
-/// A happening that changes a quantity, and the number of its run of commuting ones.
+/// A happening that changes a quantity, and the number of its run of commuting uses.
 pub(super) struct Writer {
     pub(super) node: NodeId,
     pub(super) run: usize,
@@ -150,25 +150,25 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// Whether the fact is true after it: what makes it both false and true makes it true.
+    /// Returns `true` if the fact is true after it. An addition wins over a deletion.
     pub(super) fn makes_true(&self) -> bool {
         self.what.0 & Use::ADD != 0
     }
 
-    /// Whether it does nothing to the fluent but increase and decrease it.
+    /// Returns `true` if it only increases and decreases the fluent.
     pub(super) fn is_shift(&self) -> bool {
         self.what.0 == Use::ADD
     }
 }
 
-/// Cuts a sequence of uses where neighbours do not commute.
+/// Splits a sequence of uses where neighbours do not commute.
 fn runs(uses: &[(NodeId, Use)]) -> Vec<Vec<NodeId>> {
     uses.chunk_by(|(_, a), (_, b)| a.commutes_with(*b))
         .map(|run| run.iter().map(|&(node, _)| node).collect())
         .collect()
 }
 
-/// The uses of each quantity in a footprint.
+/// Returns the uses of each quantity in a footprint.
 fn uses_of(footprint: &Footprint) -> BTreeMap<Quantity, u8> {
     let mut uses = BTreeMap::new();
     let mut note = |quantity: Quantity, bit: u8| *uses.entry(quantity).or_default() |= bit;
@@ -193,7 +193,7 @@ fn uses_of(footprint: &Footprint) -> BTreeMap<Quantity, u8> {
     uses
 }
 
-/// The quantities that the footprint reads.
+/// Returns the quantities that the footprint reads.
 pub(super) fn read_by(footprint: &Footprint) -> impl Iterator<Item = Quantity> + '_ {
     let facts = footprint.reads.iter().map(|&fact| Quantity::Fact(fact));
     let fluents = footprint.reads_fluents.iter();

@@ -1,13 +1,14 @@
-//! Writers of what is read throughout an action stay on their side of its start and end.
+//! Orders that keep writers of over-all conditions on their side of an action's start and end.
 //!
-//! Not all of them need to:
+//! Not all writers need this:
 //!
-//! - What makes a fact as the action needs it does no harm wherever it happens. One such writer
-//!   must come before the action, if the fact is not so from the beginning; the others are free.
-//! - Increases and decreases that a comparison of numbers reads may do harm or not; that depends
-//!   on the numbers. Where keeping them on their sides would tie together what falls together in
-//!   the plan, or the ends of actions that overlap, these sides ([`Reason::Side`]) are listed by
-//!   themselves, for [`pin_until_sound`](super::pin_until_sound) to take those that it needs.
+//! - A writer that establishes a fact as the action needs it is harmless at any time. One such
+//!   writer must come before the action, if the fact does not have the value initially; the others
+//!   are free.
+//! - Increases and decreases of numbers in a comparison may be harmful or not, depending on the
+//!   numbers. In two cases, these sides ([`Reason::Side`]) are listed separately, so that
+//!   [`pin_until_sound`](super::pin_until_sound) can add those that are needed: if they would tie
+//!   together happenings that are simultaneous in the plan, or the ends of actions that overlap.
 
 use std::collections::BTreeMap;
 
@@ -18,8 +19,8 @@ use elbowroom_num::Rational;
 use super::order::{Order, Quantity, Timeline, Writer, read_by};
 use crate::stn_plan::{InstanceId, Node, NodeId, Reason, StnPlan};
 
-/// Demands it of all writers, for all durative instances; of those that may do no harm, in
-/// `sides`.
+/// Adds the orders of all writers, for all durative instances. Orders of writers that may be
+/// harmless go to `sides`.
 pub(super) fn order(
     task: &Task,
     plan: &StnPlan,
@@ -43,7 +44,7 @@ pub(super) fn order(
         };
         let (start, end) = (starts[index], ends[index]);
         if has_guards(body) {
-            // In no time at all, anything would hold throughout.
+            // During an action of duration 0, every condition would hold.
             let duration = timeline.time(end) - timeline.time(start);
             order.demand(
                 start,
@@ -67,8 +68,8 @@ pub(super) fn order(
                 order,
             );
         }
-        // A required condition only gains when a moment in which it was read is lost. But an
-        // effect that did not happen could happen then.
+        // Losing a moment at which a required condition is read never violates it. But an effect
+        // whose guard was false might take place then.
         let decisive = guards_throughout(task, body);
         let epsilon = task.epsilon();
         for (footprint, distance) in [(&required.other, &Rational::ZERO), (&decisive, epsilon)] {
@@ -119,9 +120,9 @@ pub(super) fn order(
     }
 }
 
-/// Whether two actions, from start to end each, run together for a while, but neither within the
-/// other. Nobody would then want the one to end before the other, or to start before it ends, as
-/// little as that they start or end together.
+/// Returns `true` if two actions overlap, but neither is within the other. It is not useful to
+/// require that one ends before the other, or starts before it ends, or that they start or end at
+/// the same time.
 fn overlap_in_part(
     (start, end): (NodeId, NodeId),
     (other_start, other_end): (NodeId, NodeId),
@@ -136,12 +137,12 @@ fn overlap_in_part(
     time(second.0) < time(first) && time(first) < time(second.1)
 }
 
-/// The over-all conditions of an action, without those of its conditional effects.
+/// Over-all conditions of an action, without those of its conditional effects.
 #[derive(Default)]
 struct Required {
-    /// Basic facts, and whether they must be true.
+    /// Basic facts with their required truth values.
     literals: Vec<(FactId, bool)>,
-    /// The reads of comparisons that stand by themselves.
+    /// Reads of comparisons that are conjuncts.
     compared: Footprint,
     /// All other reads: by other conditions, and by rates.
     other: Footprint,
@@ -178,13 +179,13 @@ impl Required {
     }
 }
 
-/// Whether anything is required throughout the instance, or decided by it.
+/// Returns `true` if the instance has an over-all condition, or an effect that depends on one.
 pub(super) fn has_any(plan: &StnPlan, id: InstanceId) -> bool {
     let body = plan.instance(id).action.durative();
     body.is_some_and(|body| !body.over_all.is_trivial() || has_guards(body))
 }
 
-/// Whether effects depend on what holds throughout the action.
+/// Returns `true` if effects depend on over-all conditions.
 fn has_guards(body: &DurativeBody) -> bool {
     let mut guards = guards(body);
     guards.any(|guard| !guard.over_all.is_trivial())
@@ -195,22 +196,22 @@ fn guards(body: &DurativeBody) -> impl Iterator<Item = &Guard> {
     guards.chain(body.continuous.iter().map(|effect| &effect.guard))
 }
 
-/// The reads of over-all conditions of conditional effects.
+/// Returns the reads of over-all conditions of conditional effects.
 fn guards_throughout(task: &Task, body: &DurativeBody) -> Footprint {
     let conditions = guards(body).map(|guard| guard.over_all.clone()).collect();
     Footprint::of_condition(task, &Condition::And(conditions))
 }
 
-/// A durative action, and how far inside it writers that were inside must stay, unless they were
-/// closer to its start or end.
+/// A durative action, and the distance from its start and its end that writers inside it must keep,
+/// unless they are closer in the plan.
 struct Span<'a> {
     start: NodeId,
     end: NodeId,
     distance: &'a Rational,
 }
 
-/// `writers` are those of one quantity. As runs keep their order among each other, it is enough
-/// to hold the ones next to the start and next to the end.
+/// Keeps the writers of one quantity on their sides. Runs keep their order, so it is sufficient to
+/// constrain those next to the start and next to the end.
 fn keep_sides(
     writers: &[Writer],
     action: &Span<'_>,
@@ -241,12 +242,12 @@ fn keep_sides(
     }
 }
 
-/// Demands what keeps a fact as it is `wanted` between a start and an end, given its writers and
-/// whether it is so before all of them.
+/// Adds the orders that keep a fact at its `wanted` value between a start and an end.
+/// `is_so_at_first` is `true` if it has the value before all writers.
 ///
-/// What makes it so and what makes it otherwise keep their order among each other. So one writer
-/// that makes it so before the start is enough, and those that make it otherwise next must come
-/// after the end.
+/// Writers that establish the value and writers that destroy it keep their order. So it is
+/// sufficient that one writer that establishes it comes before the start, and that the next ones
+/// that destroy it come after the end.
 fn keep_true(
     writers: &[Writer],
     wanted: bool,
@@ -260,13 +261,14 @@ fn keep_true(
     let is_before = |writer: &Writer| time(writer) <= timeline.time(start);
     let before = &writers[..writers.partition_point(is_before)];
     let since = before.iter().rposition(|writer| !makes_so(writer));
-    // In time order; the action's own start serves without any demand.
+    // In time order. The action's own start needs no constraint.
     let serving = &before[since.map_or(0, |position| position + 1)..];
     let own = serving.iter().find(|writer| writer.node == start);
     match own.or(serving.first()) {
         _ if since.is_none() && is_so_at_first => {}
         Some(first) => order.demand(first.node, start, Rational::ZERO, Reason::OverAll),
-        // It is not so: nobody has looked, as the action takes no time.
+        // The fact has the wrong value. The validator has not read it, because the action has
+        // duration 0.
         None => {
             for writer in last_run(before) {
                 order.demand(writer.node, start, Rational::ZERO, Reason::OverAll);

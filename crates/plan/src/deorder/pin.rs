@@ -1,4 +1,4 @@
-//! Fixing as few differences as needed, where conditions on numbers leave no other choice.
+//! Fixes a small number of time differences, as needed for conditions on numbers.
 
 use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
@@ -7,15 +7,14 @@ use crate::network::{Schedule, network_node};
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 use crate::valuation::Valuation;
 
-/// Adds constraints that hold in the nominal schedule until the oracle finds nothing wrong.
+/// Adds constraints that hold in the nominal schedule until the oracle finds no violation.
 ///
-/// The oracle names the time points of some obligation that a schedule of the plan violates. Of
-/// these, what writes a number first takes its [side](Reason::Side) again of what reads it; then
-/// the order is fixed, then what the executor chooses, then other differences, one at a time. In
-/// the end, what turned out not to be needed is taken back, orders of what nominally falls
-/// together first.
+/// The oracle returns the time points of an obligation that some schedule of the plan violates.
+/// First, the dropped [sides](Reason::Side) between these points are added again. Then the order of
+/// the points is fixed, then durations, then other differences, one at a time. At the end,
+/// constraints that are not needed are removed, in reverse order of their addition.
 ///
-/// `None` when the oracle is not content even with the nominal schedule alone.
+/// Returns `None` if the oracle rejects even the nominal schedule.
 pub fn pin_until_sound(
     plan: StnPlan,
     nominal: &Schedule,
@@ -49,7 +48,7 @@ pub fn pin_until_sound(
     Some(with_all_sides(plan))
 }
 
-/// The plan without its [sides](Reason::Side), and these.
+/// Returns the plan without its [sides](Reason::Side), and the sides.
 #[must_use]
 pub fn without_sides(mut plan: StnPlan) -> (StnPlan, Vec<Constraint>) {
     let constraints = std::mem::take(&mut plan.constraints);
@@ -60,7 +59,7 @@ pub fn without_sides(mut plan: StnPlan) -> (StnPlan, Vec<Constraint>) {
     (plan, sides)
 }
 
-/// The plan with its [sides](Reason::Side) for good.
+/// Makes the [sides](Reason::Side) of the plan permanent.
 #[must_use]
 pub fn with_all_sides(mut plan: StnPlan) -> StnPlan {
     for constraint in &mut plan.constraints {
@@ -71,8 +70,8 @@ pub fn with_all_sides(mut plan: StnPlan) -> StnPlan {
     plan
 }
 
-/// The plan with its [sides](Reason::Side) for good, but of two that make time points fall
-/// together only the first.
+/// Makes the [sides](Reason::Side) of the plan permanent. Of two sides that would make time points
+/// simultaneous, only the first is kept.
 #[must_use]
 pub fn with_sides_one_way(plan: StnPlan) -> StnPlan {
     let (mut plan, sides) = without_sides(plan);
@@ -85,8 +84,8 @@ pub fn with_sides_one_way(plan: StnPlan) -> StnPlan {
     with_all_sides(plan)
 }
 
-/// The plan with every time point where it is in the nominal schedule: for plans about whose other
-/// schedules nothing can be told.
+/// Returns the plan with every time point fixed at its nominal time, for plans whose other
+/// schedules cannot be analysed.
 #[must_use]
 pub fn pinned_to(mut plan: StnPlan, nominal: &Schedule) -> StnPlan {
     let pins = plan.nodes().skip(1).map(|(node, _)| Constraint {
@@ -101,7 +100,7 @@ pub fn pinned_to(mut plan: StnPlan, nominal: &Schedule) -> StnPlan {
     plan
 }
 
-/// The gentlest constraint about these nodes that is not implied yet.
+/// Returns the weakest constraint between these nodes that is not implied yet.
 fn next_pin(plan: &StnPlan, nominal: &Schedule, nodes: &[NodeId]) -> Option<Constraint> {
     let network = ConsistentNetwork::try_from(plan.network(&Valuation::default())).ok()?;
     let time = |node: NodeId| &nominal[node];
@@ -137,8 +136,8 @@ fn next_pin(plan: &StnPlan, nominal: &Schedule, nodes: &[NodeId]) -> Option<Cons
         let exact = time(to) - time(from);
         least(from, to).as_ref() != Some(&exact) || most(from, to).as_ref() != Some(&exact)
     };
-    // Where how long an action takes is settled, its start stands for its end: that is what the
-    // executor chooses, and it leaves the duration free to become a parameter.
+    // If the duration of an action is fixed, its start represents its end: the executor chooses the
+    // start, and the duration can still become a parameter.
     let mut chosen: Vec<NodeId> = nodes
         .iter()
         .map(|&node| match duration(plan, node) {
@@ -162,7 +161,7 @@ fn next_pin(plan: &StnPlan, nominal: &Schedule, nodes: &[NodeId]) -> Option<Cons
         .map(|(from, to)| exactly(from, to))
 }
 
-/// Start and end of the durative action to which the node belongs.
+/// Returns the start and the end of the durative action of the node.
 fn duration(plan: &StnPlan, node: NodeId) -> Option<(NodeId, NodeId)> {
     match plan.nodes[node.index()] {
         Node::Start(id) | Node::End(id) => Some((plan.start(id), plan.end(id))),

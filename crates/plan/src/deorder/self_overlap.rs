@@ -1,4 +1,4 @@
-//! Instances of one ground action that do not overlap in the plan stay apart.
+//! Separation of instances of one ground action that do not overlap in the plan.
 
 use std::collections::BTreeMap;
 
@@ -9,8 +9,9 @@ use super::order::Order;
 use crate::network::Schedule;
 use crate::stn_plan::{Node, NodeId, Reason, StnPlan};
 
-/// Demands that an instance starts no earlier than those instances of its action end that have ended by its
-/// start in the plan. Instances that overlap in the plan may overlap in each schedule.
+/// Adds the constraints that an instance starts no earlier than the ends of those instances of its
+/// action that have ended by its start in the plan. Instances that overlap in the plan may overlap
+/// in each schedule.
 pub(super) fn order(plan: &StnPlan, times: &Schedule, order: &mut Order) {
     let mut nodes: Vec<[Option<NodeId>; 2]> = vec![[None; 2]; plan.instances.len()];
     for (node, what) in plan.nodes() {
@@ -41,7 +42,7 @@ pub(super) fn order(plan: &StnPlan, times: &Schedule, order: &mut Order) {
     }
 }
 
-/// An instance that has been placed.
+/// An instance that has been processed.
 struct Instance {
     end: NodeId,
     /// `true` if all earlier instances of the action end before it starts.

@@ -11,7 +11,7 @@ use crate::stn_plan::{Bound, NodeId, Reason};
 use crate::testing::{number, rover};
 use crate::valuation::Valuation;
 
-/// A plan of the rover: `start: action [duration]` on each line.
+/// Parses a plan of the rover, with `start: action [duration]` on each line.
 fn plan(text: &str) -> (elbowroom_model::Task, TimeTriggeredPlan) {
     let task = rover();
     let mut plan = TimeTriggeredPlan::default();
@@ -37,7 +37,7 @@ fn deordered(text: &str) -> Deordered {
     deorder(&task, &plan).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The constraints as an STN plan file has them.
+/// Returns the constraints in the notation of STN plan files.
 fn constraints(text: &str) -> String {
     let (task, _) = plan(text);
     let closed = ParametrizedPlan::closed(&task, deordered(text).plan);
@@ -54,7 +54,8 @@ fn a_duration_obeys_the_domain_rather_than_the_plan() {
     );
     assert_eq!(
         constraints("3: navigate [7]"),
-        // What starts with making a fact true and ends with making it false takes time.
+        // An action that makes a fact true at its start and false at its end has a positive
+        // duration.
         "c: n0.end - n0.start in [5, 15];"
     );
 }
@@ -116,7 +117,7 @@ fn a_deadline_becomes_a_constraint() {
 
 #[test]
 fn a_fluent_that_is_read_and_changed_keeps_the_order_of_its_users() {
-    // Refuelling needs 3 at the start, takes them, and gives some at the end.
+    // Refuelling needs 3 at the start, consumes them, and adds an amount at the end.
     assert_eq!(
         constraints(
             "0: refuel s1 [10]
@@ -183,7 +184,7 @@ fn pins_are_as_few_as_the_oracle_needs() {
                 3: collect s2 [15]";
     let Deordered { plan, nominal, .. } = deordered(text);
     let (first, second) = (NodeId(1), NodeId(3));
-    // Content once the second start is known to come no sooner than the first.
+    // The oracle accepts if the second start is known to come no sooner than the first.
     let mut oracle = |plan: &crate::StnPlan| {
         let network =
             elbowroom_stn::ConsistentNetwork::try_from(plan.network(&Valuation::default()))

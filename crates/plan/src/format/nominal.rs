@@ -19,10 +19,10 @@ pub(super) struct Draft {
     pub(super) range: Interval,
 }
 
-/// A nominal value for each parameter, `None` where none can be found.
+/// Returns a nominal value for each parameter, `None` if none can be found.
 ///
-/// What the domain fixes comes first; the rest is read off the earliest schedule of the network
-/// in which those bounds are limited by the parameters' ranges alone.
+/// Values that the domain fixes come first. The others are taken from the earliest schedule of the
+/// network, where bounds without a value are limited only by the parameters' ranges.
 pub(super) fn find(task: &Task, plan: &StnPlan, drafts: &[Draft]) -> Vec<Option<Rational>> {
     let mut ranges: Vec<Interval> = drafts
         .iter()
@@ -54,9 +54,10 @@ pub(super) fn find(task: &Task, plan: &StnPlan, drafts: &[Draft]) -> Vec<Option<
     ranges.iter().enumerate().map(find).collect()
 }
 
-/// The durations that the domain allows the instance, as far as the initial state tells.
+/// Returns the durations that the domain allows for the instance, as far as the initial state
+/// determines them.
 fn domain_durations(task: &Task, plan: &StnPlan, id: InstanceId) -> Option<Interval> {
-    // The plan's own action no longer lists its duration constraints.
+    // The plan's own action no longer contains its duration constraints.
     let action = &plan.instance(id).action;
     let original = task.instantiate(action.schema, &action.arguments).ok()?;
     let constraints = &original.durative()?.duration;
@@ -66,7 +67,7 @@ fn domain_durations(task: &Task, plan: &StnPlan, id: InstanceId) -> Option<Inter
     })
 }
 
-/// The earliest schedule when each parameter may have any value of its range, wherever it occurs.
+/// Returns the earliest schedule if each occurrence of a parameter may have any value of its range.
 fn earliest(plan: &StnPlan, ranges: &[Interval]) -> Option<Schedule> {
     let mut network = Network::with_nodes(plan.nodes.len());
     let zero = network_node(NodeId::ZERO);
@@ -96,13 +97,13 @@ fn earliest(plan: &StnPlan, ranges: &[Interval]) -> Option<Schedule> {
     Some(network.earliest_schedule(zero).into())
 }
 
-/// A value with which all constraints that mention the parameter hold in the schedule.
+/// Returns a value for which all constraints with the parameter hold in the schedule.
 fn value_in(plan: &StnPlan, id: ParameterId, schedule: &Schedule) -> Option<Rational> {
     let mut least = None;
     let mut greatest = None;
     for constraint in &plan.constraints {
         let difference = &schedule[constraint.to] - &schedule[constraint.from];
-        // A lower bound must not exceed the difference, an upper one not fall short of it.
+        // A lower bound must not be greater than the difference, an upper one not less.
         if constraint.lower == Bound::Parameter(id) {
             greatest = Some(match greatest {
                 Some(so_far) if so_far < difference => so_far,

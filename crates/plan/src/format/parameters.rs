@@ -1,4 +1,4 @@
-//! What the parameters of an STN plan file stand for, and their values and ranges.
+//! Kinds, values and ranges of the parameters of an STN plan file.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::stn_plan::{Bound, Constraint, InstanceId, StnPlan};
 use crate::unknowns::{self, OpenNumber};
 use crate::valuation::ParameterId;
 
-/// The kind of each declared parameter, judging by the constraints in which it occurs.
+/// Returns the kind of each declared parameter, determined from the constraints with the parameter.
 pub(super) fn kinds(plan: &StnPlan, used: &[Vec<usize>]) -> Vec<ParameterKind> {
     let kind = |index: usize| {
         let id = ParameterId::from(index);
@@ -26,7 +26,7 @@ pub(super) fn kinds(plan: &StnPlan, used: &[Vec<usize>]) -> Vec<ParameterKind> {
     (0..used.len()).map(kind).collect()
 }
 
-/// The instance whose duration the constraint sets to the parameter.
+/// Returns the instance whose duration the constraint sets to the parameter.
 fn duration_set_to(plan: &StnPlan, constraint: &Constraint, id: ParameterId) -> Option<InstanceId> {
     if constraint.lower != Bound::Parameter(id) || constraint.upper != Bound::Parameter(id) {
         return None;
@@ -34,8 +34,8 @@ fn duration_set_to(plan: &StnPlan, constraint: &Constraint, id: ParameterId) -> 
     plan.duration_of(constraint)
 }
 
-/// Takes the domain's duration constraints from all instances whose duration is a parameter, also
-/// where one parameter is the duration of several.
+/// Removes the domain's duration constraints from all instances whose duration is a parameter, also
+/// if one parameter is the duration of several.
 pub(super) fn free_durations(plan: &mut StnPlan, kinds: &[ParameterKind]) {
     let free: Vec<InstanceId> = plan
         .constraints
@@ -50,7 +50,8 @@ pub(super) fn free_durations(plan: &mut StnPlan, kinds: &[ParameterKind]) {
     plan.free_durations(free);
 }
 
-/// The parameter of each number that the domain leaves open and the file or the plan mentions.
+/// Returns the parameter of each number that the domain leaves open and the file or the plan
+/// mentions.
 pub(super) fn open_numbers(
     file: &File<'_>,
     task: &Task,
@@ -133,7 +134,7 @@ pub(super) fn parameters(
     (!mistakes.is_failed()).then_some(parameters)
 }
 
-/// The range that `lb` and `ub` give, each side on its own, or else the natural one.
+/// Returns the range from `lb` and `ub`; a missing side is the natural one.
 fn range(item: &ParameterItem<'_>, natural: Interval) -> Interval {
     let end = |limit: &Option<Limit>, natural: End| match limit {
         Some(Limit::Number(number)) => End::Closed(number.clone()),

@@ -1,4 +1,5 @@
-//! From the items of an STN plan file to a plan: names looked up in a task and in the file.
+//! Conversion of the items of an STN plan file to a plan: looks up names in the task and in the
+//! file.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,10 +16,10 @@ use crate::stn_plan::{Bound, Constraint, Instance, Node, NodeId, Reason, StnPlan
 use crate::unknowns;
 use crate::valuation::ParameterId;
 
-/// The plan, or `None` after noting mistakes.
+/// Returns the plan, or `None` after recording mistakes.
 ///
-/// When there are mistakes already, names that the broken items may have declared are not asked
-/// for; everything else is checked all the same.
+/// If there are mistakes already, unknown names that the broken items may have declared are not
+/// reported. All other checks are made.
 pub(super) fn resolve(
     file: &File<'_>,
     task: &Task,
@@ -65,11 +66,11 @@ pub(super) fn resolve(
     Some(plan.with_planned_durations())
 }
 
-/// The names that constraints can mention.
+/// Names that constraints can mention.
 struct Names<'a> {
     points: BTreeMap<String, NodeId>,
     parameters: BTreeMap<&'a str, ParameterId>,
-    /// Whether no item was lost that could have declared more of them.
+    /// `true` if no item with mistakes could have declared more of them.
     has_all_points: bool,
     has_all_parameters: bool,
 }
@@ -220,7 +221,7 @@ fn parameter_names<'a>(file: &File<'a>, mistakes: &mut Report) -> BTreeMap<&'a s
     names
 }
 
-/// The nodes that a file can mention, by name.
+/// Returns the nodes that a file can mention, by name.
 fn time_points(plan: &StnPlan) -> BTreeMap<String, NodeId> {
     plan.nodes()
         .filter(|(_, node)| !matches!(node, Node::Timed(_)))

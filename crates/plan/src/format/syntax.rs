@@ -1,4 +1,4 @@
-//! The grammar of STN plan files: from words to items whose names are not looked up yet.
+//! Grammar of STN plan files: from words to items with unresolved names.
 
 use elbowroom_num::Rational;
 use elbowroom_text::{Report, Source};
@@ -77,7 +77,7 @@ pub(super) fn parse(source: &Source) -> (File<'_>, Report) {
     (file, parser.mistakes)
 }
 
-/// The limit that a word denotes.
+/// Returns the limit that a word denotes.
 pub(crate) fn limit(text: &str) -> Option<Limit> {
     match text.to_ascii_lowercase().as_str() {
         "inf" | "+inf" | "infinity" | "+infinity" => Some(Limit::Infinity),
@@ -91,12 +91,12 @@ const ITEMS: &str = "`parameter`, `durative-action instance`, `action instance` 
 struct Parser<'a> {
     tokens: Vec<Token<'a>>,
     next: usize,
-    /// Where the text ends.
+    /// End of the text.
     end: usize,
     mistakes: Report,
 }
 
-/// Each method that returns an `Option` gives `None` after noting a mistake.
+/// Methods that return an `Option` return `None` after recording a mistake.
 impl<'a> Parser<'a> {
     fn item(&mut self, file: &mut File<'a>) -> Option<()> {
         let keyword = self.word(ITEMS)?;
@@ -189,7 +189,7 @@ impl<'a> Parser<'a> {
         })
     }
 
-    /// `to - from`, with or without spaces around the sign.
+    /// Parses `to - from`, with or without spaces around the sign.
     fn difference(&mut self) -> Option<(Token<'a>, Token<'a>)> {
         const POINT: &str = "a time point: `.zero`, `LABEL.start`, `LABEL.end` or `LABEL`";
         let first = self.word(POINT)?;
@@ -213,7 +213,7 @@ impl<'a> Parser<'a> {
         Some((first, Token { text: rest, span }))
     }
 
-    /// One bound and the mark after it. A number may be split by spaces: `1 / 3`, `- 5`.
+    /// Parses a bound and the mark after it. A number may contain spaces: `1 / 3`, `- 5`.
     fn bound(&mut self, mark: &str) -> Option<BoundText<'a>> {
         let first = self.word("a number, `inf`, `-inf` or a parameter")?;
         let mut text = first.text.to_owned();
@@ -253,7 +253,8 @@ impl<'a> Parser<'a> {
         self.fail(NUMBER)
     }
 
-    /// A missing `;` before the next item is noted, but costs nothing of either item.
+    /// Reads the `;`. If it is missing before the next item, this is recorded, and both items are
+    /// kept.
     fn end_of_item(&mut self) -> Option<()> {
         if self.accept(";") || self.peek().is_none() {
             return Some(());
@@ -268,7 +269,7 @@ impl<'a> Parser<'a> {
         self.fail("`;`")
     }
 
-    /// Whether the words ahead can only be the beginning of an item.
+    /// Returns `true` if the next words can only be the beginning of an item.
     fn starts_item(&self) -> bool {
         let Some(keyword) = self.peek() else {
             return false;
@@ -327,7 +328,7 @@ impl<'a> Parser<'a> {
         self.fail(what)
     }
 
-    /// Notes that the next token is not `what` was expected.
+    /// Records that the next token is not the expected `what`.
     fn fail<T>(&mut self, what: &str) -> Option<T> {
         let expected = format!("expected {what}");
         if let Some(token) = self.peek() {
@@ -343,7 +344,7 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// Splits `n0.end-n0.start`. As labels may contain `-`, the sign is the first one after a suffix,
+/// Splits `n0.end-n0.start`. Labels may contain `-`, so the sign is the first one after a suffix,
 /// or else the only one.
 fn split_difference(word: Token<'_>) -> Option<(Token<'_>, Token<'_>)> {
     let signs = || word.text.match_indices('-').map(|(at, _)| at);

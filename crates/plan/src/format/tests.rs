@@ -112,7 +112,7 @@ fn nominal_values_come_from_the_domain_or_from_the_earliest_schedule() {
          c: ct.end - .zero in [free, 60];",
     );
     let nominal: Vec<_> = plan.nominal().iter().map(ToString::to_string).collect();
-    // The collection takes 15 from the initial state; what follows starts at 20, and no sooner.
+    // The collection takes 15 by the initial state; the next action starts at 20, and no sooner.
     assert_eq!(nominal, ["15", "3", "5"]);
 }
 

@@ -1,6 +1,6 @@
 //! Words and marks of an STN plan file.
 
-/// A stretch of the text, in bytes.
+/// Byte range of the text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Span {
     pub(super) start: usize,
@@ -8,7 +8,7 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// From the beginning of this to the end of `other`.
+    /// Returns the range from the beginning of this one to the end of `other`.
     pub(super) fn to(self, other: Self) -> Self {
         Self {
             start: self.start,
@@ -40,7 +40,7 @@ fn is_mark(c: char) -> bool {
     matches!(c, ':' | ';' | '(' | ')' | '[' | ']' | ',')
 }
 
-/// All words and marks, comments left out.
+/// Returns all words and marks, without comments.
 pub(crate) fn tokens(text: &str) -> Vec<Token<'_>> {
     let mut tokens = Vec::new();
     let mut rest = text;

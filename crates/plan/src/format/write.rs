@@ -1,4 +1,4 @@
-//! Writes STN plan files.
+//! Writer of STN plan files.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -14,10 +14,10 @@ use crate::stn_plan::{Bound, Constraint, Node, NodeId, StnPlan};
 use crate::unknowns;
 use crate::valuation::ParameterId;
 
-/// A plan cannot be written as an STN plan file.
+/// Reason why a plan cannot be written as an STN plan file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WriteError {
-    /// The format knows durations, bounds and the domain's `:synth-parameters`, nothing else.
+    /// The format supports only durations, bounds and the domain's `:synth-parameters`.
     #[error(
         "an STN plan file cannot say what these parameters stand for: {}; leave them out, or name \
          the numbers with `:synth-parameters` in the domain",
@@ -27,7 +27,7 @@ pub enum WriteError {
         /// The parameters.
         names: Vec<String>,
     },
-    /// A label or a parameter's name would not be read back as one name.
+    /// A label or a parameter's name would not be read as one name.
     #[error("`{name}` is not allowed in an STN plan file: choose a name without spaces and marks")]
     Name {
         /// The label or name.
@@ -35,13 +35,14 @@ pub enum WriteError {
     },
 }
 
-/// The plan as an STN plan file, which [`read`](super::read) reads back.
+/// Returns the plan as an STN plan file for [`read`](super::read).
 ///
-/// Timed initials do not appear in such files: as they are fixed, a bound between one and another
-/// node becomes a bound on the other node's time. Bounds on the same difference are merged.
+/// The file does not contain timed initials. Their times are fixed, so a bound between a timed
+/// initial and another node becomes a bound on the other node's time. Bounds on the same difference
+/// are merged.
 ///
 /// # Errors
-/// When a parameter is something that the format cannot express, or a name is not a word.
+/// When the format cannot express a parameter, or a name is not a word.
 pub fn write(task: &Task, plan: &ParametrizedPlan) -> Result<String, WriteError> {
     check_kinds(task, plan)?;
     let labels = plan.plan.instances.iter().map(|instance| &instance.label);
@@ -83,7 +84,7 @@ fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
     writeln!(text, "{content}").expect("writing to a string cannot fail");
 }
 
-/// A bound on a difference that is to be written.
+/// A bound on a difference.
 #[derive(Clone)]
 struct Difference {
     from: NodeId,
@@ -92,7 +93,7 @@ struct Difference {
     upper: Bound,
 }
 
-/// All constraints without timed initials, numeric ones on the same difference merged.
+/// Returns all constraints without timed initials. Numeric ones on the same difference are merged.
 fn merged(task: &Task, plan: &StnPlan) -> Vec<Difference> {
     let mut all: Vec<Difference> = Vec::new();
     let mut numeric: BTreeMap<(NodeId, NodeId), usize> = BTreeMap::new();
@@ -125,8 +126,8 @@ fn tighter(old: &Bound, new: &Bound, excludes: fn(&Rational, &Rational) -> bool)
     }
 }
 
-/// The constraint with `.zero` in place of a timed initial, `None` when it is about fixed times
-/// only.
+/// Returns the constraint with `.zero` in place of a timed initial, or `None` if it is only about
+/// fixed times.
 fn without_timed(task: &Task, plan: &StnPlan, constraint: &Constraint) -> Option<Difference> {
     let time = |node: NodeId| match plan.nodes[node.index()] {
         Node::Timed(index) => Some(task.timed()[index].time.clone()),
@@ -198,7 +199,7 @@ fn parameter_line(text: &mut String, parameter: &Parameter) {
     );
 }
 
-/// A decimal where that is exact and short, else a fraction.
+/// Returns a decimal if that is exact and short, else a fraction.
 fn number(value: &Rational) -> String {
     const DIGITS: u32 = 9;
     let decimal = value.to_decimal(DIGITS);

@@ -1,4 +1,4 @@
-//! Constants in a ground action: where they stand, and parameters in their place.
+//! Constants in a ground action: their occurrences, and their replacement by parameters.
 
 use std::sync::Arc;
 
@@ -11,17 +11,16 @@ use elbowroom_num::Rational;
 
 use crate::valuation::ParameterId;
 
-/// In which expressions of an action to look.
+/// Expressions of an action to search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
-    /// Amounts by which effects, continuous ones too, change the function, or values that they
-    /// assign to it.
+    /// Amounts of effects, including continuous ones, on the function, or values assigned to it.
     Effects(FunctionId),
     /// Comparisons that read the function.
     Conditions(FunctionId),
 }
 
-/// The distinct constants there, in ascending order.
+/// Returns the distinct constants there, in ascending order.
 pub(super) fn constants(task: &Task, action: &Action, place: Place) -> Vec<Rational> {
     let mut found = Vec::new();
     let _ = rewritten(task, action, place, &mut |leaf| {
@@ -35,7 +34,7 @@ pub(super) fn constants(task: &Task, action: &Action, place: Place) -> Vec<Ratio
     found
 }
 
-/// The fluents that are read there.
+/// Returns the fluents that are read there.
 pub(super) fn fluents(task: &Task, action: &Action, place: Place) -> Vec<FluentId> {
     let mut found = Vec::new();
     let _ = rewritten(task, action, place, &mut |leaf| {
@@ -49,7 +48,7 @@ pub(super) fn fluents(task: &Task, action: &Action, place: Place) -> Vec<FluentI
     found
 }
 
-/// The action with the parameter wherever the constant stands there.
+/// Returns the action with the parameter in place of the constant there.
 pub(super) fn opened(
     task: &Task,
     action: &Action,
@@ -92,8 +91,8 @@ fn rewritten(task: &Task, action: &Action, place: Place, replace: Replace<'_>) -
     action
 }
 
-/// Whether the action changes the function continuously, and in no other direction than down as far
-/// as the words go: `(decrease (charge) (* #t 2))`.
+/// Returns `true` if the action changes the function continuously and all these changes are written
+/// as decreases: `(decrease (charge) (* #t 2))`.
 fn only_decreases(task: &Task, schema: problem::SchemaId, function: FunctionId) -> bool {
     let problem::Body::Durative { continuous, .. } = &task.problem().schemas[schema.index()].body
     else {
@@ -106,7 +105,8 @@ fn only_decreases(task: &Task, schema: problem::SchemaId, function: FunctionId) 
     own.peek().is_some() && own.all(|effect| matches!(effect.rate, problem::Expression::Negate(_)))
 }
 
-/// The numbers of a decrease are those that it names, not those of the rate.
+/// Replaces numbers in a rate. Those of a decrease are the numbers in the domain, without the sign
+/// of the rate.
 fn rewrite_rate(rate: &Expression, is_decrease: bool, replace: Replace<'_>) -> Expression {
     if !is_decrease {
         return rate.map_leaves(&mut |leaf| replace(leaf));

@@ -1,14 +1,14 @@
-//! What can be wrong with a request to leave quantities open.
+//! Errors in specifications of parameters.
 
-/// A quantity cannot be left open as asked.
+/// Reason why a quantity cannot become a parameter as specified.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ParametrizeError {
-    /// The words do not follow the grammar.
+    /// The specification has a syntax error.
     #[error("cannot understand `--vary {spec}`: expected {expected}")]
     Syntax {
         /// The text.
         spec: String,
-        /// The form that is expected.
+        /// The expected form.
         expected: String,
     },
     /// There is no such kind of quantity.
@@ -16,39 +16,39 @@ pub enum ParametrizeError {
     UnknownKind {
         /// The text.
         spec: String,
-        /// The word that stands where a kind is expected.
+        /// The word in place of a kind.
         name: String,
-        /// A similar kind that there is.
+        /// A similar kind that exists.
         nearest: Option<String>,
     },
-    /// A name means nothing in the domain, the problem or the plan.
+    /// A name is unknown in the domain, the problem or the plan.
     #[error("`--vary {spec}`: there is no {kind} `{name}`{}", suggestion(.nearest.as_ref()))]
     UnknownName {
         /// The text.
         spec: String,
-        /// The kind of thing that was looked for: `action or label`, `function`, …
+        /// The expected kind of name: `action or label`, `function`, …
         kind: &'static str,
         /// The name.
         name: String,
-        /// A similar name that there is.
+        /// A similar name that exists.
         nearest: Option<String>,
     },
-    /// Everything is known, but the plan has no such quantity.
+    /// All names are known, but the plan has no such quantity.
     #[error("`--vary {spec}`: {why}")]
     NothingMatches {
         /// The text.
         spec: String,
-        /// The missing part.
+        /// Reason, in words.
         why: String,
     },
-    /// Several numbers could be meant.
+    /// Several numbers match.
     #[error("`--vary {spec}` could mean several things: {}; {advice}", choices.join(", "))]
     Ambiguous {
         /// The text.
         spec: String,
         /// The possible meanings.
         choices: Vec<String>,
-        /// How to say which.
+        /// Advice on how to select one of them.
         advice: &'static str,
     },
     /// The domain leaves a number open, and its nominal value is not given.
@@ -67,7 +67,7 @@ pub enum ParametrizeError {
         /// Its range.
         range: String,
     },
-    /// Derived predicates are decided by rules that every schedule shares.
+    /// A derived predicate depends on an open number. Its rules are the same in all schedules.
     #[error("a derived predicate depends on `:synth-parameters`, which is not supported")]
     OpenRule,
 }

@@ -1,4 +1,4 @@
-//! A plan whose quantities are being opened, one specification after another.
+//! A plan whose quantities are being replaced by parameters, one specification after another.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,32 +14,32 @@ use crate::stn_plan::{Bound, InstanceId, NodeId, Reason};
 use crate::unknowns::{self, OpenNumber};
 use crate::valuation::ParameterId;
 
-/// A quantity that at most one parameter stands for.
+/// A quantity that at most one parameter represents.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Quantity {
     Duration(InstanceId),
     Timed(usize),
     Initial(FluentId),
     Open(OpenNumber),
-    /// Named parameters of one constant each; their names say which.
+    /// Parameters of one constant each, identified by their names.
     Constant(String),
 }
 
-/// A plan whose quantities are being opened.
+/// A plan whose quantities are being replaced by parameters.
 pub(super) struct Opening<'a> {
     pub(super) task: &'a Task,
     pub(super) nominal: &'a Schedule,
     pub(super) plan: ParametrizedPlan,
     pub(super) opened: BTreeMap<Quantity, ParameterId>,
     open_numbers: BTreeMap<OpenNumber, ParameterId>,
-    /// The names of all parameters.
+    /// Names of all parameters.
     names: BTreeSet<String>,
     /// Instances whose durations the executor chooses.
     pub(super) controllable: BTreeSet<InstanceId>,
 }
 
 impl<'a> Opening<'a> {
-    /// A plan of which nothing more is open than its parameters say.
+    /// Creates the state for a plan with its present parameters.
     pub(super) fn new(
         task: &'a Task,
         plan: ParametrizedPlan,
@@ -63,7 +63,7 @@ impl<'a> Opening<'a> {
 
     /// Applies all specifications.
     pub(super) fn apply_all(&mut self, specs: &[VarySpec]) -> Result<(), ParametrizeError> {
-        // What the executor chooses is not opened, wherever in the list that stands.
+        // Durations that the executor chooses are not opened, whatever the order of the list.
         let (controllable, open): (Vec<_>, Vec<_>) = specs
             .iter()
             .partition(|spec| matches!(spec.target, Target::Controllable(_)));
@@ -102,7 +102,7 @@ impl<'a> Opening<'a> {
         }
     }
 
-    /// The parameter that stands for the quantity: the one there is, or a new one.
+    /// Returns the parameter of the quantity: the existing one, or a new one.
     pub(super) fn parameter(
         &mut self,
         spec: &VarySpec,
@@ -149,7 +149,7 @@ impl<'a> Opening<'a> {
         })
     }
 
-    /// The name, or the name with a number that makes it unique.
+    /// Returns the name, or the name with a number that makes it unique.
     fn unused(&self, name: String) -> String {
         if !self.names.contains(&name) {
             return name;
@@ -195,7 +195,8 @@ impl<'a> Opening<'a> {
     pub(super) fn finish(mut self) -> Result<ParametrizedPlan, ParametrizeError> {
         let plan = &mut self.plan;
         for number in unknowns::mentioned(self.task, &plan.plan) {
-            // In a plan that was read from a file, none are left, but the goal is the task's.
+            // A plan that was read from a file has no open numbers left, but the goal is the
+            // task's.
             let is_filled = number.instance.is_none()
                 && plan.find(&number.name(self.task, &plan.plan)).is_some();
             if !self.open_numbers.contains_key(&number) && !is_filled {
@@ -209,7 +210,8 @@ impl<'a> Opening<'a> {
         Ok(self.plan.with_planned_durations())
     }
 
-    /// How long those actions are planned to take that the executor tells how long to.
+    /// Returns the planned durations of the actions whose durations the executor chooses at their
+    /// start.
     fn told(&self) -> BTreeMap<InstanceId, Rational> {
         let plan = &self.plan.plan;
         let told = plan.constraints.iter().filter_map(|constraint| {

@@ -1,4 +1,5 @@
-//! Opening durations, constants, initial values and the times of timed initials.
+//! Replacement of durations, constants, initial values and the times of timed initials by
+//! parameters.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -54,8 +55,8 @@ impl Opening<'_> {
         Ok(())
     }
 
-    /// Limits a duration for which the domain gives an interval to that interval. (Where the domain gives one number,
-    /// that is the planned duration, and the real one may be any.)
+    /// Limits a duration for which the domain gives an interval to that interval. (If the domain
+    /// gives one number, this is the planned duration, and the range of the real one is unlimited.)
     fn limit_to_domain(&mut self, id: InstanceId, parameter: ParameterId) {
         let mut constraints = self.plan.plan.constraints.iter();
         let Some(domain) = constraints.find(|it| it.reason == Reason::Duration(id)) else {
@@ -73,13 +74,13 @@ impl Opening<'_> {
             lower: end(&domain.lower),
             upper: end(&domain.upper),
         });
-        // A schedule that was rounded may miss the interval by a little.
+        // A rounded schedule may slightly miss the interval.
         if allowed.contains(&parameter.nominal) {
             parameter.range = allowed;
         }
     }
 
-    /// The parameters that stand for durations already.
+    /// Returns the existing parameters of durations.
     fn known_durations(&self) -> BTreeMap<InstanceId, ParameterId> {
         let mut known = BTreeMap::new();
         for (index, parameter) in self.plan.parameters.iter().enumerate() {
@@ -90,8 +91,8 @@ impl Opening<'_> {
         known
     }
 
-    /// Puts parameters in place of whatever fixed how long these instances take, from their starts to their
-    /// ends.
+    /// Replaces the constraints on the durations of these instances by parameters, from their
+    /// starts to their ends.
     fn set_durations(&mut self, set: &[(InstanceId, NodeId, NodeId, ParameterId)]) {
         let plan = &mut self.plan.plan;
         let ids: BTreeSet<InstanceId> = set.iter().map(|(id, ..)| *id).collect();
@@ -102,7 +103,8 @@ impl Opening<'_> {
         plan.constraints
             .retain(|constraint| match constraint.reason {
                 Reason::Duration(id) => !ids.contains(&id),
-                // Fixing the duration served the schedules of one duration; each value is one.
+                // The pinned duration is only needed for schedules of one duration. Each parameter
+                // value has its own.
                 Reason::Pinned => !ends.contains(&(constraint.from, constraint.to)),
                 _ => true,
             });
@@ -141,7 +143,7 @@ impl Opening<'_> {
                         select::listed(", only ", &found)
                     );
                     let read = constants::fluents(self.task, &instance.action, place);
-                    // That the function itself is read does not say how much it changes.
+                    // A read of the function itself does not determine the amount of its change.
                     let mut others = read.into_iter();
                     if let Some(other) = others.find(|fluent| self.names_other(*fluent, target)) {
                         let name = self.task.fluent_name(other);
@@ -183,13 +185,13 @@ impl Opening<'_> {
         Ok(())
     }
 
-    /// Whether a fluent is not of the target's function.
+    /// Returns `true` if the fluent belongs to another function than the target's.
     fn names_other(&self, fluent: FluentId, target: &ConstantTarget) -> bool {
         let function = self.task.problem().function(&target.function);
         Some(self.task.function_of(fluent)) != function
     }
 
-    /// An action whose duration is whatever the fluent is at time 0.
+    /// Returns an action whose duration is the value of the fluent at time 0.
     fn lasts(&self, fluent: FluentId) -> Option<&str> {
         let mut instances = self.plan.plan.instances.iter();
         let reads = |instance: &&Instance| {
@@ -250,8 +252,8 @@ impl Opening<'_> {
         Ok(())
     }
 
-    /// Puts the parameter in place of the time of a group of timed initials, which keeps its
-    /// place among the groups that change the same things.
+    /// Replaces the time of a group of timed initials by the parameter. The group keeps its
+    /// position among the groups that change the same facts or fluents.
     fn set_timed(&mut self, group: usize, id: ParameterId) {
         let timed = self.task.timed();
         let plan = &mut self.plan.plan;
@@ -267,7 +269,7 @@ impl Opening<'_> {
                 continue;
             }
             let (first, second) = (group.min(other), group.max(other));
-            // Any positive distance would do: at one time they would fall together.
+            // Any positive distance prevents that the groups are simultaneous.
             let gap = &timed[second].time - &timed[first].time;
             let constraint = Constraint {
                 from: plan.timed(first),
@@ -283,7 +285,7 @@ impl Opening<'_> {
     }
 }
 
-/// `charge_auv`
+/// Returns a name such as `charge_auv`.
 fn joined(atom: &[String]) -> String {
     atom.join("_").to_lowercase()
 }

@@ -1,4 +1,4 @@
-//! Names in specifications looked up in the task and in the plan.
+//! Look-up of names from specifications in the task and in the plan.
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Change, FluentId};
@@ -9,7 +9,7 @@ use super::{ParametrizeError, Selection, VarySpec, nothing};
 use crate::stn_plan::{InstanceId, StnPlan};
 use elbowroom_text::nearest;
 
-/// The instances meant; at least one.
+/// Returns the selected instances; at least one.
 pub(super) fn instances(
     task: &Task,
     plan: &StnPlan,
@@ -85,7 +85,7 @@ fn object(task: &Task, spec: &VarySpec, name: &str) -> Result<ObjectId, Parametr
     })
 }
 
-/// The function of that name.
+/// Returns the function with that name.
 pub(super) fn function(
     task: &Task,
     spec: &VarySpec,
@@ -101,7 +101,7 @@ pub(super) fn function(
     })
 }
 
-/// The fluent `(function object …)`.
+/// Returns the fluent `(function object …)`.
 pub(super) fn fluent(
     task: &Task,
     spec: &VarySpec,
@@ -114,7 +114,7 @@ pub(super) fn fluent(
     found.ok_or_else(|| nothing(spec, "nothing mentions such a fluent".to_owned()))
 }
 
-/// The groups of timed initials that change the fact or fluent; at least one.
+/// Returns the groups of timed initials that change the fact or fluent; at least one.
 pub(super) fn timed(
     task: &Task,
     spec: &VarySpec,
@@ -161,7 +161,7 @@ fn objects(
     names.iter().map(|name| object(task, spec, name)).collect()
 }
 
-/// The error for a name that means nothing.
+/// Returns the error for an unknown name.
 pub(super) fn unknown(
     spec: &VarySpec,
     kind: &'static str,
@@ -177,7 +177,7 @@ pub(super) fn unknown(
     }
 }
 
-/// The numbers after `prefix`, or nothing if there are none.
+/// Returns the numbers after `prefix`, or an empty text if there are none.
 pub(super) fn listed(prefix: &str, numbers: &[Rational]) -> String {
     if numbers.is_empty() {
         return String::new();

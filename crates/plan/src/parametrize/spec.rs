@@ -1,4 +1,4 @@
-//! What `--vary` says: one quantity, or several alike, to leave open.
+//! Specifications of `--vary`: one quantity, or several of the same kind, to replace by parameters.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,38 +9,38 @@ use elbowroom_text::nearest;
 use super::ParametrizeError;
 use crate::format::{Limit, Token, limit, tokens};
 
-/// One `--vary`: which quantities to leave open, and how to search for them.
+/// A specification of `--vary`: quantities to leave open, with weight and range.
 ///
 /// The module's documentation has the grammar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VarySpec {
-    /// The text it was read from, for messages.
+    /// Original text, for messages.
     pub text: String,
-    /// Which quantities.
+    /// The quantities.
     pub target: Target,
-    /// How strongly a search should favour them; 1 if not given.
+    /// Weight in a search; 1 if not given.
     pub weight: Option<Rational>,
-    /// The values they can take at all: finite ends, `None` for none. If not given, the natural
-    /// ones.
+    /// Range: finite ends, `None` for no limit. If not given, the natural range.
     pub range: Option<(Option<Rational>, Option<Rational>)>,
 }
 
-/// The quantities that a [`VarySpec`] leaves open.
+/// Quantities that a [`VarySpec`] leaves open.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
     /// The durations of all durative instances.
     Durations,
-    /// The durations of these.
+    /// The durations of these instances.
     Duration(Selection),
-    /// Nothing: the executor chooses how long these take, so that their durations are not open.
+    /// No quantity: the executor chooses the durations of these instances, so they are not left
+    /// open.
     Controllable(Selection),
-    /// A constant in the effects of these on a function.
+    /// A constant in the effects of these instances on a function.
     Constant(ConstantTarget),
-    /// A constant that the conditions of these compare a function with.
+    /// A constant that the conditions of these instances compare a function with.
     Condition(ConstantTarget),
     /// The value of a fluent at time 0: function and arguments.
     Initial(Vec<String>),
-    /// When timed initials change a fact or fluent: predicate or function, and arguments.
+    /// Times of timed initials that change a fact or fluent: predicate or function, and arguments.
     Timed {
         /// The fact or fluent.
         atom: Vec<String>,
@@ -59,22 +59,22 @@ pub enum Target {
 /// Some of a plan's instances.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Selection {
-    /// All instances of the action of that name, or the one of that label.
+    /// All instances of the action with that name, or the one with that label.
     Named(String),
-    /// All instances with these arguments; `_` stands for any.
+    /// All instances with these arguments; `_` matches any object.
     Exactly(Vec<String>),
 }
 
 /// See [`Target::Constant`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConstantTarget {
-    /// In which instances.
+    /// The instances.
     pub instances: Selection,
     /// The name of the function.
     pub function: String,
-    /// Which constant, if several occur.
+    /// The constant, if there are several.
     pub value: Option<Rational>,
-    /// Whether it is one number in all of them, rather than one number each.
+    /// `true` if all instances share one parameter, `false` if each has its own.
     pub is_shared: bool,
 }
 
@@ -115,7 +115,7 @@ impl FromStr for VarySpec {
     }
 }
 
-/// The words with which a specification begins.
+/// First words of specifications.
 const KINDS: [&str; 7] = [
     "duration",
     "controllable",
@@ -126,7 +126,7 @@ const KINDS: [&str; 7] = [
     "timed",
 ];
 
-/// The words not read yet.
+/// Unread words.
 struct Words<'a> {
     text: &'a str,
     tokens: &'a [Token<'a>],
@@ -140,7 +140,7 @@ impl<'a> Words<'a> {
         if let Some(unknown) = self.unknown()? {
             return Ok(unknown);
         }
-        // An action may be called like one of the keywords; in parentheses it is no keyword.
+        // An action may have the name of a keyword. In parentheses, the word is not a keyword.
         let keyword = first.to_ascii_lowercase();
         self.skip();
         match keyword.as_str() {
@@ -160,7 +160,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// `NAME=VALUE`, with or without spaces.
+    /// Parses `NAME=VALUE`, with or without spaces.
     fn unknown(&mut self) -> Result<Option<Target>, ParametrizeError> {
         let Some(first) = self.peek() else {
             return Ok(None);
@@ -220,7 +220,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// `(name arg …)`, or `name` alone.
+    /// Parses `(name arg …)`, or a single `name`.
     fn atom(&mut self) -> Result<Vec<String>, ParametrizeError> {
         if self.accept("(") {
             self.rest_of_list()
@@ -237,7 +237,7 @@ impl<'a> Words<'a> {
         Ok(list)
     }
 
-    /// `[lb, ub]`, either of which may be infinite.
+    /// Parses `[lb, ub]`. Either bound may be infinite.
     fn range(&mut self) -> Result<(Option<Rational>, Option<Rational>), ParametrizeError> {
         const RANGE: &str = "`[LB, UB]`";
         let is_bracketed = self.accept("[");
@@ -253,7 +253,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// A number; `None` for an infinity.
+    /// Parses a number; `None` for an infinity.
     fn number(&mut self) -> Result<Option<Rational>, ParametrizeError> {
         let limit = self.peek().and_then(limit);
         match limit {
@@ -294,10 +294,11 @@ impl<'a> Words<'a> {
         self.tokens = self.tokens.get(1..).unwrap_or_default();
     }
 
-    /// The error for a word after the end of a specification.
+    /// Returns the error for a word after the end of a specification.
     fn surplus(&self, target: &Target, word: &str) -> ParametrizeError {
         match target {
-            // No action is followed by a list, or by a name.
+            // A list or a name cannot follow an action, so the first word is probably a misspelt
+            // keyword.
             Target::Duration(Selection::Named(name))
                 if word == "(" || is_word(word) && nearest(name, KINDS).is_some() =>
             {

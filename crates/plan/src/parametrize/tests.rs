@@ -7,7 +7,7 @@ use crate::parameter::{ParameterKind, ParametrizedPlan};
 use crate::stn_plan::{Bound, InstanceId, Reason, StnPlan};
 use crate::testing::{number, rover};
 
-/// Two collections, a refuelling and a beep, with a nominal schedule.
+/// Returns a plan of two collections, a refuelling and a beep, with a nominal schedule.
 fn plan() -> (StnPlan, Schedule) {
     let text = "
         durative-action instance n0 : (collect S1);
@@ -16,7 +16,7 @@ fn plan() -> (StnPlan, Schedule) {
         action instance n3 : (beep);
         parameter n2.?r default 4;";
     let mut plan = format::read(text.as_bytes(), &rover()).unwrap().plan;
-    // As if nothing had read the file: the refuelling's number is open again.
+    // Restores the open number of the refuelling, as in a plan that was not read from a file.
     let task = rover();
     for instance in &mut plan.instances {
         let action = &instance.action;
@@ -33,7 +33,7 @@ fn varied(specs: &[&str]) -> Result<ParametrizedPlan, ParametrizeError> {
     parametrize(&rover(), plan, &nominal, &specs?)
 }
 
-/// `name=nominal` of each parameter but the refuelling's open number.
+/// Returns `name=nominal` for each parameter except the refuelling's open number.
 fn summary(specs: &[&str]) -> String {
     let open = [specs, &["?r=4"]].concat();
     let plan = varied(&open).unwrap_or_else(|error| panic!("{error}"));

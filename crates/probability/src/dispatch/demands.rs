@@ -1,4 +1,4 @@
-//! Which layers of an order fit, kept from one decision to the next: [`Demands`].
+//! Index of the layers of an order that fit, updated incrementally: [`Demands`].
 
 use std::collections::BTreeMap;
 
@@ -8,37 +8,38 @@ use elbowroom_plan::InstanceId;
 use crate::circumstances::Circumstances;
 use crate::total_order::TotalOrderPlan;
 
-/// What the layers of an order ask for that is either so or not so, and how many of their demands are
-/// not met at present. A demand is mostly the same for many layers in a row, so one of them is kept for
-/// all, and something that changes takes time in proportion to the logarithm of the order's length.
+/// Boolean demands of the layers of an order, with the number of unmet demands of each layer.
+/// Consecutive layers mostly have the same demands, so these are stored once for all of them. An
+/// update takes time proportional to the logarithm of the order's length.
 #[derive(Clone, Debug)]
 pub(super) struct Demands {
     by_subject: BTreeMap<Subject, Demand>,
     unmet: Counts,
-    /// What was under way when the demands were last held against the circumstances.
+    /// Actions that were running at the last update.
     running: Vec<InstanceId>,
 }
 
-/// What a demand is about.
+/// Subject of a demand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Subject {
-    /// That a fact is more likely to hold than not.
+    /// The fact is more likely true than false.
     Fact(FactId),
-    /// That an action is under way.
+    /// The action is running.
     UnderWay(InstanceId),
 }
 
 #[derive(Clone, Debug, Default)]
 struct Demand {
-    /// How it is.
+    /// Present truth value.
     is: bool,
-    /// The layers that want it not to be, from the first to before the last, and those that want it
-    /// to be.
+    /// Layers that demand `false`, and layers that demand `true`, as ranges from the first layer to
+    /// before the last one.
     wanted: [Vec<(usize, usize)>; 2],
 }
 
 impl Demands {
-    /// Those of an order's layers before its happenings, as if nothing held and nothing was under way.
+    /// Collects the demands of an order's layers before its happenings. Initially all facts are
+    /// false and no action is running.
     pub(super) fn of(order: &TotalOrderPlan) -> Self {
         let count = order.sequence.len();
         let mut demands = Self {
@@ -74,7 +75,7 @@ impl Demands {
         }
     }
 
-    /// Takes note of how things are; whether the order knows all that is under way.
+    /// Updates the truth values. Returns `true` if all running actions occur in the order.
     pub(super) fn observe(&mut self, circumstances: &Circumstances) -> bool {
         let running = circumstances.running.iter();
         let running: Vec<InstanceId> = running.map(|running| running.instance).collect();
@@ -97,7 +98,7 @@ impl Demands {
         knows_all
     }
 
-    /// Whether any layer asks for it or for its opposite.
+    /// Updates one truth value. Returns `true` if any layer has a demand about the subject.
     fn set(&mut self, subject: Subject, is: bool) -> bool {
         let demand = self.by_subject.get_mut(&subject);
         if let Some(demand) = demand {
@@ -107,7 +108,7 @@ impl Demands {
         false
     }
 
-    /// The position of the last layer before `before` of which all these demands are met.
+    /// Returns the position of the last layer before `before` with all these demands met.
     pub(super) fn last_met(&self, before: usize) -> Option<usize> {
         self.unmet.last_zero(before)
     }
@@ -127,20 +128,21 @@ impl Demand {
     }
 }
 
-/// What lies between these ranges, up to `count`.
+/// Returns the gaps between these ranges, up to `count`.
 fn gaps(ranges: &[(usize, usize)], count: usize) -> Vec<(usize, usize)> {
     let begins = std::iter::once(0).chain(ranges.iter().map(|(_, to)| *to));
     let ends = ranges.iter().map(|(from, _)| *from).chain([count]);
     begins.zip(ends).filter(|(from, to)| from < to).collect()
 }
 
-/// Numbers in a row, none below 0, to which something is added for whole ranges: a segment tree.
+/// Segment tree over a sequence of non-negative numbers; adds to ranges.
 #[derive(Clone, Debug)]
 struct Counts {
     count: usize,
     /// The leaves are the last `width` nodes; the children of node `n` are `2 n` and `2 n + 1`.
     width: usize,
-    /// By node: what was added to all below it, and the least sum below it with that.
+    /// By node: the amount added to all numbers below it, and the least sum below it, including
+    /// this amount.
     added: Vec<i32>,
     least: Vec<i32>,
 }
@@ -176,7 +178,7 @@ impl Counts {
         self.least[node] = self.added[node] + self.least[2 * node].min(self.least[2 * node + 1]);
     }
 
-    /// The position of the last 0 before `before`.
+    /// Returns the position of the last 0 before `before`.
     fn last_zero(&self, before: usize) -> Option<usize> {
         self.zero_below(1, (0, self.width), before.min(self.count), 0)
     }

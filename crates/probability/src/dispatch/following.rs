@@ -1,4 +1,4 @@
-//! An order under way, with what is kept of it from one decision to the next: [`Following`].
+//! The current order with cached data for the next decisions: [`Following`].
 
 use elbowroom_plan::Node;
 
@@ -7,18 +7,18 @@ use crate::circumstances::Circumstances;
 use crate::search::{First, OrderSearch, Rests};
 use crate::total_order::{Slot, TotalOrderPlan};
 
-/// Which layers of an order fit, and what its rests have time for. It says the same as
-/// [`lattermost_layer`](super::lattermost_layer), which looks at everything anew each time.
+/// Layers of an order that fit, and time windows of its suffixes. Gives the same result as
+/// [`lattermost_layer`](super::lattermost_layer), which does not use cached data.
 #[derive(Clone, Debug)]
 pub(super) struct Following {
     demands: Demands,
     rests: Rests,
-    /// Behind the last timed initial of the order, others may have passed that are not part of it.
+    /// After the last timed initial of the order, others may have passed that are not part of it.
     late: Option<Rests>,
 }
 
 impl Following {
-    /// An order that begins after so many timed initials.
+    /// Creates the cached data for an order that begins after `passed` timed initials.
     pub(super) fn new(search: &OrderSearch, order: &TotalOrderPlan, passed: usize) -> Self {
         Self {
             demands: Demands::of(order),
@@ -27,7 +27,7 @@ impl Following {
         }
     }
 
-    /// The position of the happening after the lattermost layer that fits, and when it may be.
+    /// Returns the position and the time window of the happening after the last layer that fits.
     pub(super) fn lattermost(
         &mut self,
         search: &OrderSearch,
@@ -60,7 +60,7 @@ impl Following {
         let first = if self.rests.are_for(position, passed) {
             search.first_of(&self.rests, order, position, circumstances)
         } else if self.rests.have_timed(position) {
-            // The next timed initial is not the one that the order has next.
+            // The next timed initial is not the next one of the order.
             First::Never
         } else {
             let late = self

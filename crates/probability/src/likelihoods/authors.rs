@@ -1,4 +1,4 @@
-//! The file format of Olisipo's authors: [`read()`].
+//! File format of Olisipo's authors: [`read()`].
 //!
 //! ```text
 //! file      := factLine+ "-" actionLine*
@@ -6,10 +6,10 @@
 //! actionLine:= action("#"object)* P(start succeeds) (predicate"%"P(effect takes place))*
 //! ```
 //!
-//! One probability stands for all effects of an action on a predicate, at start or end, making
-//! true or false, whatever the arguments. Facts and actions are listed in full; where the authors'
-//! programs stop at a missing fact, or take a missing effect for one that never takes place, this
-//! reader objects.
+//! One probability applies to all effects of an action on a predicate, at start or end, making true
+//! or false, with any arguments. Facts and actions are listed in full. Where the authors' programs
+//! stop at a missing fact, or treat a missing effect as one that never takes place, this reader
+//! reports an error.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -20,7 +20,7 @@ use elbowroom_text::{Diagnostics, Report, Source};
 
 use super::{Likelihoods, PartialFlip, Success, is_changed, names};
 
-/// A stretch of the text without white space.
+/// Part of the text without white space.
 #[derive(Clone, Debug)]
 struct Word<'a> {
     text: &'a str,
@@ -30,7 +30,7 @@ struct Word<'a> {
 /// Reads a file of likelihoods in the authors' format.
 ///
 /// # Errors
-/// All mistakes found: of syntax, of names, of numbers, and what is missing.
+/// All mistakes found: syntax errors, unknown names, invalid numbers, and missing entries.
 pub fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagnostics> {
     let source = source.into();
     let text = source.text();
@@ -216,7 +216,7 @@ impl Reader<'_> {
             .ok()
     }
 
-    /// Every fact that something can change, or of whose predicate something is said, has a line.
+    /// Checks that every fact that something can change, or whose predicate occurs, has a line.
     fn check_facts(&mut self, separator: &Range<usize>) {
         for (index, predicate) in self.problem.predicates.iter().enumerate() {
             let id = PredicateId::from(index);
@@ -244,7 +244,7 @@ impl Reader<'_> {
                 );
             }
         }
-        // What never changes, and is not mentioned, stays as it is.
+        // A fact that nothing changes, and that is not mentioned, never changes by itself.
         for (index, predicate) in self.problem.predicates.iter().enumerate() {
             let id = PredicateId::from(index);
             let is_mentioned = self.likelihoods.facts.keys().any(|(p, _)| *p == id);

@@ -1,4 +1,4 @@
-//! Actions that fail after their start, and what such a failure leaves behind.
+//! Failures of actions after their start, and their effects.
 
 use std::collections::BTreeSet;
 
@@ -8,31 +8,30 @@ use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId};
 
 use super::Likelihoods;
 
-/// The failures of an action after its start, as far as an entry speaks of them.
+/// Failures of an action after its start, as far as an entry contains them.
 ///
-/// Attempts to start that fail are another matter: they leave everything as it was.
+/// Failed attempts to start are not included: they change nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Failing {
-    /// The probability that the end succeeds as a whole, its conditions being true; otherwise the
-    /// action has failed, and has none of its end effects. 1 where nobody says anything.
+    /// Probability that the end succeeds as a whole, if its conditions hold. Otherwise the action
+    /// has failed, and has none of its end effects. Default: 1.
     pub end: Option<f64>,
-    /// How often per second the action fails while it is under way: after `t` seconds it still
-    /// goes on with probability exp(−rate · t). 0 where nobody says anything.
+    /// Rate of failures per second while the action is running: after `t` seconds it is still
+    /// running with probability exp(−rate · t). Default: 0.
     pub during_per_second: Option<f64>,
-    /// Whether a failure takes back what the start has done to facts. Not, where nobody says
-    /// anything.
+    /// `true` if a failure undoes the effects of the start on facts. Default: `false`.
     pub undone: Option<bool>,
-    /// What a failure may leave behind; what the probabilities leave of 1 is the failure that
-    /// changes nothing more.
+    /// Possible outcomes of a failure. With the remaining probability, a failure changes nothing
+    /// more.
     pub outcomes: Option<Vec<Outcome>>,
 }
 
-/// One of the ways in which things may stand when an action has failed.
+/// A possible outcome of a failure of an action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// How likely it is, given that the action fails after its start.
+    /// Probability, given that the action fails after its start.
     pub probability: f64,
-    /// What changes, in this order, after what is undone.
+    /// Changes in this order, after the effects of the start are undone.
     pub changes: Vec<OutcomeChange>,
 }
 
@@ -41,44 +40,44 @@ pub struct Outcome {
 pub struct OutcomeChange {
     /// The fact's predicate.
     pub predicate: PredicateId,
-    /// Its objects.
+    /// Objects of the fact.
     pub arguments: Vec<Argument>,
-    /// Whether it becomes true.
+    /// `true` if it becomes true.
     pub becomes: bool,
 }
 
 /// An object of a fact that a failure changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Argument {
-    /// This one.
+    /// A fixed object.
     Object(ObjectId),
-    /// The one that the action has for the parameter at this place.
+    /// The action's argument for the parameter at this position.
     Parameter(usize),
 }
 
-/// What a failure of a ground action leaves behind.
+/// Effects of a failure of a ground action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aftermath {
-    /// How likely it is, given that the action fails after its start.
+    /// Probability, given that the action fails after its start.
     pub probability: f64,
-    /// The facts that are set, in this order, and to what.
+    /// Facts that are set, in this order, with their new truth values.
     pub changes: Vec<(FactId, bool)>,
 }
 
 impl Failing {
-    /// Whether it says that the action can fail after its start.
+    /// Returns `true` if the entry contains failures after the start.
     pub(super) fn has_failures(&self) -> bool {
         self.end.is_some() || self.during_per_second.is_some()
     }
 
-    /// Whether it says what a failure leaves behind.
+    /// Returns `true` if the entry contains effects of failures.
     pub(super) fn has_leftovers(&self) -> bool {
         self.undone == Some(true) || self.outcomes.is_some()
     }
 }
 
 impl Likelihoods {
-    /// What the entries of an action say, the most specific first.
+    /// Returns the entries for an action, the most specific first.
     fn failing_of(
         &self,
         schema: SchemaId,
@@ -93,34 +92,34 @@ impl Likelihoods {
     }
 
     fn failing<T: Copy>(&self, action: &Action, part: impl Fn(&Failing) -> Option<T>) -> Option<T> {
-        // What takes no time has no end.
+        // An instantaneous action has no end.
         action.durative()?;
         self.failing_of(action.schema, &action.arguments)
             .find_map(part)
     }
 
-    /// The probability that the end of an action succeeds, its conditions being true.
+    /// Returns the probability that the end of an action succeeds, if its conditions hold.
     pub fn end(&self, action: &Action) -> f64 {
         self.failing(action, |said| said.end).unwrap_or(1.0)
     }
 
-    /// How often per second an action fails while it is under way.
+    /// Returns the rate of failures of an action per second while it is running.
     pub fn during(&self, action: &Action) -> f64 {
         self.failing(action, |said| said.during_per_second)
             .unwrap_or(0.0)
     }
 
-    /// The probability that an action that has started succeeds, if it takes so many seconds.
+    /// Returns the probability that a started action succeeds, if it takes `seconds`.
     pub fn lasts(&self, action: &Action, seconds: f64) -> f64 {
         self.end(action) * (-self.during(action) * seconds).exp()
     }
 
-    /// What a failure of an action after its start leaves behind: the ways in which things may
-    /// stand then. Their probabilities add up to 1.
+    /// Returns the possible outcomes of a failure of an action after its start. Their probabilities
+    /// add up to 1.
     ///
     /// Unconditional effects of the start on facts are undone, whether or not they took place, as
-    /// in simulated worlds; where the start both deletes and adds a fact, it is taken to have made
-    /// it true.
+    /// in simulated worlds. If the start both deletes and adds a fact, it counts as having made it
+    /// true.
     pub fn aftermaths(&self, task: &Task, action: &Action) -> Vec<Aftermath> {
         let undone = if self.failing(action, |said| said.undone) == Some(true) {
             undone(action)
@@ -140,7 +139,7 @@ impl Likelihoods {
                 changes: undone.iter().copied().chain(own).collect(),
             });
         }
-        // Tenths do not add up to 1 in binary.
+        // Decimal fractions do not add up to exactly 1 in binary.
         if left > 1e-9 || all.is_empty() {
             all.push(Aftermath {
                 probability: left,
@@ -160,13 +159,13 @@ impl Likelihoods {
         aftermaths.flat_map(|aftermath| aftermath.changes).collect()
     }
 
-    /// Whether an entry says that ends fail.
+    /// Returns `true` if some entry contains failing ends.
     pub fn has_failing_ends(&self) -> bool {
         let mut all = self.all_failing();
         all.any(|failing| failing.end.is_some_and(|end| end < 1.0))
     }
 
-    /// Whether an entry says that actions fail while they are under way.
+    /// Returns `true` if some entry contains failures of running actions.
     pub(super) fn has_failures_during(&self) -> bool {
         let mut all = self.all_failing();
         all.any(|failing| failing.during_per_second.is_some_and(|rate| rate > 0.0))
@@ -180,7 +179,7 @@ impl Likelihoods {
     }
 }
 
-/// What undoing a start does to facts.
+/// Returns the changes of facts that undo a start.
 fn undone(action: &Action) -> Vec<(FactId, bool)> {
     let start = action
         .durative()
@@ -199,8 +198,8 @@ fn undone(action: &Action) -> Vec<(FactId, bool)> {
 }
 
 impl OutcomeChange {
-    /// The fact that is meant when this action fails; `None` if an object is of the wrong type, so
-    /// that there is no such fact.
+    /// Returns the fact for a failure of this action; `None` if an object has the wrong type, so
+    /// that the fact does not exist.
     fn fact(&self, task: &Task, action: &Action) -> Option<FactId> {
         let objects = self.arguments.iter().map(|argument| match argument {
             Argument::Object(object) => Some(*object),
@@ -212,7 +211,7 @@ impl OutcomeChange {
         task.fact_named(&problem.apply_name(name, &objects))
     }
 
-    /// As in a file: `(on ?box floor)`.
+    /// Returns the notation of files: `(on ?box floor)`.
     pub(super) fn text(&self, problem: &Problem, schema: Option<SchemaId>) -> String {
         let parameters = schema.map(|schema| &problem.schemas[schema.index()].parameters);
         let mut text = format!("({}", problem.predicates[self.predicate.index()].name);

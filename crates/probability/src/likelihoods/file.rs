@@ -1,4 +1,5 @@
-//! Our own likelihood files, TOML: [`read()`]. The format is in `docs/formats/likelihoods.md`.
+//! Elbowroom's likelihood files, in TOML: [`read()`]. `docs/formats/likelihoods.md` defines the
+//! format.
 
 mod complete;
 mod failing;
@@ -13,15 +14,15 @@ use toml::de::{DeTable, DeValue};
 
 use super::{Failing, Likelihoods, PartialFlip, Success, names};
 
-/// The value of `format` in our files.
+/// Value of `format` in these files.
 pub(super) const FORMAT: &str = "elbowroom-likelihoods";
 /// The value of `version`.
 pub(super) const VERSION: &str = "1";
 
-/// Reads a likelihood file of our own format.
+/// Reads a likelihood file in Elbowroom's format.
 ///
 /// # Errors
-/// All mistakes found: of syntax, of names, of numbers, and what is missing.
+/// All mistakes found: syntax errors, unknown names, invalid numbers, and missing entries.
 pub(super) fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagnostics> {
     let source = source.into();
     let text = source.text();
@@ -46,14 +47,14 @@ pub(super) fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods
 type Key<'a> = Spanned<std::borrow::Cow<'a, str>>;
 type Value<'a> = Spanned<DeValue<'a>>;
 
-/// A mistake that has been noted.
+/// A mistake that has been recorded.
 struct Noted;
 
 struct Reader<'a> {
     problem: &'a Problem,
     likelihoods: Likelihoods,
     mistakes: Report,
-    /// The sections that say what failures leave behind.
+    /// Sections with effects of failures.
     leftovers: Vec<(Range<usize>, failing::About)>,
 }
 
@@ -133,7 +134,8 @@ impl Reader<'_> {
     ) {
         match value.get_ref() {
             DeValue::Table(table) => {
-                // In the order of the file, so that of two mistakes the second is the mistake.
+                // In the order of the file, so that the second of two conflicting entries is
+                // reported.
                 let mut entries: Vec<_> = table.iter().collect();
                 entries.sort_by_key(|(key, _)| key.span().start);
                 for (key, value) in entries {
@@ -325,7 +327,8 @@ impl Reader<'_> {
         }
     }
 
-    /// The predicate that a key names, with its arguments unless all its facts are meant.
+    /// Returns the predicate that a key names, with its arguments; `None` for arguments if the key
+    /// means all facts.
     fn fact_named(&mut self, key: &Key<'_>) -> Option<(PredicateId, Option<Vec<ObjectId>>)> {
         let mut words = key.get_ref().split_whitespace();
         let name = words.next().unwrap_or_default();
@@ -342,7 +345,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The objects in a key; `None` if there are none where there could be some.
+    /// Returns the objects in a key; `None` if there are none where there could be some.
     fn arguments<'k>(
         &mut self,
         key: &Key<'_>,
@@ -363,7 +366,7 @@ impl Reader<'_> {
         }
     }
 
-    /// TOML itself refuses equal keys, but names compare without case and spaces.
+    /// Reports a repeated key. TOML rejects equal keys, but names here ignore case and spaces.
     fn check_new(&mut self, is_new: bool, key: &Key<'_>) {
         if !is_new {
             let message = format!("`{}` is there twice", key.get_ref());
@@ -384,7 +387,7 @@ impl Reader<'_> {
             .ok()
     }
 
-    /// A number of changes per second.
+    /// Reads a number of changes per second.
     fn rate(&mut self, value: &Value<'_>) -> Option<f64> {
         let read = match value.get_ref() {
             DeValue::Float(number) => number.as_str().replace('_', "").parse::<f64>().ok(),

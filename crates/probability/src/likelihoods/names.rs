@@ -1,16 +1,16 @@
-//! Names of facts and actions in likelihood files, and what they stand for.
+//! Names of facts and actions in likelihood files.
 
 use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId, Variable};
 use elbowroom_text::nearest;
 
-/// The error message for a name, and advice.
+/// Error message for a name, and advice.
 pub(super) type Objection = (String, Option<String>);
 
 fn did_you_mean<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<String> {
     nearest(name, candidates).map(|name| format!("did you mean `{name}`?"))
 }
 
-/// The basic predicate of that name.
+/// Returns the basic predicate with that name.
 pub(super) fn predicate(problem: &Problem, name: &str) -> Result<PredicateId, Objection> {
     let Some(id) = problem.predicate(name) else {
         let known = problem.predicates.iter().filter(|p| !p.is_derived);
@@ -26,7 +26,7 @@ pub(super) fn predicate(problem: &Problem, name: &str) -> Result<PredicateId, Ob
     Ok(id)
 }
 
-/// The action of that name.
+/// Returns the action with that name.
 pub(super) fn schema(problem: &Problem, name: &str) -> Result<SchemaId, Objection> {
     problem.schema(name).ok_or_else(|| {
         let known = problem.schemas.iter().map(|s| s.name.as_str());
@@ -37,7 +37,7 @@ pub(super) fn schema(problem: &Problem, name: &str) -> Result<SchemaId, Objectio
     })
 }
 
-/// The objects of these names, as arguments for `parameters`.
+/// Returns the objects with these names, as arguments for `parameters`.
 pub(super) fn arguments<'a>(
     problem: &Problem,
     of: &str,
@@ -84,8 +84,8 @@ pub(super) fn arguments<'a>(
     Ok(objects)
 }
 
-/// Whether an action has an effect that makes facts of a predicate true, and one that makes them
-/// false.
+/// Returns two flags: the action has an effect that makes facts of the predicate true, and one that
+/// makes them false.
 pub(super) fn effects_on(
     problem: &Problem,
     schema: SchemaId,
@@ -101,7 +101,8 @@ pub(super) fn effects_on(
     (adds, deletes)
 }
 
-/// The predicates that an action has effects on, and whether these make facts true.
+/// Returns the predicates that an action has effects on, with `true` for effects that make facts
+/// true.
 pub(super) fn affected(problem: &Problem, schema: SchemaId) -> Vec<(PredicateId, bool)> {
     use elbowroom_model::problem::{Body, Change};
     let (first, second) = match &problem.schemas[schema.index()].body {
@@ -126,7 +127,7 @@ pub(super) fn affected(problem: &Problem, schema: SchemaId) -> Vec<(PredicateId,
     affected
 }
 
-/// The objection to an effect that an action does not have.
+/// Returns the error for an effect that an action does not have.
 pub(super) fn no_such_effect(problem: &Problem, schema: SchemaId, effect: &str) -> Objection {
     let mut names = Vec::new();
     for (predicate, _) in affected(problem, schema) {
@@ -147,7 +148,7 @@ pub(super) fn no_such_effect(problem: &Problem, schema: SchemaId, effect: &str) 
     )
 }
 
-/// Calls `visit` for each tuple of objects that fits the parameters, as long as it says so.
+/// Calls `visit` for each tuple of objects that fits the parameters, as long as it returns `true`.
 pub(super) fn for_each_tuple(
     problem: &Problem,
     parameters: &[Variable],
@@ -175,7 +176,7 @@ pub(super) fn for_each_tuple(
     extend(problem, parameters, &mut Vec::new(), visit);
 }
 
-/// The number of a text, if it is a probability.
+/// Parses a probability.
 pub(super) fn probability(text: &str) -> Result<f64, Objection> {
     let number: Option<f64> = text.parse().ok();
     match number {

@@ -1,4 +1,4 @@
-//! Writes likelihoods as TOML: [`write()`].
+//! Writer of likelihoods as TOML: [`write()`].
 
 use std::fmt::Write;
 
@@ -7,7 +7,8 @@ use elbowroom_model::problem::{ObjectId, Problem, SchemaId};
 use super::file::{FORMAT, VERSION};
 use super::{Failing, Likelihoods, Outcome, PartialFlip, Success};
 
-/// The likelihoods in our own format; [`read`](super::read) gives the same ones back.
+/// Returns the likelihoods in Elbowroom's format. [`read`](super::read) returns the same
+/// likelihoods.
 pub fn write(problem: &Problem, likelihoods: &Likelihoods) -> String {
     let mut text = format!("format = \"{FORMAT}\"\nversion = {VERSION}\n");
     let defaults = &likelihoods.defaults;
@@ -56,7 +57,7 @@ pub fn write(problem: &Problem, likelihoods: &Likelihoods) -> String {
     text
 }
 
-/// `"name object …"`, in quotes, as names may contain anything but spaces.
+/// Returns `"name object …"`, quoted because names may contain any characters except spaces.
 fn key(problem: &Problem, name: &str, arguments: &[ObjectId]) -> String {
     let mut key = format!("\"{name}");
     for argument in arguments {
@@ -135,7 +136,8 @@ fn numbers(text: &mut String, entries: &[(&str, Option<f64>)]) {
     }
 }
 
-/// `{:?}` writes the shortest decimal that reads back as the same number, with a decimal point.
+/// Writes a number. `{:?}` gives the shortest decimal that is read as the same number, with a
+/// decimal point.
 fn number(text: &mut String, key: &str, value: f64) {
     let _ = writeln!(text, "{key} = {value:?}");
 }

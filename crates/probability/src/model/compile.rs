@@ -1,4 +1,4 @@
-//! From ground actions and likelihoods to a [`Model`].
+//! Compilation of ground actions and likelihoods to a [`Model`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -42,7 +42,7 @@ pub(super) fn model(
             }
         }
     }
-    // A derived fact without rules is false; nothing can be said of it.
+    // A derived fact without rules is false, and has no likelihood.
     facts.retain(|fact| !is_derived(&task, *fact));
     let flips = facts.iter().map(|&fact| likelihoods.flip(&task, fact));
     let flips = flips.collect::<Result<_, _>>()?;
@@ -113,7 +113,7 @@ pub(super) fn model(
     })
 }
 
-/// Gathers what an action reads and writes.
+/// Collects the facts and fluents that an action reads and writes.
 fn collect(
     task: &Task,
     action: &Action,
@@ -175,7 +175,7 @@ impl Compiler<'_> {
         Requirement::of(self.task, condition, &|fact| self.position(fact))
     }
 
-    /// A fact of our own that remembers whether a guard held.
+    /// Adds a fact of the model that remembers whether a guard held.
     fn memory(&mut self) -> FactId {
         let last = self.facts.last().map_or(0, |fact| fact.0 + 1);
         let memory = FactId(last.max(FactId::FIRST_FREE.0));
@@ -222,7 +222,7 @@ impl Compiler<'_> {
             let Some(fluent) = self.fluents.binary_search(&effect.fluent).ok() else {
                 continue;
             };
-            // Whether a conditional one takes place is not followed up: then the number is open.
+            // The truth of its condition is not tracked, so the number becomes unknown.
             let rate = if effect.guard.is_trivial() {
                 effect.rate.clone()
             } else {
@@ -234,10 +234,11 @@ impl Compiler<'_> {
         Ok((start, end))
     }
 
-    /// The bounds on a planned duration that read numbers which the plan changes, as conditions; each with whether it
-    /// counts at the end. The other bounds are in the plan's links.
+    /// Returns, as conditions, the bounds on a planned duration that read numbers which the plan
+    /// changes; `true` marks those that are read at the end. The other bounds are in the plan's
+    /// links.
     fn bounds(&self, body: &DurativeBody, planned: Option<&Rational>) -> Vec<(bool, Condition)> {
-        // What remains of a running action has started.
+        // A running action has already started.
         let Some(planned) = planned.filter(|_| !body.is_under_way) else {
             return Vec::new();
         };
@@ -257,11 +258,12 @@ impl Compiler<'_> {
         bounds.map(condition).collect()
     }
 
-    /// What a failed end leaves behind. Facts that nothing in the model reads or writes are left out.
+    /// Returns the outcomes of a failed end, without facts that nothing in the model reads or
+    /// writes.
     fn aftermaths(&self, action: &Action) -> Vec<Leftover> {
         let aftermaths = self.likelihoods.aftermaths(self.task, action).into_iter();
         let leftover = |aftermath: crate::likelihoods::Aftermath| {
-            // Of several changes of a fact the last one counts.
+            // The last of several changes of a fact counts.
             let mut changes = BTreeMap::new();
             for (fact, becomes) in aftermath.changes {
                 if let Ok(position) = self.facts.binary_search(&fact) {
@@ -276,7 +278,7 @@ impl Compiler<'_> {
         aftermaths.map(leftover).collect()
     }
 
-    /// Replaces what a guard says of start and interval by a memory that the start sets.
+    /// Replaces the parts of a guard about start and interval by a memory that the start sets.
     fn remember_guard(&mut self, effect: &mut Effect, start: &mut Event) {
         let guard = &mut effect.guard;
         if guard.at_start.is_trivial() && guard.over_all.is_trivial() {
@@ -340,7 +342,7 @@ impl Compiler<'_> {
             guard,
             is_certain: false,
         };
-        // Stated twice, an effect still happens once.
+        // An effect that is stated twice happens only once.
         let is_same = |other: &FactEffect| {
             other.fact == compiled.fact
                 && other.makes_true == makes_true

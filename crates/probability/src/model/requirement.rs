@@ -1,4 +1,4 @@
-//! Conditions cut into parts: single facts, numbers, and what couples facts.
+//! Decomposition of conditions: single facts, numbers, and parts that couple facts.
 
 use elbowroom_model::Task;
 use elbowroom_model::derivation::{Moment, holds};
@@ -6,14 +6,14 @@ use elbowroom_model::ground::{Condition, Expression, FactId};
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
 
-/// A conjunction, by what its parts read.
+/// A conjunction, split by what its parts read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Requirement {
-    /// Facts with the truth they must have, sorted.
+    /// Facts with the required truth values, sorted.
     pub(crate) literals: Vec<(usize, bool)>,
-    /// The conditions that read numbers only.
+    /// Conditions that only read numbers.
     pub(crate) numeric: Vec<Condition>,
-    /// Everything else.
+    /// All other conditions.
     pub(crate) coupled: Vec<Coupled>,
 }
 
@@ -21,12 +21,12 @@ pub(crate) struct Requirement {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Coupled {
     pub(crate) condition: Condition,
-    /// The basic facts (and memories) that it reads, sorted.
+    /// Basic facts (and memories) that it reads, sorted.
     pub(crate) facts: Vec<usize>,
 }
 
 impl Requirement {
-    /// Cuts a condition up. `position` numbers facts.
+    /// Splits a condition. `position` numbers facts.
     pub(crate) fn of(
         task: &Task,
         condition: &Condition,
@@ -67,7 +67,7 @@ impl Requirement {
     }
 }
 
-/// Whether rules define the fact. Memories have ids that no task gives.
+/// Returns `true` if rules define the fact. Memories have ids that no task assigns.
 pub(crate) fn is_derived(task: &Task, fact: FactId) -> bool {
     fact < FactId::FIRST_FREE && task.is_derived(fact)
 }
@@ -83,7 +83,7 @@ pub(crate) fn visit_facts(task: &Task, condition: &Condition, visit: &mut impl F
     });
 }
 
-/// The same condition with `Not` only around facts and comparisons.
+/// Returns the condition with `Not` only around facts and comparisons.
 pub(crate) fn negations_inwards(condition: &Condition, is_positive: bool) -> Condition {
     let all = |parts: &[Condition]| {
         let parts = parts.iter();
@@ -104,26 +104,26 @@ pub(crate) fn negations_inwards(condition: &Condition, is_positive: bool) -> Con
     }
 }
 
-/// The value of a number.
+/// Value of a number.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Value {
-    /// There is none: the fluent was never assigned, or something is divided by zero.
+    /// No value: the fluent was never assigned, or a divisor is zero.
     Undefined,
-    /// It depends on times, and not only on the order of happenings.
+    /// It depends on times, not only on the order of happenings.
     Open,
-    /// It is this.
+    /// A known value.
     Known(Rational),
 }
 
 impl From<Option<&Rational>> for Value {
-    /// The value of a fluent in a state.
+    /// Converts the value of a fluent in a state.
     fn from(value: Option<&Rational>) -> Self {
         value.map_or(Self::Undefined, |value| Self::Known(value.clone()))
     }
 }
 
 impl Value {
-    /// The value of an expression, that of its leaves being given.
+    /// Returns the value of an expression, with the values of its leaves from `leaf`.
     pub(crate) fn of(expression: &Expression, leaf: &dyn Fn(&Expression) -> Self) -> Self {
         let mut is_open = false;
         let value = expression.evaluate(&mut |part| match leaf(part) {
@@ -151,11 +151,11 @@ fn reads_undefined(expression: &Expression, leaf: &dyn Fn(&Expression) -> Value)
     is_undefined
 }
 
-/// Whether a condition holds, the truth of basic facts and the values of fluents being given. A comparison that reads a
-/// fluent without a value does not hold, and neither does its negation.
+/// Evaluates a condition with the given truth values of basic facts and values of fluents. A
+/// comparison that reads a fluent without a value does not hold, and neither does its negation.
 ///
 /// # Errors
-/// When that rests on a number that depends on times.
+/// When the result depends on a number that depends on times.
 pub(crate) fn evaluate(
     task: &Task,
     condition: &Condition,
@@ -181,7 +181,8 @@ pub(crate) fn evaluate(
     }
 }
 
-/// The condition with comparisons that read fluents without a value in place of what makes it false.
+/// Returns the condition with each comparison that reads a fluent without a value replaced by a
+/// constant that makes the condition false.
 fn without_undefined(
     condition: &Condition,
     is_positive: bool,
@@ -211,11 +212,11 @@ fn without_undefined(
     }
 }
 
-/// A condition rests on a number that depends on times.
+/// The result of a condition depends on a number that depends on times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TimeDependent;
 
-/// The reason why a comparison is neither true nor false.
+/// Reason why a comparison is neither true nor false.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     Undefined,

@@ -1,21 +1,21 @@
-//! When the happenings of an order are, and what becomes of facts between them.
+//! Times of the happenings of an order, and changes of facts between them.
 //!
-//! An order says nothing of times. Where facts change with time, each happening is taken to be as
-//! early as it can after the one before it: an end when its action has lasted as long as it must,
-//! timed initials at their time, a start at once. That is how an executor that follows the order
-//! gets along if nothing deviates; what is kept ε apart is at the same time here.
+//! An order does not contain times. If facts change with time, each happening is assumed to be as
+//! early as possible after the previous one: an end after the least duration of its action, timed
+//! initials at their time, a start at once. These are the times of an executor that follows the
+//! order without deviations, except that separations of ε are ignored.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{Node, NodeId};
 
 use super::{LossCause, PrunedNetwork, Reading, TooCoupled};
 
-/// See the module.
+/// Present time and ends of running actions.
 #[derive(Clone, Debug)]
 pub(super) struct Clock {
-    /// In seconds: the time of the last happening.
+    /// Time of the last happening, in seconds.
     pub(super) now: f64,
-    /// When the actions under way end, in the order in which they stand there.
+    /// Ends of the running actions, in the same order.
     pub(super) ends: Vec<f64>,
 }
 
@@ -28,12 +28,13 @@ impl Clock {
     }
 }
 
-/// Times closer than this, in seconds, are the same to those who compare orders.
+/// Times closer than this, in seconds, count as equal in comparisons of orders.
 const SAME: f64 = 1e-9;
 
 impl PrunedNetwork<'_> {
-    /// Time passes until a happening. What is under way may fail, and what is required throughout
-    /// it must last: a fact that changes and changes back has not. Other facts change by themselves.
+    /// Advances the time to a happening. Running actions may fail, and their over-all conditions
+    /// must hold without interruption: a fact must not change and change back. Other facts change
+    /// by themselves.
     pub(super) fn pass(&mut self, node: NodeId) -> Result<(), TooCoupled> {
         let model = self.model;
         if !model.has_rates() {
@@ -78,8 +79,9 @@ impl PrunedNetwork<'_> {
         self.require_throughout(node)
     }
 
-    /// All that can matter to the times of what follows, for comparison with another order that has
-    /// done the same: how long the actions under way still take, and, where `is_on_the_clock`, now.
+    /// Returns the data that determines the times of later happenings, for comparison with another
+    /// order that has the same happenings: the remaining durations of running actions, and, if
+    /// `is_on_the_clock`, the present time.
     pub(crate) fn times_to_come(&self, is_on_the_clock: bool) -> Vec<i64> {
         if !self.model.has_rates() {
             return Vec::new();

@@ -1,6 +1,6 @@
-//! A joint distribution over a few facts that a condition has coupled.
+//! Joint distribution of a few facts that a condition has coupled.
 
-/// The transition probabilities of a fact under an effect.
+/// Transition probabilities of a fact under an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kernel {
     /// P(true after | true before).
@@ -10,7 +10,7 @@ pub(super) struct Kernel {
 }
 
 impl Kernel {
-    /// The probability of being true afterwards.
+    /// Returns the probability of being true afterwards.
     pub(super) fn apply(self, p: f64) -> f64 {
         p * self.if_true + (1.0 - p) * self.if_false
     }
@@ -25,7 +25,7 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
-    /// No facts, no doubt.
+    /// Returns the distribution of no facts.
     pub(super) fn unit(layer: u32) -> Self {
         Self {
             facts: Vec::new(),
@@ -34,7 +34,7 @@ impl Cluster {
         }
     }
 
-    /// The product with an independent distribution at the same layer.
+    /// Multiplies with an independent distribution at the same layer.
     pub(super) fn extend(&mut self, facts: &[usize], weights: &[f64]) {
         self.facts.extend_from_slice(facts);
         let old = std::mem::take(&mut self.weights);
@@ -49,7 +49,7 @@ impl Cluster {
         place.expect("the fact is in this cluster")
     }
 
-    /// Changes one fact, whatever the others are.
+    /// Changes one fact, independently of the others.
     pub(super) fn transform(&mut self, place: usize, kernel: Kernel) {
         let bit = 1 << place;
         for index in 0..self.weights.len() {
@@ -62,9 +62,9 @@ impl Cluster {
         }
     }
 
-    /// Changes the facts at `places`, each as the assignment before says.
+    /// Changes the facts at `places`, depending on the previous assignment.
     ///
-    /// `kernels` gives the changes for an assignment, one for each of the places.
+    /// `kernels` returns the changes for an assignment, one for each of the places.
     pub(super) fn transform_jointly(
         &mut self,
         places: &[usize],
@@ -99,7 +99,7 @@ impl Cluster {
         self.weights = after;
     }
 
-    /// Conditions on the assignments for which `keeps` holds; how likely these were.
+    /// Conditions on the assignments for which `keeps` holds, and returns their probability.
     pub(super) fn condition(&mut self, mut keeps: impl FnMut(usize) -> bool) -> f64 {
         let mut mass = 0.0;
         for (index, weight) in self.weights.iter_mut().enumerate() {
@@ -116,7 +116,7 @@ impl Cluster {
         mass
     }
 
-    /// How likely the assignments are for which `counts` holds.
+    /// Returns the probability of the assignments for which `counts` holds.
     pub(super) fn mass(&self, mut counts: impl FnMut(usize) -> bool) -> f64 {
         let weights = self.weights.iter().enumerate();
         weights
@@ -125,7 +125,7 @@ impl Cluster {
             .sum()
     }
 
-    /// How likely one fact is to be true.
+    /// Returns the probability that one fact is true.
     pub(super) fn marginal(&self, place: usize) -> f64 {
         self.mass(|index| index & (1 << place) != 0)
     }

@@ -1,4 +1,4 @@
-//! What a happening does to facts and numbers.
+//! Effects of happenings on facts and numbers.
 
 use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_num::Rational;
@@ -10,7 +10,7 @@ use super::{PrunedNetwork, TooCoupled, Undo};
 use crate::model::{Event, Value};
 
 impl PrunedNetwork<'_> {
-    /// The numbers after a happening.
+    /// Returns the numbers after a happening.
     pub(super) fn updates(&mut self, node: NodeId, event: &Event) -> Vec<(usize, Number)> {
         let model = self.model;
         if event.updates.is_empty() && event.continuous.is_empty() {
@@ -56,7 +56,8 @@ impl PrunedNetwork<'_> {
         after
     }
 
-    /// How long an action that was running at the beginning will have run from there to its end.
+    /// Returns the remaining duration of an action that was running initially, counted from the
+    /// initial time.
     fn lasts(&self, id: InstanceId) -> Option<Rational> {
         let is_first_end = |node: &NodeId| self.model.plan().nodes[node.index()] == Node::End(id);
         if self.sequence.iter().any(is_first_end) {
@@ -71,7 +72,7 @@ impl PrunedNetwork<'_> {
         self.undo.push(Undo::Number(fluent, old));
     }
 
-    /// The effects of a happening on facts, and the changes that come by themselves.
+    /// Applies the effects of a happening on facts, and spontaneous changes.
     pub(super) fn facts_change(&mut self, node: NodeId, event: &Event) -> Result<(), TooCoupled> {
         let model = self.model;
         let mut uncertain = Vec::new();
@@ -92,7 +93,7 @@ impl PrunedNetwork<'_> {
             self.facts.apply(model, &certain, event.is_step);
             return Ok(());
         }
-        // Effects on one fact go together, whether or not they are certain.
+        // Certain and uncertain effects on one fact have to be applied together.
         let is_open = |fact: usize| uncertain.iter().any(|(_, outcome)| outcome.fact == fact);
         let (joint, apart): (Vec<_>, Vec<_>) = certain
             .into_iter()

@@ -1,8 +1,9 @@
-//! The facts' joint distribution, given that all went well so far.
+//! Joint distribution of the facts, given that all happenings until now succeeded.
 //!
-//! Facts are independent of each other until a condition couples them; so the distribution is a
-//! product: one number for each fact on its own, one [`Cluster`] for each group of coupled ones.
-//! Facts change by themselves with every layer. That is made up for when they are next looked at.
+//! Facts are independent of each other until a condition couples them. So the distribution is a
+//! product: one number for each independent fact, and one [`Cluster`] for each group of coupled
+//! facts. Facts change by themselves with every layer. These changes are applied lazily, when a
+//! fact is accessed.
 
 mod coupling;
 mod snapshot;
@@ -17,25 +18,25 @@ use crate::model::{Model, Value, evaluate, visit_facts};
 
 pub(crate) use snapshot::Snapshot;
 
-/// How many facts a cluster can have: 2^16 numbers.
+/// Largest number of facts in a cluster (2^16 numbers).
 pub(super) const MOST_COUPLED: usize = 16;
 
-/// The belief about a fact.
+/// Belief about a fact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Record {
-    /// The layer at which `p` is right; for a coupled fact, its cluster knows.
+    /// Layer of `p`. A coupled fact's cluster has its own layer.
     layer: u32,
-    /// P(true), for a fact on its own.
+    /// P(true), for an independent fact.
     p: f64,
     /// The fact's cluster, if it is coupled.
     cluster: Option<u32>,
 }
 
-/// See the module.
+/// Joint distribution of the facts.
 #[derive(Clone, Debug)]
 pub(super) struct Facts {
     layer: u32,
-    /// By layer, how it becomes the next one: after a step, or as so many seconds pass.
+    /// By layer, the transition to the next one: a step, or the elapsed seconds.
     transitions: Vec<Option<f64>>,
     records: Vec<Record>,
     clusters: Vec<Option<Cluster>>,
@@ -48,7 +49,7 @@ enum Undo {
     Cluster(usize, Option<Cluster>),
 }
 
-/// A moment to come back to.
+/// A state to return to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Checkpoint {
     layer: u32,
@@ -93,7 +94,7 @@ impl Facts {
         self.transitions.truncate(checkpoint.layer as usize);
     }
 
-    /// Makes a fact certain before anything has happened.
+    /// Makes a fact certain before any happening.
     pub(super) fn set_certain(&mut self, fact: usize, truth: bool) {
         self.records[fact].p = f64::from(u8::from(truth));
     }
@@ -103,7 +104,7 @@ impl Facts {
         self.split_off(fact, f64::from(u8::from(truth)));
     }
 
-    /// P(true) in the present layer.
+    /// Returns P(true) in the present layer.
     pub(super) fn marginal(&mut self, model: &Model, fact: usize) -> f64 {
         match self.records[fact].cluster {
             None => self.single(model, fact),
@@ -114,7 +115,7 @@ impl Facts {
         }
     }
 
-    /// Conditions on the fact's truth; how likely that was.
+    /// Conditions on the fact's truth value, and returns its probability.
     pub(super) fn require(&mut self, model: &Model, fact: usize, truth: bool) -> f64 {
         if let Some(slot) = self.records[fact].cluster {
             return self.require_in_cluster(model, slot, fact, truth);
@@ -134,8 +135,9 @@ impl Facts {
         mass
     }
 
-    /// Conditions on a condition that reads several facts; how likely it was, and whether some of
-    /// it had to be taken for granted. `Err`: how many facts that would couple.
+    /// Conditions on a condition that reads several facts. Returns its probability, and `true` if
+    /// parts of it had to be assumed. Returns the number of facts as an error if they cannot be
+    /// coupled.
     pub(super) fn require_coupled(
         &mut self,
         model: &Model,
@@ -168,7 +170,7 @@ impl Facts {
         Ok((mass, rests_on_time))
     }
 
-    /// Whether a condition holds in all possible cases, or in none.
+    /// Returns the truth value of a condition if it is the same in all possible cases.
     pub(super) fn truth(
         &mut self,
         model: &Model,
@@ -184,10 +186,10 @@ impl Facts {
         }
     }
 
-    /// Unconditional effects, sorted by fact, and the changes that come by themselves.
+    /// Applies unconditional effects, sorted by fact, and spontaneous changes.
     pub(super) fn apply(&mut self, model: &Model, outcomes: &[Outcome], is_step: bool) {
         let next = self.layer + u32::from(is_step);
-        // What remains coupled, by cluster, as all facts of a cluster change at once.
+        // Facts that stay coupled, by cluster, because all facts of a cluster change at once.
         let mut coupled: Vec<(u32, Vec<(usize, Kernel)>)> = Vec::new();
         for of_one in outcomes.chunk_by(|a, b| a.fact == b.fact) {
             let fact = of_one[0].fact;
@@ -225,7 +227,8 @@ impl Facts {
         self.layer = next;
     }
 
-    /// Time passes, and facts change by themselves, but for these, which stay as they are.
+    /// Lets time pass: facts change by themselves, except for those in `held`, which keep their
+    /// values.
     pub(super) fn pass(&mut self, seconds: f64, held: &[(usize, bool)]) {
         self.transitions.push(Some(seconds));
         self.layer += 1;
@@ -234,8 +237,8 @@ impl Facts {
         }
     }
 
-    /// Guarded effects with uncertain guards, together with everything else that happens.
-    /// `Err`: how many facts that would couple.
+    /// Applies guarded effects with uncertain guards, together with all other changes. Returns the
+    /// number of facts as an error if they cannot be coupled.
     pub(super) fn apply_guarded(
         &mut self,
         model: &Model,
@@ -251,7 +254,7 @@ impl Facts {
             }
             involved.push(outcome.fact);
         }
-        // Certain facts that are changed are part of it, even if they are alone.
+        // Changed facts are included even if they are certain and independent.
         involved.sort_unstable();
         involved.dedup();
         let slot = self.couple(model, &involved)?;
@@ -305,7 +308,7 @@ impl Facts {
         Ok(())
     }
 
-    /// P(true) of a fact on its own, brought up to the present layer.
+    /// Returns P(true) of an independent fact, updated to the present layer.
     fn single(&mut self, model: &Model, fact: usize) -> f64 {
         let record = self.records[fact];
         if record.layer >= self.layer {
@@ -348,7 +351,7 @@ impl Facts {
     }
 }
 
-/// The basic facts and memories that a condition reads.
+/// Returns the basic facts and memories that a condition reads.
 fn read(model: &Model, condition: &Condition) -> Vec<usize> {
     let mut facts = Vec::new();
     visit_facts(model.task(), condition, &mut |fact| {

@@ -1,66 +1,66 @@
-//! Where an order's probability is lost: [`Loss`].
+//! Losses of an order's probability: [`Loss`].
 
 use elbowroom_model::ground::{Condition, FactId};
 use elbowroom_plan::InstanceId;
 
-/// A share of all worlds that is lost at one place of an order.
+/// Share of all worlds that is lost at one position of an order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loss {
-    /// The position in the order of the happening after whose beginning it is lost; `None` before
-    /// the first, where something is under way.
+    /// Position in the order of the happening at which it is lost; `None` before the first one, if
+    /// actions are running.
     pub position: Option<usize>,
     /// The reading at which it is lost.
     pub reading: Reading,
-    /// The condition that failed.
+    /// Cause of the loss.
     pub cause: LossCause,
-    /// How many of all worlds are lost: a probability. Those of all losses of an order and its
-    /// P(A ∩ G) add up to 1.
+    /// Lost share of all worlds: a probability. Those of all losses of an order and its P(A ∩ G)
+    /// add up to 1.
     pub mass: f64,
 }
 
-/// The reading of the state that a loss is due to.
+/// Reading of the state that causes a loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// The conditions of the happening.
     OnArrival,
-    /// An over-all condition of an action under way, after the happening; or, for
+    /// An over-all condition of a running action, after the happening; or, for
     /// [`LossCause::During`], the action itself, before it.
     Throughout(InstanceId),
     /// The goal, after the last happening.
     Goal,
 }
 
-/// Why worlds are lost.
+/// Cause of a loss.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LossCause {
     /// The attempt to start fails.
     Start,
     /// The end fails.
     End,
-    /// An action fails while it is under way: that of [`Reading::Throughout`].
+    /// A running action fails: that of [`Reading::Throughout`].
     During,
-    /// A fact does not have the truth that is needed.
+    /// A fact does not have the required truth value.
     Fact {
-        /// Which one.
+        /// The fact.
         fact: FactId,
-        /// The truth it should have.
+        /// The required truth value.
         truth: bool,
     },
     /// A condition on numbers, or on several facts at once, does not hold.
     Condition(Condition),
 }
 
-/// The losses so far, if they are kept.
+/// Losses until now, if they are recorded.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ledger(Option<Vec<Loss>>);
 
 impl Ledger {
-    /// One that is kept.
+    /// Creates a ledger that records losses.
     pub(super) fn kept() -> Self {
         Self(Some(Vec::new()))
     }
 
-    /// Takes note of what is left of a probability, if less is.
+    /// Records the loss, if the probability has decreased.
     pub(super) fn note(
         &mut self,
         position: Option<usize>,
@@ -82,7 +82,7 @@ impl Ledger {
         }
     }
 
-    /// The losses so far; no more are noted.
+    /// Returns the losses and stops recording.
     pub(super) fn close(&mut self) -> Vec<Loss> {
         self.0.take().unwrap_or_default()
     }

@@ -1,4 +1,4 @@
-//! Numeric fluents along an order. They are not uncertain: where a value is known, it is exact.
+//! Numeric fluents along an order. They are not uncertain: a known value is exact.
 
 use std::collections::BTreeMap;
 
@@ -8,12 +8,12 @@ use elbowroom_num::Rational;
 
 use crate::model::{Model, Value};
 
-/// The value of a changing fluent.
+/// Value of a changing fluent.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Number {
-    /// Its value apart from continuous change that goes on.
+    /// Value without running continuous changes.
     settled: Value,
-    /// The number of continuous effects that are changing it; while any does, its value depends on
+    /// Number of continuous effects that are changing it. While there are any, its value depends on
     /// time.
     changing: u32,
 }
@@ -28,7 +28,7 @@ impl Number {
     }
 }
 
-/// All values; those of fluents that nothing in the plan changes are as at the beginning.
+/// All values. Fluents that nothing in the plan changes have their initial values.
 #[derive(Clone, Debug)]
 pub(super) struct Numbers {
     constant: BTreeMap<FluentId, Rational>,
@@ -47,7 +47,7 @@ impl Numbers {
         }
     }
 
-    /// The value of a leaf.
+    /// Returns the value of a leaf.
     pub(super) fn value(
         &self,
         model: &Model,
@@ -64,13 +64,14 @@ impl Numbers {
         }
     }
 
-    /// The value after an update; `amount` is the right-hand side on arrival. An update that reads a fluent without a
-    /// value changes nothing.
+    /// Returns the value after an update; `amount` is the right-hand side on arrival. An update
+    /// that reads a fluent without a value changes nothing.
     pub(super) fn updated(number: &Number, operator: UpdateOperator, amount: Value) -> Number {
         let is_still = number.changing == 0;
         let settled = match (operator, &number.settled, amount) {
             (_, settled, Value::Undefined) => settled.clone(),
-            // An assignment while it changes: what the change has done so far is lost.
+            // The value is assigned during a continuous change, and the amount of that change is
+            // unknown.
             (UpdateOperator::Assign, _, amount) if is_still => amount,
             (UpdateOperator::Assign, _, _) => Value::Open,
             (_, Value::Undefined, _) => Value::Undefined,
@@ -92,7 +93,7 @@ impl Numbers {
         }
     }
 
-    /// The value after an update that may or may not take place.
+    /// Returns the value after an update that may or may not take place.
     pub(super) fn maybe_updated(number: &Number) -> Number {
         Number {
             settled: Value::Open,
@@ -100,7 +101,7 @@ impl Numbers {
         }
     }
 
-    /// A continuous effect begins.
+    /// Returns the value after the start of a continuous effect.
     pub(super) fn begun(number: &Number) -> Number {
         Number {
             settled: number.settled.clone(),
@@ -108,7 +109,8 @@ impl Numbers {
         }
     }
 
-    /// A continuous effect stops, having changed the fluent by `amount`.
+    /// Returns the value after the end of a continuous effect that has changed the fluent by
+    /// `amount`.
     pub(super) fn stopped(number: &Number, amount: Value) -> Number {
         Number {
             settled: match (&number.settled, amount) {

@@ -1,10 +1,10 @@
-//! What effects, and changes by themselves, do to the probability of a fact.
+//! Influence of effects, and of spontaneous changes, on the probability of a fact.
 
 use super::cluster::Kernel;
 use crate::likelihoods::{Flip, Rate};
 use crate::model::{FactEffect, Model, Semantics};
 
-/// An effect that takes place, with its chance to fail.
+/// An effect with its success probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Outcome {
     pub(super) fact: usize,
@@ -24,15 +24,15 @@ impl From<&FactEffect> for Outcome {
     }
 }
 
-/// The part of a step other than guarded effects.
+/// Parts of a step other than guarded effects.
 pub(super) struct Pending {
     /// Unconditional effects on other facts.
     pub(super) apart: Vec<Outcome>,
-    /// Whether facts change by themselves afterwards.
+    /// `true` if facts change by themselves afterwards.
     pub(super) is_step: bool,
 }
 
-/// A fact changing by itself.
+/// Returns the transition of a fact by spontaneous changes in a step.
 pub(super) fn by_itself(flip: Flip) -> Kernel {
     Kernel {
         if_true: 1.0 - flip.becomes_false,
@@ -40,13 +40,14 @@ pub(super) fn by_itself(flip: Flip) -> Kernel {
     }
 }
 
-/// A fact changing by itself while time passes.
+/// Returns the transition of a fact by spontaneous changes while time passes.
 pub(super) fn later(rate: Rate, seconds: f64) -> Kernel {
     let (if_true, if_false) = rate.later(seconds);
     Kernel { if_true, if_false }
 }
 
-/// The transition of a fact by the effects that take place; deletions come before additions.
+/// Returns the transition of a fact by the effects that take place; deletions come before
+/// additions.
 pub(super) fn kernel<'a>(
     model: &Model,
     fact: usize,

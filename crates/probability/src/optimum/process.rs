@@ -1,4 +1,4 @@
-//! The Markov decision process of a perturbed world: states, moves, and what they lead to.
+//! Markov decision process of a perturbed world: states, moves, and transitions.
 
 use std::sync::Arc;
 
@@ -9,34 +9,34 @@ use super::{DeadEnds, Move, NotSmall, Settings};
 use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement};
 
-/// More states than this are not tabulated.
+/// Largest number of states to tabulate.
 const MOST_STATES: usize = 1 << 22;
 
-/// See [`optimum`](super).
+/// Markov decision process; see [`optimum`](super).
 #[derive(Clone, Debug)]
 pub struct Perturbed {
     model: Arc<Model>,
     pub(super) settings: Settings,
-    /// The sets of actions that can be under way, as bits, those with fewer actions first.
+    /// Possible sets of running actions, as bits, sorted by size.
     pub(super) sets: Vec<u32>,
-    /// The position of each set.
+    /// Position of each set.
     place: Vec<usize>,
-    /// By node: in which states its condition holds.
+    /// By node: `true` for the states where its condition holds.
     is_possible: Vec<Vec<bool>>,
-    /// By instance: in which states its over-all condition holds.
+    /// By instance: `true` for the states where its over-all condition holds.
     goes_on: Vec<Vec<bool>>,
     pub(super) goal: Vec<bool>,
-    /// By set and state: whether a plan exists.
+    /// By set and state: `true` if a plan exists.
     is_solvable: Vec<Vec<bool>>,
     starts: Vec<NodeId>,
     ends: Vec<NodeId>,
 }
 
 impl Perturbed {
-    /// The world in which the actions of the model's plan can be done, again and again.
+    /// Creates the world where the actions of the model's plan can be executed any number of times.
     ///
     /// # Errors
-    /// When it is not small enough, or not of this kind.
+    /// When it is too large, or of an unsupported kind.
     pub fn new(model: impl Into<Arc<Model>>, settings: Settings) -> Result<Self, NotSmall> {
         let model: Arc<Model> = model.into();
         let instances = model.plan().instances.len();
@@ -90,17 +90,17 @@ impl Perturbed {
         Ok(process)
     }
 
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
 
-    /// The rules.
+    /// Returns the rules.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// The circumstances in which the facts are as in a state and a set of actions is under way.
+    /// Returns the circumstances with the facts of a state and the running actions of a set.
     pub(super) fn circumstances(
         &self,
         set: usize,
@@ -122,7 +122,7 @@ impl Perturbed {
         circumstances
     }
 
-    /// The states that a belief may stand for, with how likely they are.
+    /// Returns the possible states of a belief, with their probabilities.
     pub(super) fn weights(&self, circumstances: &Circumstances) -> Vec<(usize, usize, f64)> {
         let running = circumstances.running.iter();
         let set = running.fold(0_u32, |set, running| set | 1 << running.instance.0);
@@ -151,25 +151,26 @@ impl Perturbed {
             .collect()
     }
 
-    /// Whether nothing is left to decide: success, or no way to it.
+    /// Returns `true` in a final state: success, or a lost run.
     pub(super) fn is_over(&self, set: usize, state: usize) -> bool {
         (set == 0 && self.goal[state])
             || (self.settings.dead_ends == DeadEnds::Lost && self.is_dead_end(set, state))
     }
 
-    /// Whether the goal could not be reached from here even if nothing went wrong any more.
+    /// Returns `true` if the goal is unreachable from here even without further failures.
     pub(super) fn is_dead_end(&self, set: usize, state: usize) -> bool {
         !self.is_solvable[set][state]
     }
 
-    /// Whether who plans finds no way to the goal from here: all facts are as in `state`, and the
-    /// actions of these instances are under way. What is not in the table is not called one.
+    /// Returns `true` if a planner finds no plan from here: the facts are those of `state`, and the
+    /// actions of these instances are running. Returns `false` for states outside of the table.
     pub fn is_dead_end_at(&self, state: &elbowroom_model::State, running: &[InstanceId]) -> bool {
         self.place(state, running)
             .is_some_and(|(set, state)| self.is_dead_end(set, state))
     }
 
-    /// The position of a state in the tables; `None` if more is under way than they have room for.
+    /// Returns the position of a state in the tables; `None` if more actions are running than they
+    /// support.
     pub(super) fn place(
         &self,
         state: &elbowroom_model::State,
@@ -195,7 +196,7 @@ impl Perturbed {
         self.place[(self.sets[set] & !(1 << id.0)) as usize]
     }
 
-    /// The available choices, in the order of the plan.
+    /// Returns the possible moves, in the order of the plan.
     pub(super) fn options(&self, set: usize, state: usize) -> Vec<Move> {
         let mut options = Vec::new();
         let bits = self.sets[set];
@@ -216,7 +217,7 @@ impl Perturbed {
         options
     }
 
-    /// Where a happening leads if it succeeds.
+    /// Returns the set of running actions after a successful happening.
     fn set_after(&self, set: usize, node: NodeId) -> usize {
         let bits = match self.model.plan().nodes[node.index()] {
             Node::Start(id) => self.sets[set] | (1 << id.0),
@@ -241,7 +242,7 @@ impl Perturbed {
                 let event = self.model.event(node);
                 let after = &flipped[self.set_after(set, node)];
                 let success = self.expected(event, state, after);
-                // Who fails to start leaves everything as it was.
+                // A failed start changes nothing.
                 let failure = if event.aftermaths.is_empty() {
                     flipped[set][state]
                 } else {
@@ -252,7 +253,7 @@ impl Perturbed {
         }
     }
 
-    /// The expected value after the effects of a happening.
+    /// Returns the expected value after the effects of a happening.
     fn expected(&self, event: &Event, state: usize, after: &[f64]) -> f64 {
         let happening = |makes_true: bool| {
             event.effects.iter().filter(move |effect| {
@@ -282,7 +283,7 @@ impl Perturbed {
             .sum()
     }
 
-    /// The expected values before facts change by themselves, fact by fact.
+    /// Returns the expected values before spontaneous changes, computed fact by fact.
     pub(super) fn flipped(&self, values: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let mut flipped: Vec<Vec<f64>> = values.to_vec();
         if self.settings.enforces_over_all {
@@ -312,7 +313,7 @@ impl Perturbed {
         flipped
     }
 
-    /// From where the goal is reached if nothing goes wrong.
+    /// Returns the states that reach the goal without failures.
     fn solvable(&self) -> Vec<Vec<bool>> {
         let states = self.goal.len();
         let mut solvable = vec![vec![false; states]; self.sets.len()];
@@ -345,7 +346,7 @@ impl Perturbed {
         }
     }
 
-    /// The state after the effects of a happening, if all take place.
+    /// Returns the state after the effects of a happening, if all take place.
     fn nominal(&self, event: &Event, state: usize) -> usize {
         let mut after = state;
         for makes_true in [false, true] {
@@ -365,7 +366,7 @@ impl Perturbed {
     }
 }
 
-/// The expected value after an end that has failed.
+/// Returns the expected value after a failed end.
 fn expected_aftermath(event: &Event, state: usize, after: &[f64]) -> f64 {
     let values = event.aftermaths.iter().map(|aftermath| {
         let changes = aftermath.changes.iter();

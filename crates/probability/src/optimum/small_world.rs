@@ -1,4 +1,4 @@
-//! Small worlds on a clock: whether what is best in them can be tabulated, and the table.
+//! Optimal policies of small worlds on a clock, as tables.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -18,30 +18,31 @@ use crate::model::{Model, Semantics};
 use crate::search::{OrderSearch, SearchSettings};
 use crate::total_order::Slot;
 
-/// The limit on actions running at once.
+/// Largest number of actions that run at once.
 const MOST_RUNNING: usize = 3;
 
-/// Worlds with more states, those of facts times those of actions under way, are not tabulated: a
-/// table of so many takes some seconds.
+/// Largest number of states to tabulate: states of facts times sets of running actions. A table of
+/// this size takes some seconds.
 const MOST_STATES: usize = 1 << 18;
 
-/// Nor are worlds with more facts than this, however little can be done in them.
+/// Largest number of facts, even with few actions.
 const MOST_FACTS: usize = 16;
 
-/// The best that can be done in each state of a small world.
+/// Optimal policy of a small world.
 #[derive(Clone, Debug)]
 pub struct Table {
     process: Perturbed,
     optimum: Optimum,
-    /// The actions in the order of the model's instances, as long as the domain says.
+    /// Actions in the order of the model's instances, with the durations of the domain.
     steps: Vec<Step>,
 }
 
 impl Table {
-    /// The table of a world; `None` where it is not small, or is not of the kind in which every
-    /// happening can be chosen when it is due: there are numbers, timed initials or negations, or
-    /// an action's end, successful or failed, deletes what another action, or the goal, needs, or an end needs what another
-    /// action makes true while this one is running.
+    /// Creates the table of a world. Returns `None` if the world is too large, or if some happening
+    /// cannot be chosen when it is due. This is the case if there are numbers, timed initials or
+    /// negations, if an action's end, successful or failed, deletes a fact that another action or
+    /// the goal needs, or if an end needs a fact that another action makes true while this one is
+    /// running.
     pub fn new(task: &Task, likelihoods: &Likelihoods) -> Option<Self> {
         let task = task.clone();
         let likelihoods = without_luck(likelihoods);
@@ -63,7 +64,7 @@ impl Table {
         }
         let settings = Settings {
             most_running: MOST_RUNNING,
-            // What runs without what it needs throughout, breaks off.
+            // An action is abandoned when its over-all condition fails.
             enforces_over_all: true,
             ..Settings::default()
         };
@@ -78,23 +79,23 @@ impl Table {
         })
     }
 
-    /// The actions in the order of the model's instances.
+    /// Returns the actions in the order of the model's instances.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
 
-    /// A search that knows the model, for the times at which happenings may be.
+    /// Returns a search for the model, which computes the times of happenings.
     pub fn search(&self) -> OrderSearch {
         table_search(&self.process)
     }
 
-    /// How likely it is that the goal is reached from here, if only what is best is done.
+    /// Returns the probability that the optimal policy reaches the goal from here.
     pub fn value(&self, circumstances: &Circumstances) -> f64 {
         self.optimum.value(&self.process, circumstances)
     }
 
-    /// The best choice. A start is due as soon as nothing that interferes with it has just
-    /// happened.
+    /// Returns the best choice. A start is due as soon as no happening that interferes with it is
+    /// recent.
     pub fn choose(&self, search: &OrderSearch, circumstances: &Circumstances) -> Choice {
         self.optimum.choice(&self.process, circumstances, |node| {
             let slots = search.windows(circumstances, &[node]);
@@ -112,13 +113,12 @@ fn table_search(process: &Perturbed) -> OrderSearch {
     OrderSearch::new(Arc::clone(process.model()), SearchSettings::default())
 }
 
-/// How likely the best of all agents is to reach the goal that has these actions, may try them as
-/// often as it likes, and sees the state as it is; where no way leads to the goal even if nothing
-/// goes wrong, it has lost. At most three actions are under way at once, and what runs without what
-/// it needs throughout breaks off.
+/// Returns the probability that an optimal agent reaches the goal with these actions. It may try
+/// them any number of times and observes the state. In a dead end, it has lost. At most three
+/// actions run at once, and an action is abandoned when its over-all condition fails.
 ///
 /// # Errors
-/// When the world is not small, or has more in it than facts.
+/// When the world is too large, or has other features than facts.
 pub fn best_value(
     task: &Task,
     actions: Vec<Action>,
@@ -148,8 +148,8 @@ pub fn best_value(
     Ok(process.optimum().value(&process, circumstances))
 }
 
-/// Nothing comes about by itself. A table takes whatever is done for a chance of that, and where
-/// nothing but the world's clock goes on, it would do something in vain for ever.
+/// Removes spontaneous changes that make facts true. Otherwise every step would be a chance of such
+/// a change, and if only the world's clock advances, the policy would repeat steps in vain forever.
 fn without_luck(likelihoods: &Likelihoods) -> Likelihoods {
     let mut likelihoods = likelihoods.clone();
     let entries = likelihoods.predicates.values_mut();
@@ -161,7 +161,8 @@ fn without_luck(likelihoods: &Likelihoods) -> Likelihoods {
     likelihoods
 }
 
-/// Whether something needs a fact to be false: facts that are lost would be luck then.
+/// Returns `true` if some condition needs a fact to be false: losing a fact would then be a helpful
+/// change.
 fn has_negations(task: &Task, actions: &[Action]) -> bool {
     let needs = actions.iter().flat_map(conditions);
     needs.chain([task.goal()]).any(is_negative)
@@ -175,7 +176,7 @@ fn is_negative(condition: &Condition) -> bool {
     }
 }
 
-/// The action, as long as it takes at least.
+/// Returns the action with its shortest duration.
 fn step(task: &Task, instance: &Instance) -> Option<Step> {
     let action = instance.action.clone();
     let duration = match action.durative() {
@@ -189,8 +190,8 @@ fn step(task: &Task, instance: &Instance) -> Option<Step> {
     })
 }
 
-/// The shortest duration that the domain allows. In these worlds no action changes a number, so it
-/// is the same in all states.
+/// Returns the shortest duration that the domain allows. In these worlds no action changes a
+/// number, so it is the same in all states.
 fn shortest(task: &Task, body: &DurativeBody) -> Option<Rational> {
     let values = &task.initial().values;
     let mut shortest: Option<Rational> = None;
@@ -207,18 +208,19 @@ fn shortest(task: &Task, body: &DurativeBody) -> Option<Rational> {
             Comparison::AtLeast | Comparison::Equal => {
                 shortest = Some(shortest.map_or(bound.clone(), |known| known.max(bound)));
             }
-            // With bounds that are not reached there may be no shortest.
+            // With a strict bound there may be no shortest duration.
             Comparison::Greater | Comparison::Less => return None,
         }
     }
     shortest.or(longest).filter(Rational::is_positive)
 }
 
-/// Returns `true` if the end of an action, successful or failed, deletes a fact of the goal, or of a condition of another
-/// action: at its start, at its end, or in between. `failures` has the facts that a failure of an action sets.
+/// Returns `true` if the end of an action, successful or failed, deletes a fact of the goal, or of
+/// a condition of another action: at its start, at its end, or in between. `failures` has the facts
+/// that a failure of an action sets.
 ///
-/// The clock decides on the order of ends. The table takes them in the best order: there, an action that needs light
-/// would always start, or end, before the light goes out.
+/// The clock determines the order of ends, but the table assumes the best order. In the table, an
+/// action that needs light would always start, or end, before the light goes out.
 fn ends_break_others(
     actions: &[Action],
     goal: &Condition,
@@ -298,7 +300,7 @@ fn conditions(action: &Action) -> Vec<&Condition> {
     }
 }
 
-/// Whether a change can make a condition without negations false.
+/// Returns `true` if a change can make a condition without negations false.
 fn breaks(change: &Change, condition: &Condition) -> bool {
     match condition {
         Condition::Fact(fact) => *change == Change::Delete(*fact),
@@ -309,7 +311,7 @@ fn breaks(change: &Change, condition: &Condition) -> bool {
     }
 }
 
-/// In how many ways at most [`MOST_RUNNING`] of so many actions can be under way.
+/// Returns the number of sets of at most [`MOST_RUNNING`] of these actions.
 fn sets(actions: usize) -> usize {
     let mut ways: usize = 1;
     let mut sum: usize = 1;
@@ -329,12 +331,13 @@ mod tests {
 
     use super::{MOST_RUNNING, Table, sets};
 
-    /// The durations of what can be done by the table, if there is one.
+    /// Returns the durations of the table's actions, if there is a table.
     fn durations(actions: &str, init: &str) -> Option<Vec<Rational>> {
         durations_under(actions, init, "")
     }
 
-    /// The same where actions are as likely to succeed as these entries of a likelihood file say.
+    /// Returns the durations of the table's actions with entries of a likelihood file, if there is
+    /// a table.
     fn durations_under(actions: &str, init: &str, entries: &str) -> Option<Vec<Rational>> {
         let domain = format!(
             "(define (domain d) (:requirements :durative-actions :numeric-fluents)
@@ -360,7 +363,7 @@ mod tests {
         durations.collect()
     }
 
-    /// An action at a place: its duration, its condition, and its effect.
+    /// Returns an action at a place, with its duration, its condition, and its effect.
     fn action(name: &str, duration: &str, condition: &str, effect: &str) -> String {
         format!(
             "(:durative-action {name} :parameters (?p - place) :duration {duration}
@@ -400,19 +403,19 @@ mod tests {
         assert!(durations(&look, "(light)").is_some());
         assert!(durations(&look, "(light) (at 5 (not (light)))").is_none());
         assert!(durations(&format!("{look}{}", burn("")), "").is_some());
-        // What is to be seen must be seen before the light goes out.
-        // Nor may anything have to be dark: then it would be luck to lose the light.
+        // The look has to end before the light goes out. Nor may a condition need darkness: losing
+        // the light would then be a helpful change.
         let hide = look
             .replace("look", "hide")
             .replace("(light)", "(not (light))");
         assert!(durations(&hide, "").is_none());
         let goes_out = burn("(at end (not (light)))");
         assert!(durations(&format!("{look}{goes_out}"), "").is_none());
-        // Nor may an action have to start before that.
+        // An action must not have to start before the light goes out either.
         let begin = look.replace("over all", "at start");
         assert!(durations(&format!("{begin}{}", burn("")), "").is_some());
         assert!(durations(&format!("{begin}{goes_out}"), "").is_none());
-        // Nor may an end need what another action makes true.
+        // An end must not need a fact that another action makes true.
         let awaits_light = action(
             "look",
             "(= ?duration 2)",
@@ -420,7 +423,7 @@ mod tests {
             "(at end (done ?p))",
         );
         assert!(durations(&format!("{awaits_light}{}", burn("")), "").is_none());
-        // Nor may the end delete what the goal needs.
+        // An end must not delete a fact that the goal needs.
         let undoes = burn("(at end (not (done ?p)))");
         assert!(durations(&format!("{look}{}", burn("")), "(light)").is_some());
         assert!(durations(&format!("{look}{undoes}"), "(light)").is_none());
@@ -447,7 +450,7 @@ mod tests {
             )
         };
         assert!(durations_under(&both, "", &outcome("(light)")).is_none());
-        // The goal needs it.
+        // The goal needs the fact.
         assert!(durations_under(&both, "", &outcome("(done here)")).is_none());
         let own = format!("{}end = 0.5\nundone = true\n", "[actions.look]\n");
         assert!(durations_under(&both, "", &own).is_some());

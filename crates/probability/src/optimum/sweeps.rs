@@ -3,19 +3,19 @@
 use super::{DeadEnds, Horizon, Move, Optimum, Perturbed};
 use crate::circumstances::Circumstances;
 
-/// By patience left, set of actions under way, and state. Layer `i` is for when `i` more steps may
-/// end in a dead end; without [`DeadEnds::Patience`] there is one layer.
+/// By remaining patience, set of running actions, and state. Layer `i` is for `i` more steps that
+/// may end in a dead end. Without [`DeadEnds::Patience`] there is one layer.
 pub(super) type Values = Vec<Vec<Vec<f64>>>;
 
 impl Perturbed {
-    /// The best that can be done, and how.
+    /// Computes the optimal values and policy.
     pub fn optimum(&self) -> Optimum {
         let mut optimum = Optimum {
             values: self.rewards(),
             moves: vec![vec![vec![Move::Stop; self.goal.len()]; self.sets.len()]; self.layers()],
             sweeps: 0,
         };
-        // Letting go takes no step, so it can be done when none is left.
+        // Abandoning is not a step, so it is possible when no step is left.
         for layer in 0..self.layers() {
             for set in 1..self.sets.len() {
                 for state in (0..self.goal.len()).filter(|state| self.goal[*state]) {
@@ -31,7 +31,8 @@ impl Perturbed {
             let mut best = before;
             for option in self.options(here.set, here.state) {
                 let value = after(option);
-                // A move is kept until a better one is found, so that moves lead on.
+                // A move is only replaced by a strictly better one, so that the policy makes
+                // progress.
                 if value > best + 1e-14 {
                     best = value;
                     moves[here.layer][here.set][here.state] = option;
@@ -42,11 +43,11 @@ impl Perturbed {
         optimum
     }
 
-    /// How likely an agent is to succeed that always does the same in the same state.
+    /// Returns the success probability of an agent with a fixed move in each state.
     ///
-    /// `agent` is asked once for each state that is not over, with all its facts certain, and with
-    /// how many more steps may end in a dead end ([`DeadEnds::Patience`]; 0 otherwise). A move that
-    /// is not possible counts as stopping.
+    /// `agent` is called once for each state that is not final, with certain facts, and with the
+    /// number of further steps that may end in a dead end ([`DeadEnds::Patience`]; 0 otherwise). A
+    /// move that is not possible counts as stopping.
     pub fn success_of(
         &self,
         initial: &Circumstances,
@@ -85,7 +86,7 @@ impl Perturbed {
             .sum()
     }
 
-    /// The number of tables.
+    /// Returns the number of tables.
     fn layers(&self) -> usize {
         match self.settings.dead_ends {
             DeadEnds::Harmless | DeadEnds::Lost => 1,
@@ -93,7 +94,7 @@ impl Perturbed {
         }
     }
 
-    /// 1 where the goal holds and nothing is under way.
+    /// Returns 1 for states where the goal holds and no action is running.
     fn rewards(&self) -> Values {
         let reached = self.goal.iter().map(|&goal| f64::from(u8::from(goal)));
         let mut sets = vec![vec![0.0; self.goal.len()]; self.sets.len()];
@@ -101,9 +102,9 @@ impl Perturbed {
         vec![sets; self.layers()]
     }
 
-    /// Brings the values up to date, state by state, until the horizon is reached or nothing
-    /// changes any more; how often. `update` makes the new value of a state of its old one and of
-    /// what each move leads to.
+    /// Updates the values, state by state, until the horizon is reached or nothing changes any
+    /// more. Returns the number of sweeps. `update` computes the new value of a state from its old
+    /// one and the values after each move.
     fn sweep(&self, values: &mut Values, update: &mut Update<'_>) -> usize {
         let mut sweeps = 0;
         let mut is_settled = vec![false; values.len()];
@@ -142,7 +143,7 @@ impl Perturbed {
         }
     }
 
-    /// The value of a state when a step ends in it: in a dead end that uses up patience.
+    /// Returns the value of a state at the end of a step. A step into a dead end uses up patience.
     fn landing(&self, values: &Values, layer: usize) -> Vec<Vec<f64>> {
         let mut landing = values[layer].clone();
         if !matches!(self.settings.dead_ends, DeadEnds::Patience(_)) {

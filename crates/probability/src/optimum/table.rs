@@ -1,11 +1,11 @@
-//! Conditions as tables over states: bit `i` of a state is the truth of the model's fact `i`.
+//! Conditions as tables over states: bit `i` of a state is the truth value of the model's fact `i`.
 
 use elbowroom_model::ground::{Condition, Expression, FactId};
 
 use super::NotSmall;
 use crate::model::{Event, Model, Requirement, Semantics, Value, evaluate};
 
-/// Whether the model is of a world without numbers and time.
+/// Checks that the model is one of a world without numbers and time.
 pub(super) fn check(model: &Model) -> Result<(), NotSmall> {
     if model.semantics() != Semantics::World {
         return Err(NotSmall::PaperSemantics);
@@ -38,7 +38,7 @@ pub(super) fn check(model: &Model) -> Result<(), NotSmall> {
     Ok(())
 }
 
-/// In which states a requirement holds.
+/// Returns `true` for the states where a requirement holds.
 pub(super) fn table(model: &Model, requirement: &Requirement) -> Vec<bool> {
     (0..1_usize << model.facts.len())
         .map(|state| {
@@ -56,14 +56,14 @@ pub(super) fn table(model: &Model, requirement: &Requirement) -> Vec<bool> {
         .collect()
 }
 
-/// Whether a condition holds in a state.
+/// Returns `true` if a condition holds in a state.
 pub(super) fn holds(model: &Model, condition: &Condition, state: usize) -> bool {
     let truth = |fact: FactId| {
         model
             .position(fact)
             .is_some_and(|at| state & (1 << at) != 0)
     };
-    // Numbers do not change here.
+    // Numbers are constant here.
     let value = |leaf: &Expression| match leaf {
         Expression::Fluent(fluent) => model.task().initial().values.get(fluent).into(),
         _ => Value::Open,

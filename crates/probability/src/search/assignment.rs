@@ -1,11 +1,11 @@
 //! The assignment problem: the Hungarian method (Kuhn 1955, in the form of Jonker and Volgenant).
 
-/// With more rows than this, each row gets its best column; that is a bound, too, and quick.
+/// With more rows than this, each row gets its best column. This is also an upper bound, and fast.
 pub(super) const MOST: usize = 24;
 
-/// At least the greatest product of one entry from each row, no two from one column, of a square
-/// matrix of numbers in [0, 1]. Exactly that for small matrices, up to rounding. Of large ones, rows
-/// may be without entries that are not their greatest.
+/// Returns an upper bound of the greatest product of one entry from each row, no two from one
+/// column, of a square matrix of numbers in [0, 1]. For small matrices, it is exact up to rounding.
+/// Rows of large ones may omit entries that are not their greatest.
 pub(super) fn best_product(rows: &[Vec<f64>]) -> f64 {
     if rows.len() > MOST {
         let best = |row: &Vec<f64>| row.iter().copied().fold(0.0, f64::max);
@@ -15,7 +15,7 @@ pub(super) fn best_product(rows: &[Vec<f64>]) -> f64 {
         [] => 1.0,
         [only] => only[0],
         _ => {
-            // What is too small to have a logarithm is taken for greater than it is.
+            // Numbers too small for a logarithm are rounded up.
             let cost = |p: &f64| -p.max(1e-300).ln();
             let costs: Vec<Vec<f64>> = rows
                 .iter()
@@ -26,7 +26,7 @@ pub(super) fn best_product(rows: &[Vec<f64>]) -> f64 {
     }
 }
 
-/// The least sum of one entry from each row, no two from one column.
+/// Returns the least sum of one entry from each row, no two from one column.
 fn least_sum(costs: &[Vec<f64>]) -> f64 {
     let size = costs.len();
     // Potentials of rows and columns; row and column 0 are artificial.

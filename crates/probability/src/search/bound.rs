@@ -1,17 +1,18 @@
-//! How likely an order can still become, and how short: a bound that no way to go on exceeds.
+//! Upper bound of the probability of all continuations of a sequence, and lower bound of their
+//! length.
 //!
-//! The paper bounds P(A ∩ G) by P(A) (Proposition 3). That is a bound, but a weak one: it forgets
-//! that the actions still needed may fail, that their conditions decay while others are done, and
-//! that what has been reached must last to the end. Counted here, besides P(A):
+//! The paper bounds P(A ∩ G) by P(A) (Proposition 3). This bound is weak: it ignores that the
+//! needed actions may fail, that the probability of their conditions decays in the meantime, and
+//! that achieved goals must last until the end. In addition to P(A), this bound includes:
 //!
-//! - *Needed instances*: those under way, and those without which a goal or a needed instance has
-//!   no support if nothing goes wrong (only where orders must work nominally). Each costs its
-//!   start's success.
-//! - *Facts*: each fact that is needed costs at least once that it may be false. Its chance is at
-//!   most the best of what its chain gives, and what the remaining effects on it leave behind.
-//! - *Queueing*: needed instances end one after another, and before each end its start. The j-th
-//!   end comes after `j - 1` ends and at least `j - running` starts. What an end needs decays until
-//!   then, and what it brings decays from then on while the others end. The best assignment of
+//! - *Needed instances*: running ones, and those without which a goal or a needed instance has no
+//!   support without failures (only if orders must work nominally). Each contributes the success
+//!   probability of its start.
+//! - *Facts*: each needed fact contributes the probability that it is true, once. This probability
+//!   is at most the best value of its Markov chain, and of the remaining effects on it.
+//! - *Queueing*: needed instances end one after another, and each starts before it ends. The j-th
+//!   end comes after `j - 1` ends and at least `j - running` starts. The conditions of an end decay
+//!   until then, and its effects decay afterwards, while the others end. The best assignment of
 //!   ends to ranks bounds the product.
 
 use elbowroom_plan::InstanceId;
@@ -25,42 +26,42 @@ use super::separations::Separations;
 use crate::model::{Event, Model, Requirement, Semantics};
 use crate::network::PrunedNetwork;
 
-/// The data of a model that the bound uses, computed once for all searches.
+/// Data of a model for the bound, computed once for all searches.
 #[derive(Clone, Debug)]
 pub(crate) struct Bounds {
-    /// For each fact, the instances that change it: `None` for timed initials.
+    /// For each fact, the instances that change it; `None` for timed initials.
     setters: Vec<Vec<Setter>>,
-    /// The conditions of an instance's end, and over all.
+    /// End and over-all conditions of each instance.
     needs_at_end: Vec<Vec<(usize, bool)>>,
-    /// Its over-all conditions.
+    /// Over-all conditions of each instance.
     needs_throughout: Vec<Vec<(usize, bool)>>,
-    /// The conditions of its start.
+    /// Start conditions of each instance.
     needs_at_start: Vec<Vec<(usize, bool)>>,
     goal: Vec<(usize, bool)>,
-    /// For each instance, the places in `goal` of the facts that its end changes.
+    /// For each instance, the positions in `goal` of the facts that its end changes.
     goal_at_end: Vec<Vec<usize>>,
 }
 
-/// An upper bound for all completions of a sequence.
+/// Bound for all completions of a sequence.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bound {
-    /// P(A ∩ G) is at most this.
+    /// Upper bound of P(A ∩ G).
     pub(crate) probability: f64,
-    /// The order has at least so many happenings, those already in the sequence included. Among
-    /// orders that are equally likely the shortest counts; a world where nothing is uncertain has
-    /// many of them, and without this bound the search would go through all.
+    /// Lower bound of the number of happenings of the order, including those of the sequence. Among
+    /// equally likely orders, the shortest one is preferred. A world without uncertainty has many
+    /// such orders, and without this bound the search would examine all of them.
     pub(crate) length: usize,
 }
 
 impl Bound {
-    /// Of what cannot become an order.
+    /// Bound of a sequence that cannot become an order.
     pub(crate) const IMPOSSIBLE: Self = Self {
         probability: 0.0,
         length: usize::MAX,
     };
 
-    /// Of a sequence after which another happening comes at the same moment. Over-all conditions are not counted,
-    /// as that happening may make them true.
+    /// Returns the bound of a sequence that is continued at the same moment. Over-all conditions
+    /// are not included, because the next happening may make them true.
     pub(crate) fn of_beginning(network: &PrunedNetwork<'_>) -> Self {
         Self {
             probability: network.actions_probability() * (1.0 + 1e-12),
@@ -69,25 +70,25 @@ impl Bound {
     }
 }
 
-/// Something that changes a fact.
+/// An effect that changes a fact.
 #[derive(Clone, Copy, Debug)]
 struct Setter {
     by: Option<InstanceId>,
     at_end: bool,
     makes_true: bool,
-    /// P(true) afterwards, or `None` if that depends on what was before.
+    /// P(true) afterwards, or `None` if it depends on the previous value.
     leaves: Option<f64>,
-    /// Whether it is sure to be tried when its happening is done.
+    /// `true` if the effect has no condition.
     is_unconditional: bool,
 }
 
-/// The search's state that the bound reads.
+/// State of the search that the bound reads.
 pub(crate) struct Outlook<'a> {
     pub(crate) nominal: &'a Nominal,
-    /// Whether the order must work if nothing goes wrong.
+    /// `true` if the order must work without failures.
     pub(crate) must_work: bool,
     pub(crate) is_free: &'a dyn Fn(InstanceId) -> bool,
-    /// Whether timed initials are to come.
+    /// `true` if timed initials are pending.
     pub(crate) has_timed: bool,
 }
 
@@ -120,7 +121,7 @@ impl Bounds {
             needs_at_start.push(model.event(start).condition.literals.clone());
             let is_coupled = couplings.is_coupled(start) || couplings.is_coupled(end);
             let over_all = if is_coupled {
-                // Between happenings of one moment nothing is required.
+                // Between happenings of one moment, over-all conditions are not required.
                 Vec::new()
             } else {
                 model.event(start).over_all.literals.clone()
@@ -161,7 +162,7 @@ impl Bounds {
         }
     }
 
-    /// An upper bound on the probability of every continuation, including the empty one.
+    /// Returns a bound for every continuation, including the empty one.
     pub(crate) fn bound(
         &self,
         model: &Model,
@@ -191,7 +192,7 @@ impl Bounds {
             is_counted: vec![false; model.facts.len()],
             bound: probability,
         };
-        // What time does to facts is not counted: it may do good as well as harm.
+        // Changes of facts with time are ignored, because they may be helpful or harmful.
         if !model.has_rates() {
             run.count(&needed, separations);
         }
@@ -202,7 +203,8 @@ impl Bounds {
         }
     }
 
-    /// The instances that every way to go on that works does or ends; `None` if there is no way.
+    /// Returns the instances that every working continuation starts or ends; `None` if there is
+    /// none.
     fn needed(
         &self,
         network: &PrunedNetwork<'_>,
@@ -279,7 +281,7 @@ struct Run<'a, 'm, 'n> {
 impl Run<'_, '_, '_> {
     fn count(&mut self, needed: &[InstanceId], separations: &Separations) {
         let running = self.network.running().len();
-        // How many happenings are needed at least.
+        // Lower bound of the number of needed happenings.
         let mut steps = 0;
         let mut ends: Vec<InstanceId> = Vec::new();
         for (place, &id) in needed.iter().enumerate() {
@@ -310,11 +312,11 @@ impl Run<'_, '_, '_> {
         }
     }
 
-    /// What one end contributes, at each rank among the ends: the chance of what it needs to last
-    /// until then, and of what it brings to last from then on.
+    /// Returns the contribution of one end, at each rank among the ends: the probability that its
+    /// conditions last until then, and that its effects last from then on.
     ///
-    /// Whether more starts come before this end or after it is open. As chances decay, each factor
-    /// is log-convex in their number, so that one of the extremes is best.
+    /// It is open whether more starts come before or after this end. As probabilities decay, each
+    /// factor is log-convex in the number of starts before it, so one of the extremes is best.
     fn share(&mut self, id: InstanceId, queue: Queue) -> Vec<f64> {
         let is_new = |literal: &&(usize, bool), is_counted: &mut Vec<bool>| {
             !std::mem::replace(&mut is_counted[literal.0], true)
@@ -357,11 +359,11 @@ impl Run<'_, '_, '_> {
         queue.ranks().into_iter().map(&mut share).collect()
     }
 
-    /// The best chance that what an end needs lasts until then, the end being `before` steps away
-    /// or more.
+    /// Returns an upper bound of the probability that a condition of an end lasts until then, if
+    /// the end is at least `before` steps away.
     ///
-    /// What is needed throughout must never fail from the start on. A start is best just before
-    /// its end: until then, what has failed may still mend itself.
+    /// An over-all condition must never fail after the start. The best start is just before the
+    /// end: until then, a lost fact may be restored by a spontaneous change.
     fn lasting(&mut self, id: InstanceId, (fact, truth): (usize, bool), before: usize) -> f64 {
         let literal = (fact, truth);
         let bounds = self.bounds;
@@ -382,8 +384,8 @@ impl Run<'_, '_, '_> {
         self.chance(fact, truth, before)
     }
 
-    /// Whether the end of `id` is the only thing left that changes the fact, and the fact is not
-    /// yet as it should be.
+    /// Returns `true` if only the end of `id` can still change the fact, and the fact does not have
+    /// the required value yet.
     fn is_last_to_set(&self, id: InstanceId, fact: usize, truth: bool) -> bool {
         let nominal = self.outlook.nominal.truth(fact);
         if !self.outlook.must_work || nominal != Truth::from(!truth) {
@@ -410,18 +412,19 @@ impl Run<'_, '_, '_> {
         }
     }
 
-    /// Counts a needed fact once.
+    /// Includes a needed fact once.
     fn count_fact(&mut self, fact: usize, truth: bool, steps: usize) {
         if !std::mem::replace(&mut self.is_counted[fact], true) {
             self.bound *= self.chance(fact, truth, steps);
         }
     }
 
-    /// The best chance that a fact has some truth after `steps` or more.
+    /// Returns an upper bound of the probability that a fact has a truth value after at least
+    /// `steps` steps.
     fn chance(&mut self, fact: usize, truth: bool, steps: usize) -> f64 {
         let chain = Chain::of(self.model.flips[fact], truth);
         let of = |p: f64| if truth { p } else { 1.0 - p };
-        // If it must be brought about, what it is now does not count.
+        // If an effect must establish the value, the present value is irrelevant.
         let must_be_set =
             self.outlook.must_work && self.outlook.nominal.truth(fact) == Truth::from(!truth);
         let mut best: f64 = 0.0;

@@ -1,4 +1,4 @@
-//! What was found before, for when the same circumstances come again.
+//! Cache of search results, by circumstances.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -11,24 +11,24 @@ use crate::circumstances::Circumstances;
 use crate::model::Model;
 use crate::total_order::TotalOrderPlan;
 
-/// More than this are not kept; then all are forgotten.
+/// Largest number of entries; then the cache is cleared.
 const MOST: usize = 65_536;
 
-/// All of the circumstances that the answer depends on.
+/// The parts of the circumstances that determine the result.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Key {
-    /// By fact of the model, as bits.
+    /// Probabilities of the model's facts, as bits.
     belief: Vec<u64>,
     values: Vec<(FluentId, Rational)>,
-    /// How long each has been under way.
+    /// Running actions, with the time since their start.
     running: Vec<(InstanceId, Rational)>,
-    /// How long ago each was.
+    /// Recent happenings, with the time since then.
     recent: Vec<(NodeId, Rational)>,
-    /// Now, if the clock matters.
+    /// Present time, if the clock matters.
     now: Option<Rational>,
 }
 
-/// The key of these circumstances.
+/// Returns the key of these circumstances.
 pub(super) fn key(model: &Model, circumstances: &Circumstances, has_deadlines: bool) -> Key {
     let probability = |&fact| circumstances.belief.probability(fact).to_bits();
     Key {
@@ -52,15 +52,15 @@ pub(super) fn key(model: &Model, circumstances: &Circumstances, has_deadlines: b
     }
 }
 
-/// What was found, shared by all clones. What is found depends on the key alone, so it does not
-/// matter who asks first.
+/// Results, shared by all clones. A result depends only on its key, so the order of queries does
+/// not matter.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cache {
     known: Arc<Mutex<IndexMap<Key, Arc<Known>>>>,
 }
 
 impl Cache {
-    /// The entry, if there is one.
+    /// Returns the entry, if there is one.
     pub(super) fn get(&self, key: &Key) -> Option<Arc<Known>> {
         self.known().get(key).cloned()
     }
@@ -82,7 +82,7 @@ impl Cache {
     }
 }
 
-/// A cached result of an earlier search.
+/// Cached result of an earlier search.
 #[derive(Clone, Debug)]
 pub(super) struct Known {
     order: Option<TotalOrderPlan>,
@@ -90,7 +90,7 @@ pub(super) struct Known {
 }
 
 impl Known {
-    /// The order as it is if it begins now; `None` if there is none.
+    /// Returns the order as of `now`; `None` if there is none.
     pub(super) fn from(&self, now: &Rational) -> Option<TotalOrderPlan> {
         let delay = now - &self.began;
         self.order.as_ref().map(|order| order.delayed(&delay))

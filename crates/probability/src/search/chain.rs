@@ -1,8 +1,8 @@
-//! How likely one fact is to have the truth that is wanted, while it changes by itself.
+//! Markov chain of one fact under spontaneous changes, relative to a required truth value.
 
 use crate::likelihoods::Flip;
 
-/// A fact changing by itself, seen from the truth that is wanted.
+/// Spontaneous changes of a fact, relative to the required truth value.
 #[derive(Clone, Copy)]
 pub(super) struct Chain(Flip);
 
@@ -18,20 +18,20 @@ impl Chain {
         })
     }
 
-    /// How likely it is in one step that the truth that is wanted goes.
+    /// Returns the probability that the required truth value is lost in one step.
     pub(super) fn fails(self) -> f64 {
         self.0.becomes_false
     }
 
-    /// Whether chances move to one side only.
+    /// Returns `true` if probabilities converge monotonically.
     pub(super) fn is_steady(self) -> bool {
         self.0.becomes_true + self.0.becomes_false <= 1.0
     }
 
-    /// The greatest chance after `steps` steps or more.
+    /// Returns the greatest probability after at least `steps` steps.
     ///
-    /// Chances move towards `becomes_true / (becomes_true + becomes_false)` from one side, unless
-    /// the two sum up to more than 1; then they jump from side to side.
+    /// Probabilities converge to `becomes_true / (becomes_true + becomes_false)` from one side,
+    /// unless the sum of the two is greater than 1; then they oscillate.
     pub(super) fn best_after(self, p: f64, steps: usize) -> f64 {
         let Flip {
             becomes_true,

@@ -1,16 +1,16 @@
 //! Happenings that may need each other at one moment: [`Couplings`].
 //!
-//! Over-all conditions hold from right after the start of an action to right before its end. So
-//! two starts at one moment may each make the other's condition true, although neither can come first.
-//! A happening *needs* another one at the same moment
+//! Over-all conditions hold from right after the start of an action to right before its end. So two
+//! simultaneous starts may each make the other's condition true, although neither can come first. A
+//! happening *needs* another one at the same moment
 //!
-//! - if it starts an action, and the other one may make true what that action requires throughout;
-//! - if it may make false what an action requires throughout, and the other one is the end of that
+//! - if it starts an action, and the other one may make an over-all condition of that action true;
+//! - if it may make an over-all condition of an action false, and the other one is the end of that
 //!   action, or may make it true again;
-//! - if it starts an action that may take no time, and the other one is that action's end: then
-//!   nothing is required throughout it.
+//! - if it starts an action that may take no time, and the other one is that action's end: then no
+//!   over-all condition is required.
 //!
-//! Happenings that need each other in a circle are coupled. Others can always come one after the
+//! Happenings that need each other in a cycle are coupled. Others can always come one after the
 //! other.
 
 use std::collections::BTreeSet;
@@ -70,7 +70,7 @@ impl Couplings {
                 }
                 for breaker in breakers.into_iter().filter(|it| *it != start) {
                     need(breaker, end);
-                    // Of a single fact, the one that makes it true interferes.
+                    // The happening that makes a single fact true interferes.
                     if let Part::Condition(_) = part {
                         for giver in &givers {
                             need(breaker, *giver);
@@ -124,8 +124,8 @@ impl Couplings {
         let is_same = |one: NodeId, other: NodeId| one == other || self.are_coupled(one, other);
         let mut rest = std::mem::take(moment);
         while let Some(&first) = rest.first() {
-            // A happening whose group needs nothing of the rest. There is one, as groups do not need each other in a
-            // circle.
+            // A happening whose group needs none of the other ones. It exists, because groups do
+            // not need each other in a cycle.
             let is_ready = |node: NodeId| {
                 let mut group = rest.iter().filter(|other| is_same(node, **other));
                 group.all(|own| {
@@ -143,8 +143,8 @@ impl Couplings {
 }
 
 impl OrderSearch {
-    /// Of the happenings that may come next, those that may be joined with the last one if it is open; each with
-    /// whether another one is to come at the same moment.
+    /// Returns those of the possible next happenings that may be joined with the last one, if it is
+    /// open; `true` marks those that another happening has to follow at the same moment.
     pub(super) fn joinable(
         &self,
         network: &PrunedNetwork<'_>,
@@ -169,7 +169,7 @@ impl OrderSearch {
     }
 }
 
-/// The place of a happening among those of one moment.
+/// Returns the rank of a happening among those of one moment.
 fn rank(nodes: &[Node], node: NodeId, begins: &dyn Fn(NodeId) -> bool) -> u8 {
     match nodes[node.index()] {
         Node::End(_) if begins(node) => 3,
@@ -187,14 +187,15 @@ fn begins_in(model: &Model, node: NodeId, moment: &[NodeId]) -> bool {
     }
 }
 
-/// A part of what an action requires throughout.
+/// Part of an action's over-all condition.
 enum Part {
     Literal(usize, bool),
     /// A condition on several facts, or on numbers.
     Condition(Condition),
 }
 
-/// The parts of what the action that starts here requires throughout, with the guards of its effects.
+/// Returns the parts of the over-all condition of the action that starts here, with the guards of
+/// its effects.
 fn parts(model: &Model, start: NodeId) -> Vec<Part> {
     let event = model.event(start);
     let Requirement {
@@ -225,7 +226,7 @@ impl Part {
         }
     }
 
-    /// Returns `true` if a happening makes this true whatever was before.
+    /// Returns `true` if a happening makes this true independently of the previous state.
     fn is_made_by(&self, event: &Event) -> bool {
         let Self::Literal(fact, truth) = self else {
             return false;
@@ -308,7 +309,7 @@ fn may_grow(model: &Model, side: &Expression, update: &Update, larger: bool) -> 
     }
 }
 
-/// The strongly connected components of more than one node.
+/// Returns the strongly connected components with more than one node.
 fn groups(needs: &[BTreeSet<NodeId>]) -> Vec<Option<usize>> {
     let reachable = |from: usize| {
         let mut seen = vec![false; needs.len()];

@@ -1,9 +1,9 @@
 //! All orders of a short plan at once: [`Lattice`].
 //!
-//! The sets of happenings that an order can have behind it, ordered by inclusion: a way upwards
-//! from nothing is an order. What is behind an order says what can follow and what would be true if
-//! nothing went wrong, but not how likely its facts are: that also depends on the way. So each way
-//! is looked at, and a set is given the best of those that lead through it.
+//! The nodes are the sets of happenings that an order can have executed, ordered by inclusion. A
+//! path upwards from the empty set is an order. The set determines the happenings that can follow
+//! and the nominal state, but not the probabilities of facts: these also depend on the path. So
+//! each path is examined, and a set gets the best probability of the paths through it.
 
 use std::collections::BTreeMap;
 
@@ -16,53 +16,53 @@ use super::{Candidates, OrderSearch, SEQUENCE_WORK};
 use crate::circumstances::Circumstances;
 use crate::network::{PrunedNetwork, TooCoupled};
 
-/// The orders of a plan.
+/// Orders of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
-    /// The sets through which an order leads, smaller ones first; the first is the empty one. Empty
+    /// Sets on paths of orders, smaller ones first; the first one is the empty set. There are none
     /// if there is no order.
     pub nodes: Vec<LatticeNode>,
-    /// Sorted by the positions of their ends.
+    /// Edges, sorted by the positions of their ends.
     pub edges: Vec<LatticeEdge>,
-    /// How many orders there are.
+    /// Number of orders.
     pub orders: usize,
 }
 
-/// A set of happenings that an order can have behind it.
+/// Set of happenings that an order can have executed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LatticeNode {
-    /// The happenings, sorted.
+    /// Happenings, sorted.
     pub done: Vec<NodeId>,
-    /// The greatest P(A ∩ G) of the orders that lead through it.
+    /// Greatest P(A ∩ G) of the orders through it.
     pub best: f64,
-    /// The greatest P(A ∩ G) of the orders that end here, if any do.
+    /// Greatest P(A ∩ G) of the orders that end here, if there are any.
     pub ends: Option<f64>,
 }
 
 /// One more happening.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LatticeEdge {
-    /// The position of the smaller set.
+    /// Position of the smaller set.
     pub from: usize,
-    /// The position of the larger set.
+    /// Position of the larger set.
     pub to: usize,
-    /// The happening by which they differ.
+    /// The additional happening.
     pub node: NodeId,
-    /// The greatest P(A ∩ G) of the orders that lead along it.
+    /// Greatest P(A ∩ G) of the orders with this edge.
     pub best: f64,
 }
 
-/// How large a lattice may become.
+/// Limits on the size of a lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LatticeLimits {
-    /// The number of sets.
+    /// Largest number of sets.
     pub nodes: usize,
-    /// The number of sequences that are looked at.
+    /// Largest number of examined sequences.
     pub sequences: usize,
 }
 
 impl Default for LatticeLimits {
-    /// Limits that keep a picture legible and the work below a second or two.
+    /// Returns limits that keep a diagram legible and the computation below one or two seconds.
     fn default() -> Self {
         Self {
             nodes: 300,
@@ -77,7 +77,7 @@ pub enum TooLarge {
     /// Too many sets.
     #[error("the lattice of orders has more than {0} nodes")]
     Nodes(usize),
-    /// Too many ways through them.
+    /// Too many paths through them.
     #[error("there are more than {0} prefixes of orders to examine")]
     Sequences(usize),
     /// A condition couples too many facts.
@@ -86,7 +86,8 @@ pub enum TooLarge {
 }
 
 impl OrderSearch {
-    /// All orders of the plan from here: those that [`OrderSearch::best_order`] chooses from.
+    /// Returns all orders of the plan from here: those that [`OrderSearch::best_order`] chooses
+    /// from.
     ///
     /// # Errors
     /// When there are more than the limits allow.
@@ -136,7 +137,7 @@ impl OrderSearch {
     }
 }
 
-/// A set of happenings: smaller ones come first.
+/// A set of happenings, preceded by its size, so that smaller ones come first.
 type Set = (usize, Vec<NodeId>);
 
 struct Walk<'s> {
@@ -162,7 +163,8 @@ impl Walk<'_> {
         (done.len(), done)
     }
 
-    /// Looks at all orders that begin like the sequence so far; the best of their probabilities.
+    /// Examines all orders that begin with the current sequence, and returns the best of their
+    /// probabilities.
     fn go_on(&mut self) -> Result<f64, TooLarge> {
         self.sequences += 1;
         work::spend(SEQUENCE_WORK);
@@ -197,7 +199,7 @@ impl Walk<'_> {
         Ok(best)
     }
 
-    /// The probability of the sequence as it stands, if it is an order.
+    /// Returns the probability of the current sequence, if it is an order.
     fn ends(&mut self) -> Result<Option<f64>, TooLarge> {
         let model = &*self.search.model;
         if !self.network.running().is_empty()
@@ -220,7 +222,8 @@ impl Walk<'_> {
         Ok((probability > 0.0).then_some(probability))
     }
 
-    /// The best of all orders that go on with this happening; `None` if there are none.
+    /// Returns the best probability of all orders that continue with this happening; `None` if
+    /// there are none.
     fn through(&mut self, node: NodeId, is_open: bool) -> Result<Option<f64>, TooLarge> {
         let model = &*self.search.model;
         let what = model.plan().nodes[node.index()];
@@ -259,7 +262,7 @@ impl Walk<'_> {
         }
     }
 
-    /// The possible next happenings, regardless of time and probabilities.
+    /// Returns the possible next happenings, regardless of time and probabilities.
     fn next(&self) -> Vec<NodeId> {
         let separations = &self.search.separations;
         let mut next = Vec::new();

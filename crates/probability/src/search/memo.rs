@@ -1,15 +1,16 @@
-//! Sequences that have done the same, and which of them stand best.
+//! Dominance between sequences with the same happenings.
 //!
-//! Two sequences have *done the same* if they have used the same instances, have the same ones
-//! under way, have passed the same timed initials, and would be in the same nominal state with the
-//! same numbers, as far as that can still matter. Then the same happenings can follow, apart from
-//! time, and whatever follows has a probability that is linear in the distribution of each
-//! independent group of facts. So sequence A *stands at least as well* as B if
+//! Two sequences are *equivalent in progress* if they have used the same instances, have the same
+//! running instances, have passed the same timed initials, and have the same relevant nominal state
+//! and numbers. Then the same happenings can follow, apart from time, and every continuation has a
+//! probability that is linear in the distribution of each independent group of facts. So sequence A
+//! *dominates* B if
 //!
 //! `P_A(A) · Π over groups min over assignments x of p_A(x) / p_B(x)  >=  P_B(A)`
 //!
-//! and there is as much time left. For a fact on its own the minimum is over true and false; if
-//! nothing to come needs it false, more of it does no harm, and only `p_A / p_B` counts if below 1.
+//! and A has at least as much time left. For an independent fact, the minimum is over true and
+//! false. If no later happening needs it to be false, a greater probability does no harm, and only
+//! `p_A / p_B` counts if it is below 1.
 
 use elbowroom_plan::{InstanceId, Node};
 use indexmap::IndexMap;
@@ -20,10 +21,10 @@ use super::separations::Separations;
 use crate::model::{Model, Requirement, visit_facts};
 use crate::network::{Number, PrunedNetwork, Snapshot};
 
-/// How many sequences that have done the same are remembered.
+/// Largest number of remembered sequences that are equivalent in progress.
 const MOST: usize = 64;
 
-/// See the module.
+/// Remembered sequences.
 #[derive(Clone, Debug)]
 pub(super) struct Memo {
     entries: IndexMap<Key, Vec<Entry>>,
@@ -36,9 +37,10 @@ struct Key {
     is_used: Vec<bool>,
     running: Vec<InstanceId>,
     next_timed: usize,
-    /// Such a sequence may be no order as it stands: see `OrderSearch::may_be_over`.
+    /// `true` if the last happening is a timed initial. Such a sequence may not be an order; see
+    /// `OrderSearch::may_be_over`.
     is_timed_last: bool,
-    /// Where facts change with time: see [`PrunedNetwork::times_to_come`].
+    /// If facts change with time: see [`PrunedNetwork::times_to_come`].
     times: Vec<i64>,
     truths: Vec<Truth>,
     numbers: Vec<Number>,
@@ -51,14 +53,15 @@ struct Entry {
     room: Option<Room>,
 }
 
-/// The facts, with truth values, on which conditions depend.
+/// Facts, with truth values, that conditions depend on.
 #[derive(Clone, Debug)]
 struct Needs {
-    /// By instance: its start and middle; its middle and end.
+    /// By instance: needs of its start and over-all conditions, and needs of its over-all
+    /// conditions and end.
     whole: Vec<Vec<(usize, u8)>>,
     rest: Vec<Vec<(usize, u8)>>,
     goal: Need,
-    /// Facts of which more may be worse although nothing needs them false.
+    /// Facts whose greater probability may be worse although nothing needs them to be false.
     is_turbulent: Vec<bool>,
 }
 
@@ -111,17 +114,17 @@ impl Memo {
         }
     }
 
-    /// Remembers a position in the nominal state's history.
+    /// Stores a position in the history of the nominal state.
     pub(super) fn mark(&mut self, checkpoint: usize) {
         self.marks.push(checkpoint);
     }
 
-    /// The last one remembered.
+    /// Removes and returns the last stored position.
     pub(super) fn unmark(&mut self) -> usize {
         self.marks.pop().unwrap_or(0)
     }
 
-    /// Whether a remembered sequence stands at least as well; if not, remembers this one.
+    /// Returns `true` if a remembered sequence dominates this one. Otherwise, remembers this one.
     pub(super) fn is_dominated(
         &mut self,
         model: &Model,
@@ -181,7 +184,8 @@ impl Entry {
     }
 }
 
-/// By how much at least whatever follows is more likely from the one than from the other.
+/// Returns a lower bound of the ratio of the probabilities of any continuation from the two
+/// distributions.
 fn ratio(from: &Snapshot, than: &Snapshot, need: &Need) -> f64 {
     if from.coupled.len() != than.coupled.len() {
         return 0.0;
@@ -214,7 +218,7 @@ fn ratio(from: &Snapshot, than: &Snapshot, need: &Need) -> f64 {
     ratio
 }
 
-/// `own / its`, where nothing is as good as something that cannot be.
+/// Returns `own / its`, or infinity if `its` is 0.
 fn part(own: f64, its: f64) -> f64 {
     if its > 0.0 { own / its } else { f64::INFINITY }
 }
@@ -246,7 +250,7 @@ impl Needs {
     }
 }
 
-/// What is needed at all: an action reads few of all facts.
+/// Returns the facts with a need; an action reads few of all facts.
 fn sparse(need: &Need) -> Vec<(usize, u8)> {
     let facts = need.iter().copied().enumerate();
     facts.filter(|(_, need)| *need != 0).collect()

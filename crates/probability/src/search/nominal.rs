@@ -1,4 +1,4 @@
-//! What an order does when nothing goes wrong.
+//! Nominal state of an order: its state without failures.
 
 use elbowroom_model::derivation::{Moment, holds};
 use elbowroom_model::ground::{Condition, Expression, FactId};
@@ -8,13 +8,14 @@ use elbowroom_plan::InstanceId;
 use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement, is_fact};
 
-/// The truth of a fact if nothing goes wrong. Numbers are not followed here, so an effect whose condition reads them may
-/// take place or not.
+/// Truth value of a fact without failures. Numbers are not tracked here, so an effect whose
+/// condition reads them may or may not take place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Truth {
     False,
     True,
-    /// The belief leaves it open, or an effect whose condition reads numbers, and nothing has decided it since.
+    /// Undecided by the belief, or by an effect whose condition reads numbers, and nothing has
+    /// decided it since.
     Open,
 }
 
@@ -24,16 +25,16 @@ impl From<bool> for Truth {
     }
 }
 
-/// The decision whether an effect takes place if nothing goes wrong.
+/// Decision whether an effect takes place without failures.
 #[derive(Clone, Copy, Debug)]
 enum Taking {
     Place,
     Nothing,
-    /// Numbers decide.
+    /// It depends on numbers.
     Open,
 }
 
-/// The nominal state along an order.
+/// Nominal state along an order.
 #[derive(Clone, Debug)]
 pub(crate) struct Nominal {
     truths: Vec<Truth>,
@@ -41,7 +42,7 @@ pub(crate) struct Nominal {
 }
 
 impl Nominal {
-    /// The state as it is believed, and whether the actions under way can go on in it.
+    /// Returns the believed state, and `true` if the running actions can continue in it.
     pub(crate) fn new(model: &Model, circumstances: &Circumstances) -> (Self, bool) {
         let belief = &circumstances.belief;
         let truth = |&fact: &FactId| match belief.probability(fact) {
@@ -56,7 +57,7 @@ impl Nominal {
         let mut under_way = Vec::new();
         for running in &circumstances.running {
             under_way.push(running.instance);
-            // Guards of the start have been decided: the effects that are left will take place.
+            // Guards about the start have been decided: the remaining effects will take place.
             let start = model.event(model.start(running.instance));
             let memories = start.effects.iter().filter(|effect| effect.is_certain);
             for memory in memories {
@@ -88,13 +89,14 @@ impl Nominal {
         self.undo.push((fact, old));
     }
 
-    /// Does a happening, if its conditions, and those of the actions under way, leave it possible.
+    /// Applies a happening. Returns `false` if its conditions, or those of the running actions, are
+    /// impossible.
     pub(crate) fn apply(&mut self, model: &Model, event: &Event, running: &[InstanceId]) -> bool {
         self.apply_open(model, event) && self.stays_possible(model, running)
     }
 
-    /// The same, if another happening follows at the same moment: the over-all conditions of the running actions
-    /// need not hold in between.
+    /// Like [`Self::apply`], for a happening that is followed by another one at the same moment:
+    /// the over-all conditions of the running actions need not hold in between.
     pub(crate) fn apply_open(&mut self, model: &Model, event: &Event) -> bool {
         if !self.admit(model, &event.condition) {
             return false;
@@ -125,8 +127,8 @@ impl Nominal {
         true
     }
 
-    /// Decides whether an effect with this guard takes place. Facts that the belief leaves open are taken to be such that
-    /// it does.
+    /// Decides whether an effect with this guard takes place. Undecided facts are assumed to have
+    /// the values with which it does.
     fn taking(&self, model: &Model, guard: Option<&Condition>) -> Taking {
         let Some(guard) = guard else {
             return Taking::Place;
@@ -139,7 +141,7 @@ impl Nominal {
                 model
                     .task()
                     .visit_fluents_of(guard, &mut |_| reads_numbers = true);
-                // The memory of a start is open where numbers decide on it.
+                // The memory of a start is undecided if it depends on numbers.
                 guard.visit_facts(&mut |fact| reads_numbers |= !is_fact(fact));
                 if reads_numbers {
                     Taking::Open
@@ -166,7 +168,7 @@ impl Nominal {
         })
     }
 
-    /// Whether what is needed throughout these actions may hold now.
+    /// Returns `true` if the over-all conditions of these actions may hold now.
     pub(crate) fn stays_possible(&mut self, model: &Model, running: &[InstanceId]) -> bool {
         running.iter().all(|&id| {
             let start = model.event(model.start(id));
@@ -179,7 +181,7 @@ impl Nominal {
         })
     }
 
-    /// Whether a requirement may hold; if so, what was open is decided as it says.
+    /// Returns `true` if a requirement may hold. Undecided facts get the required values.
     pub(crate) fn admit(&mut self, model: &Model, requirement: &Requirement) -> bool {
         for &(fact, truth) in &requirement.literals {
             match self.truths[fact] {
@@ -194,7 +196,7 @@ impl Nominal {
             .all(|coupled| self.possible(model, &coupled.condition))
     }
 
-    /// Whether the condition holds, or may hold.
+    /// Returns `true` if the condition holds, or may hold.
     fn possible(&self, model: &Model, condition: &Condition) -> bool {
         self.reading(model, condition).unwrap_or(true)
     }
@@ -218,7 +220,7 @@ impl Nominal {
     }
 }
 
-/// A fact that is open, or a number; those are the network's business.
+/// An undecided fact, or a number; the network handles these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Open;
 

@@ -1,4 +1,4 @@
-//! Later starts in an order, where its probability stays the same.
+//! Postponed starts in an order, if its probability stays the same.
 
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
@@ -9,12 +9,13 @@ use crate::model::Event;
 use crate::network::{Happenings, PrunedNetwork, TooCoupled};
 
 impl OrderSearch {
-    /// Moves starts behind ends that may go wrong and on whose effects the end of the started action depends, and behind
-    /// the ends of actions that a failure of the started action would harm.
+    /// Moves starts behind ends that may fail and on whose effects the end of the started action
+    /// depends, and behind the ends of actions that a failure of the started action would harm.
     ///
-    /// The probability of an order does not count retries, so an order that starts both actions first is as likely. But
-    /// there, one failure makes both actions fail, and the second one may be beyond repair. A start stays where the order
-    /// would be less likely or have no time otherwise.
+    /// The probability of an order does not count retries, so an order that starts both actions
+    /// first is equally likely. But in that order, one failure makes both actions fail, and the
+    /// second one may not be repeatable. A start is not moved if the order would be less likely or
+    /// would have no schedule.
     pub(super) fn postponed(
         &self,
         circumstances: &Circumstances,
@@ -34,8 +35,9 @@ impl OrderSearch {
         Ok(order)
     }
 
-    /// The sequence with an action behind the last end that it should wait for: its start, and its end if that would come
-    /// before the start otherwise. `None` if it has nothing to wait for, or the plan's links forbid the change.
+    /// Returns the sequence with an action moved behind the last end that it should wait for: its
+    /// start, and its end if that would come before the start otherwise. Returns `None` if it has
+    /// nothing to wait for, or the plan's links forbid the change.
     fn moved(&self, sequence: &[NodeId], id: InstanceId) -> Option<Vec<NodeId>> {
         let (start, end) = (self.model.start(id), self.model.end(id));
         let place = |wanted: NodeId| sequence.iter().position(|node| *node == wanted);
@@ -59,7 +61,8 @@ impl OrderSearch {
         (may_follow(start) && may_follow(end)).then_some(moved)
     }
 
-    /// The position of the last end that an action should wait for; its start and end have these positions.
+    /// Returns the position of the last end that an action should wait for; `from` and `own_end`
+    /// are the positions of its start and end.
     fn last_end_to_await(
         &self,
         sequence: &[NodeId],
@@ -87,7 +90,7 @@ impl OrderSearch {
         })
     }
 
-    /// Returns `true` if a failure of `own` may undo what `other` needs.
+    /// Returns `true` if a failure of `own` may undo a condition of `other`.
     fn is_harmed(&self, other: InstanceId, own: InstanceId) -> bool {
         let (start, end) = (self.model.start(other), self.model.end(other));
         let (start, end) = (self.model.event(start), self.model.event(end));

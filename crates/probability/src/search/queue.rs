@@ -1,8 +1,8 @@
-//! Where an end can be among those that an order still needs: [`Queue`].
+//! Ranks of an end among the ends that an order still needs: [`Queue`].
 
 use super::assignment;
 
-/// The number of required action ends, and how many of them belong to running actions.
+/// Number of required action ends, and number of those that belong to running actions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Queue {
     pub(super) running: usize,
@@ -10,8 +10,8 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    /// How many happenings come before the end at a rank, and how many after it, if starts wait
-    /// for as long as they can, and if all are before it.
+    /// Returns the number of happenings before the end at a rank, and the number after it, in two
+    /// cases: starts come as late as possible, and all starts come first.
     pub(super) fn neighbours(self, rank: usize) -> [(usize, usize); 2] {
         let unstarted = self.ends - self.running.min(self.ends);
         let ends_after = self.ends - 1 - rank;
@@ -22,11 +22,11 @@ impl Queue {
         ]
     }
 
-    /// The ranks at which an end is looked at: in a short queue all of them, and in a long one, in
-    /// which each end takes the rank that is best for it, those among which the best one is.
+    /// Returns the ranks to examine for an end: all of them in a short queue. In a long one, where
+    /// each end takes its best rank, only candidates for the best one.
     ///
-    /// Chances decay, so that shares are log-convex from rank to rank, but for the first happening
-    /// and for where ends begin to need starts: the best rank is at an end of such a piece.
+    /// Probabilities decay, so shares are log-convex in the rank, except for the first happening
+    /// and where ends begin to need starts. The best rank is at an end of one of these pieces.
     pub(super) fn ranks(self) -> Vec<usize> {
         if self.ends <= assignment::MOST {
             return (0..self.ends).collect();
@@ -48,7 +48,7 @@ mod tests {
     use crate::likelihoods::Flip;
     use crate::search::chain::Chain;
 
-    /// One of the ranks that are looked at is the best of all, whatever decays.
+    /// One of the examined ranks is the best of all, for any decay.
     #[test]
     fn in_a_long_queue_the_best_rank_is_among_those_that_are_looked_at() {
         let mut seed: u32 = 3;
@@ -72,7 +72,7 @@ mod tests {
             let needs: Vec<(Chain, f64)> = (0..turn % 3).map(|_| chain(true)).collect();
             let brings: Vec<(Chain, f64)> = (0..turn % 2).map(|_| chain(false)).collect();
             let (throughout, chance) = chain(true);
-            // As what an end needs throughout: from the start just before it on.
+            // For an over-all condition of an end: from the start just before it on.
             let lasting = |before: usize| match before.checked_sub(1) {
                 Some(sooner) => throughout.best_after(chance, sooner) * (1.0 - throughout.fails()),
                 None => chance,

@@ -1,11 +1,11 @@
-//! How much time an order leaves to what follows.
+//! Time that an order leaves for later happenings.
 //!
-//! Of all the happenings of an order, only a few can still matter to the timing of what is to come:
-//! the last one, the ends under way, zero (if there are times on the clock to be kept), and what
-//! was less than ε ago from which something must be ε apart. The network of the order, projected on
-//! these, is a small matrix of greatest differences. It is kept closed: a happening is added by
-//! relaxing the paths through its new bounds, and what no longer matters is dropped with its row
-//! and column.
+//! Only a few happenings of an order influence the timing of later ones: the last one, the ends of
+//! running actions, time zero (if there are absolute times), and happenings less than ε ago that
+//! must be ε apart from some other one. The network of the order, projected on these time points,
+//! is a small matrix of greatest differences. It is kept closed: a happening is added by relaxing
+//! the paths through its new bounds. Points that are no longer relevant are dropped with their rows
+//! and columns.
 
 mod rests;
 
@@ -18,7 +18,7 @@ use crate::model::Model;
 
 pub(crate) use rests::{First, Rests};
 
-/// The rooms of an order, after each of its happenings.
+/// Rooms of an order, after each of its happenings.
 #[derive(Clone, Debug)]
 pub(super) struct Rooms<'s> {
     separations: &'s Separations,
@@ -26,26 +26,26 @@ pub(super) struct Rooms<'s> {
     after: Vec<Room>,
 }
 
-/// A time point that what follows can refer to.
+/// A time point that constraints of later happenings may mention.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Point {
     Zero,
     Last,
     End(InstanceId),
-    /// A happening that may be less than ε ago, from which something must be ε apart.
+    /// A happening that may be less than ε ago, and that must be ε apart from some other one.
     Recent(NodeId),
 }
 
-/// The projection of an order's network on the points that matter to what follows.
+/// Projection of an order's network on the time points that are relevant for later happenings.
 #[derive(Clone, Debug)]
 pub(super) struct Room {
     points: Vec<Point>,
-    /// The greatest difference from point to point, row by row; `None` if there is none.
+    /// Greatest difference from point to point, row by row; `None` if it is unbounded.
     distances: Vec<Option<Rational>>,
 }
 
 impl<'s> Rooms<'s> {
-    /// The room that there is now; `None` if what is under way leaves no schedule.
+    /// Returns the present room; `None` if the running actions leave no schedule.
     pub(super) fn new(separations: &'s Separations, circumstances: &Circumstances) -> Option<Self> {
         let now = &circumstances.now;
         let mut room = Room {
@@ -81,8 +81,8 @@ impl<'s> Rooms<'s> {
         self.after.last().unwrap_or(&self.now)
     }
 
-    /// Adds a happening, `next_timed` being the timed initials that have passed before it, unless
-    /// there is no time for it. With `is_joined` it comes at the same moment as the last one.
+    /// Adds a happening, unless there is no time for it. `next_timed` is the number of timed
+    /// initials before it. With `is_joined`, it comes at the same moment as the last one.
     pub(super) fn push(
         &mut self,
         model: &Model,
@@ -95,7 +95,7 @@ impl<'s> Rooms<'s> {
         has_time
     }
 
-    /// Takes the last happening back.
+    /// Removes the last happening.
     pub(super) fn pop(&mut self) {
         self.after.pop();
     }
@@ -146,8 +146,8 @@ impl<'s> Rooms<'s> {
         Some(room)
     }
 
-    /// What matters of the room that there is to what follows, with or without times on the clock,
-    /// its points in order. `None` if nothing does.
+    /// Returns the relevant part of the present room, with or without absolute times, with its
+    /// points sorted. `None` if no part is relevant.
     pub(super) fn room(&self, has_deadlines: bool) -> Option<Room> {
         let room = self.last();
         let is_end = |point: &Point| matches!(point, Point::End(_));
@@ -177,7 +177,7 @@ impl Room {
         self.distances[from * self.points.len() + to].as_ref()
     }
 
-    /// A point that can be anywhere.
+    /// Adds an unconstrained point.
     fn add(&mut self, point: Point) -> usize {
         let old = self.points.len();
         self.points.push(point);
@@ -193,7 +193,7 @@ impl Room {
         old
     }
 
-    /// Drops all points but these, if it is there.
+    /// Drops all other points.
     fn retain(&mut self, keeps: impl Fn(usize) -> bool) {
         let count = self.points.len();
         let mut at = 0;
@@ -225,7 +225,8 @@ impl Room {
         self.at_most(to, from, &-difference)
     }
 
-    /// Makes `to - from <= difference` hold, and all that follows; `None` if that cannot be.
+    /// Adds the bound `to - from <= difference`, and all implied ones. Returns `None` if it is
+    /// inconsistent.
     fn at_most(&mut self, from: usize, to: usize, difference: &Rational) -> Option<()> {
         if self.distance(from, to).is_some_and(|old| old <= difference) {
             return Some(());
@@ -236,7 +237,8 @@ impl Room {
             return None;
         }
         let count = self.points.len();
-        // Only what comes to `to` in a shorter way now, and gets on from `from` in one, can change.
+        // Only distances between points with a shorter path to `to` and points with a shorter path
+        // from `from` can change.
         let before = |place: usize| {
             let sum = self.distance(place, from)? + difference;
             let old = self.distance(place, to);
@@ -262,14 +264,14 @@ impl Room {
         Some(())
     }
 
-    /// Makes a point the last happening, and drops what matters no more.
+    /// Makes a point the last happening, and drops irrelevant points.
     fn end_with(&mut self, own: usize, node: NodeId, separations: &Separations) {
         let nearest = -&separations.epsilon;
         let is_close: Vec<bool> = (0..self.points.len())
             .map(|place| match self.points[place] {
                 Point::Zero | Point::End(_) => true,
                 Point::Last => false,
-                // One that is done again is not the one that was done before.
+                // A repeated happening replaces its previous occurrence.
                 Point::Recent(other) if other == node => false,
                 Point::Recent(_) => {
                     let latest = self.distance(own, place);
@@ -297,8 +299,8 @@ impl Room {
         }
     }
 
-    /// Whether every way to go on that has time in `other` has time here, too. The points of both
-    /// are in order.
+    /// Returns `true` if every continuation with a schedule in `other` has one here as well. The
+    /// points of both are sorted.
     pub(super) fn contains(&self, other: &Self) -> bool {
         let is_wider = |own: &Option<Rational>, its: &Option<Rational>| match (own, its) {
             (None, _) => true,

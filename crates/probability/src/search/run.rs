@@ -14,7 +14,7 @@ use crate::circumstances::Circumstances;
 use crate::model::Model;
 use crate::network::{PrunedNetwork, TooCoupled};
 
-/// A search under way: the sequence so far, everywhere it is kept.
+/// A running search, with the data of the current sequence.
 pub(super) struct Run<'s, 'w> {
     search: &'s OrderSearch,
     model: &'s Model,
@@ -24,10 +24,10 @@ pub(super) struct Run<'s, 'w> {
     nominal: Nominal,
     rooms: Rooms<'s>,
     is_used: Vec<bool>,
-    /// For each instance, the one of its kind that is to be used before it.
+    /// For each instance, the interchangeable one that has to be used before it.
     before: Vec<Option<InstanceId>>,
     is_placed: Vec<bool>,
-    /// The next of the timed initials that matter.
+    /// Position of the next relevant timed initial.
     next_timed: usize,
     memo: Memo,
     best: Option<Best>,
@@ -35,20 +35,20 @@ pub(super) struct Run<'s, 'w> {
     watch: &'w mut dyn FnMut(&Progress) -> ControlFlow<()>,
 }
 
-/// The best order that was found.
+/// Best order found.
 pub(super) struct Best {
     pub(super) probability: f64,
     pub(super) sequence: Vec<NodeId>,
-    /// Of each happening, whether it comes at the same moment as the one before it.
+    /// For each happening, `true` if it comes at the same moment as the previous one.
     pub(super) joined: Vec<bool>,
 }
 
-/// Two probabilities closer than this, relatively, count as equal. It is more than what a bound is
-/// raised by against rounding; otherwise a bound would always promise a little more than there is.
+/// Relative difference below which two probabilities count as equal. It is more than the correction
+/// of bounds for rounding; otherwise a bound would always seem slightly better than the best order.
 pub(super) const TIE: f64 = 1e-11;
 
 impl<'s, 'w> Run<'s, 'w> {
-    /// With no happening yet.
+    /// Creates a search with an empty sequence.
     pub(super) fn new(
         search: &'s OrderSearch,
         circumstances: &Circumstances,
@@ -82,12 +82,12 @@ impl<'s, 'w> Run<'s, 'w> {
         })
     }
 
-    /// The best sequence, and the number of sequences examined.
+    /// Returns the best sequence, and the number of sequences examined.
     pub(super) fn finish(self) -> (Option<Best>, usize) {
         (self.best, self.sequences)
     }
 
-    /// Looks at one sequence, without what cannot be part of one from here.
+    /// Examines one sequence, without happenings that are impossible from here.
     pub(super) fn try_first(&mut self, sequence: &[NodeId]) -> Result<(), TooCoupled> {
         let mut done = Vec::new();
         for &node in sequence {
@@ -104,7 +104,7 @@ impl<'s, 'w> Run<'s, 'w> {
             if !can_be || !self.search.separations.may_follow(node, &is_placed) {
                 continue;
             }
-            // The goal may be reached before the end, and nothing else then.
+            // The goal may be reached before the end of the sequence.
             self.consider()?;
             // Happenings that need each other come at the same moment.
             let is_joined = self.network.is_open();
@@ -129,7 +129,7 @@ impl<'s, 'w> Run<'s, 'w> {
         Ok(())
     }
 
-    /// Looks at the sequence so far, and at all that begin with it.
+    /// Examines the current sequence, and all continuations.
     pub(super) fn explore(&mut self) -> Result<ControlFlow<()>, TooCoupled> {
         self.sequences += 1;
         work::spend(SEQUENCE_WORK);
@@ -181,13 +181,13 @@ impl<'s, 'w> Run<'s, 'w> {
         Ok(ControlFlow::Continue(()))
     }
 
-    /// The position among the timed initials that `node` itself has, if it is one.
+    /// Returns the position of `node` among the timed initials, if it is one.
     fn timed_before(&self, node: NodeId) -> usize {
         let is_timed = matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
         self.next_timed - usize::from(is_timed)
     }
 
-    /// Whether something within that bound could be better than the best so far.
+    /// Returns `true` if a sequence within that bound could be better than the best one.
     fn can_beat(&self, bound: Bound) -> bool {
         match &self.best {
             None => bound.probability > 0.0,
@@ -199,7 +199,7 @@ impl<'s, 'w> Run<'s, 'w> {
         }
     }
 
-    /// Keeps the sequence so far, if it is an order and better than the best.
+    /// Records the current sequence, if it is an order and better than the best one.
     fn consider(&mut self) -> Result<(), TooCoupled> {
         if !self.network.running().is_empty()
             || self.network.is_open()
@@ -237,8 +237,8 @@ impl<'s, 'w> Run<'s, 'w> {
         Ok(())
     }
 
-    /// The possible next happenings, regardless of time and probabilities; each with whether another one is to come at
-    /// the same moment.
+    /// Returns the possible next happenings, regardless of time and probabilities; `true` marks
+    /// those that another happening has to follow at the same moment.
     fn next(&self) -> Vec<(NodeId, bool)> {
         self.search.joinable(&self.network, self.next_nodes())
     }
@@ -272,9 +272,9 @@ impl<'s, 'w> Run<'s, 'w> {
         next
     }
 
-    /// Adds a happening to everything but the rooms; the bound of all that can follow, unless
-    /// the happening is impossible or the bound is not good enough. With `is_open`, another one is to come at the same
-    /// moment, unless nothing needs that.
+    /// Adds a happening to all data except the rooms. Returns the bound of all continuations, or
+    /// `None` if the happening is impossible or the bound is not good enough. With `is_open`,
+    /// another happening has to follow at the same moment, unless nothing needs that.
     fn push(&mut self, node: NodeId, is_open: bool) -> Result<Option<Bound>, TooCoupled> {
         let model = self.model;
         let event = model.event(node);
@@ -331,7 +331,8 @@ impl<'s, 'w> Run<'s, 'w> {
         self.nominal.undo_to(checkpoint);
     }
 
-    /// Returns `true` if the over-all conditions of the running actions hold, so that nothing need come at the same moment.
+    /// Returns `true` if the over-all conditions of the running actions hold, so that no happening
+    /// has to follow at the same moment.
     fn is_settled(&mut self) -> bool {
         let running = self.network.running();
         self.nominal.is_settled(self.model, running) && self.network.may_be_settled()
@@ -354,7 +355,7 @@ impl<'s, 'w> Run<'s, 'w> {
         )
     }
 
-    /// Whether a sequence that has done the same stands at least as well.
+    /// Returns `true` if an equivalent sequence dominates the current one.
     fn is_dominated(&mut self) -> bool {
         let has_timed = self.next_timed < self.search.separations.timed.len();
         let room = self.rooms.room(self.has_deadlines && has_timed);

@@ -1,4 +1,4 @@
-//! What the temporal constraints of a plan's happenings are, whatever their order.
+//! Temporal constraints between a plan's happenings, independent of their order.
 
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::Body;
@@ -8,24 +8,24 @@ use elbowroom_plan::{LinkKind, Node, NodeId};
 use crate::circumstances::Running;
 use crate::model::Model;
 
-/// The temporal constraints of a plan, computed once for all searches.
+/// Temporal constraints of a plan, computed once for all searches.
 #[derive(Clone, Debug)]
 pub(crate) struct Separations {
     pub(crate) epsilon: Rational,
-    /// Whether two nodes must be ε apart; symmetric.
+    /// `true` if two nodes must be ε apart; symmetric.
     apart: Vec<Vec<bool>>,
-    /// Whether anything must be ε apart from a node.
+    /// `true` if any node must be ε apart from the node.
     keeps_distance: Vec<bool>,
-    /// For each node, those that may not come after it.
+    /// For each node, the nodes that must not come after it.
     never_after: Vec<Vec<NodeId>>,
-    /// For each node, those that it may not come after.
+    /// For each node, the nodes that it must not come after.
     never_before: Vec<Vec<NodeId>>,
-    /// The timed initials that matter, in order of time.
+    /// Relevant timed initials, sorted by time.
     pub(crate) timed: Vec<(NodeId, Rational)>,
-    /// How many of them an order has: those up to the last that changes what the goal reads. The
-    /// goal counts after all timed initials.
+    /// Number of them in an order: those up to the last one that changes a fact or number of the
+    /// goal. The goal counts after all timed initials.
     pub(crate) timed_until_goal: usize,
-    /// By instance.
+    /// Durations by instance.
     pub(crate) durations: Vec<(Rational, Option<Rational>)>,
     pub(crate) starts: Vec<NodeId>,
     pub(crate) ends: Vec<NodeId>,
@@ -41,7 +41,7 @@ impl Separations {
             }
             Node::End(id) => {
                 let mut footprint = Footprint::of_end(task, &plan.instance(id).action);
-                // An end that fails writes what the failure leaves behind.
+                // A failed end writes the facts of its outcome.
                 let aftermaths = model.event(model.end(id)).aftermaths.iter();
                 for &(fact, becomes) in aftermaths.flat_map(|aftermath| &aftermath.changes) {
                     footprint.include_fact(model.facts[fact], becomes);
@@ -121,12 +121,12 @@ impl Separations {
         }
     }
 
-    /// Whether two happenings must be `epsilon` apart.
+    /// Returns `true` if two happenings must be `epsilon` apart.
     pub(crate) fn are_apart(&self, one: NodeId, other: NodeId) -> bool {
         self.apart[one.index()][other.index()]
     }
 
-    /// Whether `one` may come before `other`, as far as the plan's links say.
+    /// Returns `true` if the plan's links allow `one` to come before `other`.
     pub(crate) fn may_precede(&self, one: NodeId, other: NodeId) -> bool {
         !self.never_after[one.index()].contains(&other)
     }
@@ -135,12 +135,13 @@ impl Separations {
         self.apart.len()
     }
 
-    /// Whether anything must be `epsilon` apart from a happening.
+    /// Returns `true` if any node must be `epsilon` apart from a happening.
     pub(crate) fn keeps_distance(&self, node: NodeId) -> bool {
         self.keeps_distance[node.index()]
     }
 
-    /// By when a happening must be that is to come before the timed initials from `next_timed` on.
+    /// Returns the latest time of a happening that comes before the timed initials from
+    /// `next_timed` on.
     pub(crate) fn latest_before_timed(&self, node: NodeId, next_timed: usize) -> Option<Rational> {
         let to_come = self.timed.iter().enumerate().skip(next_timed);
         let latest = to_come.filter_map(|(index, (timed, time))| {
@@ -153,15 +154,15 @@ impl Separations {
         latest.min()
     }
 
-    /// When a timed initial literal is, if it is the next one; those that have passed, or are not
-    /// next, leave no time.
+    /// Returns the time of a timed initial if it is the next one. `None`: it has passed, or is not
+    /// the next one, so there is no schedule.
     pub(crate) fn time_of_next(&self, node: NodeId, next_timed: usize) -> Option<&Rational> {
         let (next, time) = self.timed.get(next_timed)?;
         (*next == node).then_some(time)
     }
 
-    /// The time at which the end of an action under way can be, at the earliest and at the latest.
-    /// One that is overdue has no latest end that could still be kept.
+    /// Returns the earliest and the latest end of a running action. An overdue action has no latest
+    /// end.
     pub(crate) fn end_of(&self, running: &Running, now: &Rational) -> (Rational, Option<Rational>) {
         let (least, greatest) = &self.durations[running.instance.index()];
         let earliest = (&running.start + least).max(now.clone());
@@ -169,18 +170,18 @@ impl Separations {
         (earliest, latest.filter(|latest| latest >= now))
     }
 
-    /// Whether no timed initial after `now` changes what the goal reads.
+    /// Returns `true` if no timed initial after `now` changes a fact or number of the goal.
     pub(crate) fn is_goal_settled(&self, now: &Rational) -> bool {
         let last = self.timed_until_goal.checked_sub(1);
         last.is_none_or(|last| self.timed[last].1 <= *now)
     }
 
-    /// Whether the clock matters, and not only time differences.
+    /// Returns `true` if absolute times matter, not only time differences.
     pub(crate) fn has_deadlines(&self, now: &Rational) -> bool {
         self.timed.iter().any(|(_, time)| time > now)
     }
 
-    /// Whether `node` may come after all of these.
+    /// Returns `true` if `node` may come after all placed nodes.
     pub(crate) fn may_follow(&self, node: NodeId, is_placed: &dyn Fn(NodeId) -> bool) -> bool {
         let before = &self.never_before[node.index()];
         !before.iter().any(|&other| is_placed(other))

@@ -1,13 +1,13 @@
-//! Instances that can stand for each other.
+//! Interchangeable instances.
 //!
-//! Three machines of one kind that wait for the same care: whatever order begins with the second
-//! has a twin, equally likely, that begins with the first. Of such instances only the first that is
-//! not used yet is tried, which keeps one order of each set of twins.
+//! Example: three machines of one kind need the same maintenance. Any order that begins with the
+//! second machine is as likely as a symmetric order that begins with the first one. Of such
+//! instances, only the first unused one is tried, which keeps one of each set of symmetric orders.
 //!
-//! Two instances are interchangeable if swapping them, and the facts that only they touch, changes
+//! Two instances are interchangeable if swapping them, and the facts that only they access, changes
 //! nothing: not the model (probabilities, conditions, effects, the goal), not durations and
-//! separations, and not the belief. What reads or writes numbers, or facts in other ways than one
-//! by one, is taken for unique.
+//! separations, and not the belief. Instances that read or write numbers, or read facts other than
+//! as single literals, are treated as unique.
 
 use elbowroom_plan::{InstanceId, NodeId};
 
@@ -16,32 +16,32 @@ use crate::circumstances::Circumstances;
 use crate::likelihoods::Rate;
 use crate::model::{Event, Model};
 
-/// The symmetries of a model, once for all searches.
+/// Symmetries of a model, computed once for all searches.
 #[derive(Clone, Debug)]
 pub(super) struct Symmetry {
-    /// For each instance, its class, and the facts that only it touches, in corresponding order.
+    /// For each instance, its class, and the facts that only it accesses, in corresponding order.
     instances: Vec<Option<(usize, Vec<usize>)>>,
 }
 
-/// A fact as an instance sees it.
+/// A fact from the viewpoint of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Seen {
     Shared(usize),
     Own(usize),
 }
 
-/// All that tells an instance from others, apart from the names of its own facts.
+/// Properties of an instance, independent of the names of its own facts.
 #[derive(Clone, Debug, PartialEq)]
 struct Signature {
     is_durative: bool,
     duration: (elbowroom_num::Rational, Option<elbowroom_num::Rational>),
     success: [f64; 3],
-    /// Conditions at start, throughout, at the end.
+    /// Conditions at start, over all, and at end.
     needs: [Vec<(Seen, bool)>; 3],
-    /// Effects at start and end: with their probability, and whether they cannot fail.
+    /// Effects at start and end, with their probability; `true` if they cannot fail.
     effects: [Vec<(Seen, bool, f64, bool)>; 2],
-    /// Of each own fact: how likely it flips, how often it changes with time, and what the
-    /// goal wants of it.
+    /// For each own fact: the probabilities of spontaneous changes, the rates of changes with time,
+    /// and its required value in the goal.
     own: Vec<(f64, f64, Rate, Option<bool>)>,
 }
 
@@ -80,7 +80,7 @@ impl Symmetry {
         }
     }
 
-    /// For each instance, the one that is to be used before it, if there is one.
+    /// Returns, for each instance, the one that has to be used before it, if there is one.
     pub(super) fn order(
         &self,
         model: &Model,
@@ -118,7 +118,7 @@ fn events_of(model: &Model, id: InstanceId) -> (bool, [&Event; 2]) {
     (start != end, [model.event(start), model.event(end)])
 }
 
-/// The facts that an instance reads one by one, or writes.
+/// Returns the facts that an instance reads as single literals, or writes.
 fn facts_of(model: &Model, id: InstanceId) -> Vec<usize> {
     let (_, events) = events_of(model, id);
     let mut facts: Vec<usize> = Vec::new();
@@ -135,7 +135,7 @@ fn facts_of(model: &Model, id: InstanceId) -> Vec<usize> {
     facts
 }
 
-/// An instance's signature and its own facts; `None` if it is taken for unique.
+/// Returns an instance's signature and its own facts; `None` if it is treated as unique.
 fn signature(
     model: &Model,
     separations: &Separations,
@@ -158,7 +158,7 @@ fn signature(
     }
     let [start, end] = events;
     let mut own: Vec<usize> = Vec::new();
-    // What is shared comes first, so that it does not matter where a fact's number lies.
+    // Shared facts come first, so that the result does not depend on the numbers of facts.
     let mut see = |fact: usize| {
         if !is_own(fact) {
             return Seen::Shared(fact);
@@ -212,7 +212,7 @@ fn signature(
 }
 
 impl Separations {
-    /// Whether separations stay the same when two instances are swapped.
+    /// Returns `true` if separations stay the same when two instances are swapped.
     fn are_swappable(&self, one: InstanceId, other: InstanceId) -> bool {
         let nodes = |id: InstanceId| [self.starts[id.index()], self.ends[id.index()]];
         let (ones, others) = (nodes(one), nodes(other));

@@ -1,4 +1,4 @@
-//! When the happenings of an order may and can be: its simple temporal network.
+//! Time windows of the happenings of an order, by its simple temporal network.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
@@ -10,23 +10,23 @@ use crate::model::Model;
 
 /// The whole network of an order, happening by happening.
 ///
-/// The search itself asks for less, and has a quicker answer ([`super::room::Rooms`]).
+/// The search itself needs less, and uses a faster method ([`super::room::Rooms`]).
 #[derive(Clone, Debug)]
 pub(super) struct Timing<'s> {
     separations: &'s Separations,
     network: ConsistentNetwork,
     zero: elbowroom_stn::NodeId,
-    /// The last happening, or now.
+    /// The last happening, or the present time.
     last: elbowroom_stn::NodeId,
     placed: Vec<(NodeId, elbowroom_stn::NodeId)>,
-    /// How many of these were before now.
+    /// Number of these in the past.
     past: usize,
-    /// The ends of the actions under way.
+    /// Ends of the running actions.
     pending: Vec<(InstanceId, elbowroom_stn::NodeId)>,
 }
 
 impl<'s> Timing<'s> {
-    /// The network without happenings; `None` if what is under way leaves no schedule.
+    /// Creates the network without happenings; `None` if the running actions leave no schedule.
     pub(super) fn new(separations: &'s Separations, circumstances: &Circumstances) -> Option<Self> {
         let mut network = ConsistentNetwork::new();
         let zero = network.add_node();
@@ -67,8 +67,8 @@ impl<'s> Timing<'s> {
         self.demand(Constraint::at_most(self.zero, node, time.clone()))
     }
 
-    /// Adds a happening, `next_timed` being the timed initials that have passed before it; `None`
-    /// if there is no time for it. With `is_joined` it comes at the same moment as the last one, or now.
+    /// Adds a happening. `next_timed` is the number of timed initials before it. Returns `None` if
+    /// there is no schedule. With `is_joined`, it comes at the same moment as the last one, or now.
     pub(super) fn push(
         &mut self,
         model: &Model,
@@ -91,7 +91,8 @@ impl<'s> Timing<'s> {
             self.demand(Constraint::at_most(self.last, own, Rational::ZERO))?;
         }
         let separations = self.separations;
-        // Whatever is before the last of those that must be apart is before it in time, too.
+        // Happenings before the last one that must be apart are earlier, so they need no
+        // constraint.
         let mut placed = self.placed.iter().rev();
         let last_apart = placed.find(|(other, _)| separations.are_apart(*other, node));
         if let Some(&(_, before)) = last_apart {
@@ -122,7 +123,7 @@ impl<'s> Timing<'s> {
         Some(())
     }
 
-    /// The time at which each happening of the order may and can be.
+    /// Returns the time window of each happening of the order.
     pub(super) fn windows(&self) -> Vec<(NodeId, Rational, Option<Rational>)> {
         let windows = self.network.windows(self.zero);
         let window = |(node, own): &(NodeId, elbowroom_stn::NodeId)| {

@@ -1,9 +1,9 @@
-//! What must hold before a happening, for something to hold after it.
+//! Regression: conditions before a happening that are needed for conditions after it.
 //!
 //! The layers are those of the pruned network: a fact that an effect sets is not needed before it,
-//! and a fact that is needed later is needed in all layers between. What couples facts, and what
-//! reads numbers, is carried backwards by substitution. A condition on a number that changes
-//! continuously in between is not carried any further.
+//! and a fact that is needed later is needed in all layers between. Conditions that couple facts or
+//! read numbers are regressed by substitution. A condition on a number that changes continuously in
+//! between is not regressed any further.
 
 use std::collections::BTreeSet;
 
@@ -14,15 +14,15 @@ use elbowroom_plan::{InstanceId, NodeId};
 use super::Layer;
 use crate::model::{Event, Model, Requirement, is_fact};
 
-/// The regressed conditions of one layer.
+/// Regressed conditions of one layer.
 #[derive(Clone, Debug, Default)]
 struct Needed {
     literals: BTreeSet<(usize, bool)>,
     conditions: Vec<Condition>,
 }
 
-/// The layers of a sequence; `under_way` has the actions under way in each. In layers between happenings of one moment,
-/// over-all conditions are not required.
+/// Returns the layers of a sequence; `under_way` has the running actions of each. In layers between
+/// happenings of one moment, over-all conditions are not required.
 pub(super) fn layers(
     model: &Model,
     (sequence, joined): (&[NodeId], &[bool]),
@@ -58,7 +58,7 @@ impl Needed {
         }
     }
 
-    /// The conditions on arrival at a happening.
+    /// Returns the conditions on arrival at a happening.
     fn before(&self, model: &Model, event: &Event) -> Self {
         let mut before = Self::default();
         for &(fact, truth) in &self.literals {
@@ -105,7 +105,7 @@ impl Needed {
     }
 }
 
-/// When a fact is true after a happening, in terms of what holds before it.
+/// Returns the condition before a happening under which a fact is true after it.
 fn after(model: &Model, event: &Event, fact: FactId) -> Condition {
     let Some(position) = model.position(fact) else {
         return Condition::Fact(fact);
@@ -131,7 +131,7 @@ fn after(model: &Model, event: &Event, fact: FactId) -> Condition {
     Condition::Or(either)
 }
 
-/// The condition before a happening; `None` if it cannot be carried backwards.
+/// Returns the condition before a happening; `None` if it cannot be regressed.
 fn regressed(model: &Model, event: &Event, condition: &Condition) -> Option<Condition> {
     let of_all = |parts: &[Condition]| {
         let parts = parts.iter();
@@ -146,7 +146,7 @@ fn regressed(model: &Model, event: &Event, condition: &Condition) -> Option<Cond
             if basic.as_slice() == [*fact] {
                 after(model, event, *fact)
             } else {
-                // A derived fact: unchanged if nothing that it rests on is.
+                // A derived fact is unchanged if all facts that it depends on are unchanged.
                 let is_touched = |fact: &FactId| {
                     let position = model.position(*fact);
                     event
@@ -184,10 +184,11 @@ fn regressed(model: &Model, event: &Event, condition: &Condition) -> Option<Cond
     })
 }
 
-/// A number's value cannot be told from what is known before.
+/// The value of a number cannot be determined from values before.
 struct Lost;
 
-/// A fluent's value after a happening in terms of what is known before; `None` if it is the same.
+/// Returns a fluent's value after a happening as an expression over values before; `None` if it
+/// does not change.
 fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<Expression>, Lost> {
     let Some(position) = model.fluent_position(fluent) else {
         return Ok(None);
@@ -232,8 +233,8 @@ fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<
     Ok(value)
 }
 
-/// The condition without what only the network remembers: an effect that depends on it is taken
-/// for one that takes place.
+/// Returns the condition without memories, which only the network has: an effect that depends on
+/// one is assumed to take place.
 fn without_memories(condition: &Condition) -> Condition {
     let of_all = |parts: &[Condition]| parts.iter().map(without_memories).collect();
     match condition {

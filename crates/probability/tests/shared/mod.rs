@@ -1,5 +1,5 @@
-//! The authors' domains and likelihoods, and the plans the experiments began with. Tests that need
-//! files beside the repository say so and pass where they are absent.
+//! The authors' domains and likelihoods, and the first plans of the experiments. Tests that need
+//! files outside of the repository report if these are missing, and pass.
 #![allow(dead_code, reason = "each test uses some of it")]
 
 #[path = "../../../../testing/skipped.rs"]
@@ -45,7 +45,7 @@ impl Published {
     }
 }
 
-/// The folder of the authors' data, if it is there.
+/// Returns the folder of the authors' data, if it exists.
 pub(crate) fn data() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/olisipo");
     if folder.is_dir() {
@@ -55,12 +55,12 @@ pub(crate) fn data() -> Option<PathBuf> {
     None
 }
 
-/// SF3 p1–p10.
+/// Returns SF3 p1–p10.
 pub(crate) fn sf3() -> Vec<Published> {
     published("sf3", "domain_simple_factory_robot.pddl", SF3_PLAN, 10)
 }
 
-/// AF3 p1–p8.
+/// Returns AF3 p1–p8.
 pub(crate) fn af3() -> Vec<Published> {
     published("af3", "domain_adv_factory_robot.pddl", AF3_PLAN, 8)
 }
@@ -93,7 +93,7 @@ fn file(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// A task, and the partial order of a plan for it.
+/// Returns a task, and the partial order of a plan for it.
 pub(crate) fn read_task(domain: &str, problem: &str, plan: &str) -> (Task, PartialOrderPlan) {
     let domain = Source::new("domain.pddl", domain);
     let problem = Source::new("problem.pddl", problem);

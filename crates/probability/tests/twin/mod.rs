@@ -1,5 +1,5 @@
-//! Plainly right counterparts: the process of `docs/probability.md` with every world spelt out,
-//! and all orders tried one after the other.
+//! Simple reference implementations: the process of `docs/probability.md` with all worlds
+//! enumerated, and the enumeration of all orders.
 #![allow(dead_code, reason = "each test uses some of it")]
 
 pub(crate) mod orders;
@@ -17,14 +17,14 @@ use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
 use elbowroom_probability::likelihoods::Failing;
 use elbowroom_probability::{Circumstances, Flip, Likelihoods, Semantics};
 
-/// A world: which facts hold, and which end effects of running actions will take place.
+/// A world: the true facts, and the end effects of running actions that will take place.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct World {
     facts: Vec<bool>,
     memories: BTreeMap<(InstanceId, usize), bool>,
 }
 
-/// All worlds that are possible after an order, with how likely they are.
+/// All possible worlds after an order, with their probabilities.
 #[derive(Clone, Debug)]
 pub(crate) struct Worlds<'a> {
     task: &'a Task,
@@ -34,9 +34,9 @@ pub(crate) struct Worlds<'a> {
     values: BTreeMap<FluentId, Rational>,
     running: Vec<InstanceId>,
     possible: Vec<(World, f64)>,
-    /// In seconds.
+    /// Present time in seconds.
     now: f64,
-    /// When the actions under way end.
+    /// Ends of the running actions.
     ends: BTreeMap<InstanceId, f64>,
 }
 
@@ -95,12 +95,12 @@ impl<'a> Worlds<'a> {
         all
     }
 
-    /// P(A) so far.
+    /// Returns P(A).
     pub(crate) fn actions_probability(&self) -> f64 {
         self.possible.iter().map(|(_, weight)| weight).sum()
     }
 
-    /// P(A ∩ G) so far.
+    /// Returns P(A ∩ G).
     pub(crate) fn success_probability(&self) -> f64 {
         let goal = self.task.goal();
         let worlds = self.possible.iter();
@@ -118,7 +118,7 @@ impl<'a> Worlds<'a> {
         self.plan.duration(id).0.to_f64()
     }
 
-    /// Seconds pass until the happening, which is as early as it can be.
+    /// Advances the time to the happening, which is as early as possible.
     fn pass(&mut self, node: NodeId) {
         let due = match self.plan.nodes[node.index()] {
             Node::End(id) => self.ends[&id],
@@ -156,7 +156,7 @@ impl<'a> Worlds<'a> {
                     (rate.becomes_true, rate.becomes_false)
                 };
                 if held.contains(&(fact, truth)) {
-                    // Not even for a moment.
+                    // The fact must not change, not even temporarily.
                     *after.entry(world).or_insert(0.0) += weight * (-away * seconds).exp();
                     continue;
                 }
@@ -178,7 +178,7 @@ impl<'a> Worlds<'a> {
         self.look_throughout();
     }
 
-    /// The facts that a condition asks for one by one.
+    /// Collects the literals of a condition.
     fn literals(&self, condition: &Condition, all: &mut Vec<(FactId, bool)>) {
         match condition {
             Condition::And(parts) => parts.iter().for_each(|part| self.literals(part, all)),
@@ -195,8 +195,8 @@ impl<'a> Worlds<'a> {
         self.push_as(node, (false, false));
     }
 
-    /// A happening, and whether it comes at the same moment as the one before it and as the next one. Nothing is required
-    /// throughout actions in between.
+    /// Adds a happening that may come at the same moment as the previous one or the next one. No
+    /// over-all condition is required in between.
     pub(crate) fn push_as(&mut self, node: NodeId, (is_joined, is_open): (bool, bool)) {
         if !is_joined {
             self.pass(node);
@@ -266,7 +266,7 @@ impl<'a> Worlds<'a> {
         success.map_or_else(Failing::default, |success| success.failing.clone())
     }
 
-    /// An action is no longer under way.
+    /// Removes a running action.
     fn is_over(&mut self, id: InstanceId) {
         self.running.retain(|running| *running != id);
         for (world, _) in &mut self.possible {
@@ -274,7 +274,7 @@ impl<'a> Worlds<'a> {
         }
     }
 
-    /// An end that could succeed, and does not; it is not pushed. Numbers only change if the end
+    /// Applies a failed end whose conditions hold; it is not pushed. Numbers only change if the end
     /// takes place.
     fn fail_at_end(&mut self, node: NodeId, id: InstanceId) {
         self.pass(node);
@@ -314,7 +314,8 @@ impl<'a> Worlds<'a> {
                 let was = set.map_or(world.facts[index], |(_, truth)| *truth);
                 let flip = self.likelihoods.flip(self.task, fact).unwrap();
                 let p = f64::from(u8::from(was));
-                // What is set is an effect: in the paper's network it does not change as well.
+                // A set fact has an effect: in the paper's network it does not also change by
+                // itself.
                 let stays = set.is_some() && self.semantics == Semantics::Paper;
                 let p = if stays { p } else { flip.after(p) };
                 worlds = worlds
@@ -338,7 +339,7 @@ impl<'a> Worlds<'a> {
         self.look_throughout();
     }
 
-    /// A start, or an end, that could succeed, and does not; it is not pushed.
+    /// Applies a failed start or end whose conditions hold; it is not pushed.
     pub(crate) fn fail(&mut self, node: NodeId) {
         if let Node::End(id) = self.plan.nodes[node.index()] {
             return self.fail_at_end(node, id);
@@ -399,7 +400,7 @@ impl<'a> Worlds<'a> {
         }
     }
 
-    /// The worlds after a snap action, with effects and what happens by itself.
+    /// Returns the worlds after a snap action, with its effects and spontaneous changes.
     fn outcomes(
         &self,
         id: InstanceId,
@@ -452,7 +453,7 @@ impl<'a> Worlds<'a> {
         outcomes
     }
 
-    /// P(true afterwards) of a fact that was true with probability 0 or 1.
+    /// Returns P(true afterwards) of a fact that was true with probability 0 or 1.
     fn chance(&self, was: f64, adds: &[f64], deletes: &[f64], flip: Flip) -> f64 {
         let none = |of: &[f64]| of.iter().map(|p| 1.0 - p).product::<f64>();
         match self.semantics {
@@ -470,7 +471,7 @@ impl<'a> Worlds<'a> {
         }
     }
 
-    /// What must hold throughout, and what end effects depend on throughout.
+    /// Applies over-all conditions, and updates end effects that depend on them.
     fn look_throughout(&mut self) {
         let mut worlds = std::mem::take(&mut self.possible);
         for &id in &self.running {

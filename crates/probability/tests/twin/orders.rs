@@ -1,4 +1,4 @@
-//! All orders, one after the other.
+//! Enumeration of all orders.
 
 use elbowroom_model::Footprint;
 use elbowroom_plan::{Node, NodeId};
@@ -10,13 +10,13 @@ use super::random::Case;
 /// An order.
 pub(crate) struct Order {
     pub(crate) sequence: Vec<NodeId>,
-    /// `true` if happenings of it come at one moment.
+    /// `true` if it has happenings at one moment.
     pub(crate) has_joined: bool,
     /// P(A ∩ G).
     pub(crate) probability: f64,
 }
 
-/// All orders, as [`best`] counts them.
+/// Returns all orders, as [`best`] counts them.
 pub(crate) fn all(case: &Case, semantics: Semantics, search: &OrderSearch) -> Vec<Order> {
     let certain = Likelihoods::certain();
     let worlds = |likelihoods, semantics| {
@@ -33,10 +33,10 @@ pub(crate) fn all(case: &Case, semantics: Semantics, search: &OrderSearch) -> Ve
     orders
 }
 
-/// The best P(A ∩ G) of all orders, and how many happenings the shortest of those that are as
-/// likely has. Only those count for which there is time, which is asked of the network as a whole,
-/// and those that work nominally if the settings ask for it. Of these, happenings may come at one moment if over-all
-/// conditions may not hold in between.
+/// Returns the best P(A ∩ G) of all orders, and the length of the shortest one with this
+/// probability. An order counts if the whole network has a schedule, and, if the settings require
+/// it, if it works nominally. Happenings may come at one moment if over-all conditions may not hold
+/// in between.
 ///
 /// Without `may_join`, only orders without joined happenings count.
 pub(crate) fn best(orders: &[Order], may_join: bool) -> Option<(f64, usize)> {
@@ -132,8 +132,9 @@ fn extend(
     }
 }
 
-/// The goal counts after all timed initials: those to come that change what it reads belong to an
-/// order, and an order ends with no other ones.
+/// Returns `true` if timed initials allow an order to end here. The goal counts after all timed
+/// initials. Pending ones that change a fact or number of the goal belong to an order, and an order
+/// does not end with other ones.
 fn may_be_over(case: &Case, sequence: &[NodeId]) -> bool {
     let goal = Footprint::of_condition(&case.task, case.task.goal());
     let concerns_goal =

@@ -1,4 +1,4 @@
-//! Small random problems with everything that conditions and effects can be.
+//! Small random problems with all kinds of conditions and effects.
 
 use std::fmt::Write;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use elbowroom_probability::{Circumstances, Likelihoods, Running};
 use rand::Rng;
 use rand::seq::IndexedRandom;
 
-/// What may occur.
+/// Features that may occur.
 #[allow(clippy::struct_excessive_bools, reason = "each is a taste of its own")]
 #[derive(Clone, Copy)]
 pub(crate) struct Taste {
@@ -37,14 +37,14 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// All facts.
+    /// Returns all facts.
     pub(crate) fn facts(&self) -> impl Iterator<Item = FactId> {
         let count = u32::try_from(self.task.fact_count()).expect("a small case");
         (0..count).map(FactId)
     }
 
-    /// The effects of a snap action on facts: which fact, whether it becomes true, and how likely
-    /// the effect takes place.
+    /// Returns the effects of a snap action on facts: the fact, `true` if it becomes true, and the
+    /// probability that the effect takes place.
     pub(crate) fn fact_effects(
         &self,
         action: &Action,
@@ -230,7 +230,7 @@ fn effects(rng: &mut impl Rng, taste: Taste) -> String {
     text
 }
 
-/// Probabilities, with the extremes often enough.
+/// Generates a probability; the extremes are frequent.
 fn probability(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..6) {
         0 => 0.0,
@@ -268,7 +268,7 @@ fn likelihoods(rng: &mut impl Rng, task: &Task) -> Likelihoods {
     likelihoods
 }
 
-/// The same case, with actions that fail at their ends.
+/// Returns the case with actions that fail at their ends.
 pub(crate) fn with_failing_ends(rng: &mut impl Rng, mut case: Case) -> Case {
     for success in case.likelihoods.schemas.values_mut() {
         success.failing = Failing {
@@ -287,7 +287,7 @@ pub(crate) fn with_failing_ends(rng: &mut impl Rng, mut case: Case) -> Case {
     case
 }
 
-/// The same case, with one or two outcomes of each failure, as far as there are facts.
+/// Returns the case with one or two outcomes of each failure, if there are enough facts.
 pub(crate) fn with_outcomes(rng: &mut impl Rng, mut case: Case) -> Case {
     let predicates: Vec<PredicateId> = (0..case.task.problem().predicates.len())
         .map(PredicateId::from)
@@ -315,7 +315,7 @@ pub(crate) fn with_outcomes(rng: &mut impl Rng, mut case: Case) -> Case {
     case
 }
 
-/// The same case, with actions that fail while they are under way.
+/// Returns the case with actions that fail while they are running.
 pub(crate) fn failing_in_time(rng: &mut impl Rng, mut case: Case) -> Case {
     for success in case.likelihoods.schemas.values_mut() {
         success.failing.during_per_second = Some(probability(rng) * 0.2);
@@ -323,7 +323,7 @@ pub(crate) fn failing_in_time(rng: &mut impl Rng, mut case: Case) -> Case {
     case
 }
 
-/// The same case, with facts that also change with time.
+/// Returns the case with facts that also change with time.
 pub(crate) fn in_time(rng: &mut impl Rng, mut case: Case) -> Case {
     for flip in case.likelihoods.predicates.values_mut() {
         flip.becomes_true_per_second = Some(probability(rng) * 0.2);
@@ -353,7 +353,7 @@ fn circumstances(rng: &mut impl Rng, task: &Task, plan: &PartialOrderPlan) -> Ci
     circumstances
 }
 
-/// A random order, with every action under way ended in the end.
+/// Generates a random order with the ends of all running actions.
 pub(crate) fn order(rng: &mut impl Rng, case: &Case) -> Vec<NodeId> {
     let mut running: Vec<InstanceId> = case
         .circumstances

@@ -1,19 +1,19 @@
-//! The part of a certificate that proves that the box is inside the envelope.
+//! Part of a certificate that proves that the box is inside the envelope.
 
 use serde::{Deserialize, Serialize};
 
 use super::{End, Exact};
 
-/// Why the box is inside the envelope.
+/// Proof that the box is inside the envelope.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sound {
-    /// The ends of the box that are infinite; the others are as far out as the slacks say.
+    /// Ends of the box that are infinite. The slacks give the others.
     pub endless: Vec<Endless>,
-    /// Why there are times for all points, as the guarantee demands.
+    /// Proof that all points can be scheduled, as the guarantee requires.
     pub control: Control,
-    /// Why each condition of the plan holds in every schedule for values in the box; none if that
-    /// is taken for granted.
+    /// Proofs that each condition of the plan holds in every schedule for values in the box; `None`
+    /// if this is assumed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub conditions: Option<Vec<Condition>>,
 }
@@ -24,22 +24,22 @@ pub struct Sound {
 pub struct Endless {
     /// The parameter, by position.
     pub parameter: usize,
-    /// Which end of its interval.
+    /// End of its interval.
     pub end: End,
 }
 
-/// Why there are times for all points, whatever the values in the box are.
+/// Proof that all points can be scheduled for all values in the box.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Control {
-    /// These do, for the strong guarantee: of each point that the executor chooses its time, and
-    /// nothing for one that the world decides on.
+    /// Fixed times, for the strong guarantee: one for each point that the executor schedules,
+    /// `None` for points that the world decides.
     Times(Vec<Option<Exact>>),
-    /// Rules, for an executor that knows all values: the first case is split into the others.
+    /// Rules, for an executor that knows all values. The first case is split into the others.
     Schedules(Vec<Schedules>),
-    /// A network that an executor can keep to that learns the values as they come about.
+    /// A network that an executor can satisfy while it observes the values during execution.
     Strategy(Strategy),
-    /// No proof: it is taken for granted.
+    /// No proof: the property is assumed.
     Assumed,
 }
 
@@ -47,16 +47,16 @@ pub enum Control {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Schedules {
-    /// Those in the first case are for a parameter at its least value, those in the second one for
-    /// it at its greatest. Between a schedule for the one and a schedule for the other lie schedules
-    /// for all values between, because everything is linear.
+    /// The first case is for the least value of the parameter, the second one for its greatest
+    /// value. For a value between them, interpolating between the two schedules gives a schedule,
+    /// because all constraints are linear.
     Split {
         /// The parameter, by position.
         parameter: usize,
         /// The cases, by position.
         cases: [usize; 2],
     },
-    /// Of each point how its time depends on the values.
+    /// Time of each point as a function of the values.
     Rule(Vec<Affine>),
 }
 
@@ -64,33 +64,33 @@ pub enum Schedules {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Affine {
-    /// What depends on no value.
+    /// Constant term.
     #[serde(with = "crate::number")]
     pub constant: elbowroom_num::Rational,
-    /// What values count.
+    /// Terms in values of parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Factor>,
 }
 
-/// What the value of a parameter counts.
+/// Term of an [`Affine`] function: a parameter with its factor.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Factor {
     /// The parameter, by position.
     pub parameter: usize,
-    /// How often it counts.
+    /// Factor.
     #[serde(with = "crate::number")]
     pub factor: elbowroom_num::Rational,
 }
 
-/// What an executor has to keep to beside the network's own bounds, so that what an event means for
-/// the future shows at the points next to it.
+/// Bounds that an executor has to satisfy in addition to those of the network. With them, the
+/// effect of an event on the future shows in the bounds on its neighbouring points.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Strategy {
-    /// Bounds on differences.
+    /// Bounds on differences of times.
     pub edges: Vec<Edge>,
-    /// Points that wait.
+    /// Conditional bounds.
     pub waits: Vec<Wait>,
 }
 
@@ -107,7 +107,7 @@ pub struct Edge {
     pub most: elbowroom_num::Rational,
 }
 
-/// A point that waits for the end of a duration, but not longer than `delay` after its beginning.
+/// A point that waits for the end of a duration, but at most for `delay` after its start.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wait {
@@ -115,28 +115,29 @@ pub struct Wait {
     pub point: usize,
     /// The duration, by the position of its constraint.
     pub duration: usize,
-    /// For how long at most; none for however long the duration takes.
+    /// Longest wait; `None` if the point waits until the duration ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delay: Option<Exact>,
 }
 
-/// A condition of the plan, with all ways in which it could fail.
+/// A condition of the plan, with all possible violations.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// What has to hold, in words.
+    /// The condition, in words.
     pub why: String,
-    /// For what has to hold throughout: between which points. It fails at some moment strictly between
-    /// these, whose time is that of one point more than there are.
+    /// For an over-all condition: the start and the end point of its action. It fails at some
+    /// moment strictly between these. The moment is an additional point, with the position after
+    /// the last point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub during: Option<[usize; 2]>,
-    /// Why it cannot fail: the first case is split into the others. Without any, that is taken for
-    /// granted.
+    /// Proof that the condition cannot fail. The first case is split into the others. If there are
+    /// none, the condition is assumed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cases: Vec<Failing>,
 }
 
-/// Why a condition cannot fail, in one case.
+/// Proof that a condition cannot fail, in one case.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Failing {
@@ -147,13 +148,13 @@ pub enum Failing {
         /// The cases, by position.
         cases: [usize; 2],
     },
-    /// There is no such moment: a sum of bounds and differences that cannot be.
+    /// There is no such moment: a contradictory sum of bounds and differences.
     Never(Vec<Summand>),
-    /// It could fail in these ways, none of which is possible.
+    /// Possible violations, each refuted.
     Ways(Vec<Way>),
 }
 
-/// One way in which a condition could fail: all of these at once.
+/// Possible violation of a condition: all of these inequalities hold.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Way {
@@ -163,15 +164,15 @@ pub struct Way {
     /// Other inequalities.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inequalities: Vec<Inequality>,
-    /// Parameters that are multiplied in the inequalities: there is a sum for each combination of
-    /// their ends, the last parameter's ends first.
+    /// Parameters that are multiplied in the inequalities. There is a sum for each combination of
+    /// their ends; the ends of the last parameter vary fastest.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub corners: Vec<usize>,
-    /// Why that cannot be: sums of bounds, differences and inequalities.
+    /// Refutation: sums of bounds, differences and inequalities.
     pub sums: Vec<Vec<Summand>>,
 }
 
-/// `time of to - time of from <= most`, or less than that.
+/// `time of to - time of from <= most`, or `<` if strict.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Difference {
@@ -182,58 +183,58 @@ pub struct Difference {
     /// The greatest difference.
     #[serde(with = "crate::number")]
     pub most: elbowroom_num::Rational,
-    /// Whether it is less than that.
+    /// `true` if the inequality is strict.
     #[serde(default, skip_serializing_if = "is_no")]
     pub strict: bool,
 }
 
-/// `constant + Σ factor · time + Σ factor · value + Σ factor · value · time or value <= 0`, or less
-/// than 0.
+/// `constant + Σ factor · time + Σ factor · value + Σ factor · value · time or value <= 0`, or `<
+/// 0` if strict.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Inequality {
-    /// What depends on nothing.
+    /// Constant term.
     #[serde(with = "crate::number")]
     pub constant: elbowroom_num::Rational,
-    /// What times count.
+    /// Terms in times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub times: Vec<Timed>,
-    /// What values count.
+    /// Terms in values of parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Factor>,
-    /// What products count.
+    /// Terms in products.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub products: Vec<Product>,
-    /// Whether it is less than 0.
+    /// `true` if the inequality is strict.
     #[serde(default, skip_serializing_if = "is_no")]
     pub strict: bool,
 }
 
-/// What the time of a point counts.
+/// Term in the time of a point.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Timed {
     /// The point.
     pub point: usize,
-    /// How often it counts.
+    /// Factor.
     #[serde(with = "crate::number")]
     pub factor: elbowroom_num::Rational,
 }
 
-/// What a product counts.
+/// Term in a product of a parameter.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Product {
     /// The parameter, by position.
     pub parameter: usize,
-    /// What its value is multiplied by.
+    /// Second factor of the product.
     pub by: Multiplied,
-    /// How often the product counts.
+    /// Constant factor.
     #[serde(with = "crate::number")]
     pub factor: elbowroom_num::Rational,
 }
 
-/// What a value is multiplied by.
+/// Second factor of a product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Multiplied {
@@ -243,13 +244,13 @@ pub enum Multiplied {
     Parameter(usize),
 }
 
-/// An inequality that is added, and how often.
+/// An inequality that is added, with its multiplier.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Summand {
-    /// Which inequality.
+    /// The inequality.
     pub of: Ground,
-    /// How often; positive.
+    /// Multiplier; positive.
     #[serde(with = "crate::number")]
     pub factor: elbowroom_num::Rational,
 }
@@ -264,13 +265,14 @@ pub enum Ground {
     Least(usize),
     /// The upper bound of the constraint at this position.
     Most(usize),
-    /// This difference: those of the moment and its place first, then those of the way.
+    /// The difference at this position: first those of the moment and its case, then those of the
+    /// violation.
     Difference(usize),
-    /// This inequality of the way.
+    /// The inequality of the violation at this position.
     Inequality(usize),
 }
 
-/// What need not be said.
+/// Returns `true` if the field is omitted from the output.
 #[allow(
     clippy::trivially_copy_pass_by_ref,
     reason = "serde hands references out"

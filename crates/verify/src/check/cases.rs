@@ -1,4 +1,4 @@
-//! Cases, one of which holds, and what follows in each.
+//! Case distinctions, and the bound that follows in each case.
 
 use elbowroom_num::Rational;
 
@@ -7,15 +7,15 @@ use crate::certificate::{Case, Multiplier, Reasons, Source, Total};
 use crate::flaw::Flaw;
 use crate::probability::Span;
 
-/// A case that is still to be looked at: its place, the inequalities that hold in it, by proof and
-/// position, and where the variables lie.
+/// Unprocessed case: its position, the inequalities that hold in it (proof and position), and the
+/// spans of the variables.
 type Open = (usize, Vec<(usize, usize)>, Vec<Span>);
 
-/// The bound on the objective that follows from a sum, what variables count in it, and where they lie.
+/// Computes the bound on the objective from a sum, the factors of variables in it, and their spans.
 type Follows<'a> = dyn Fn(&Total, &[Rational], &[Span]) -> Option<Rational> + 'a;
 
 impl Checker<'_> {
-    /// Where the variables lie before any case is split.
+    /// Returns the spans of the variables before any split.
     fn spans(&self) -> Vec<Span> {
         let is_probability = matches!(self.certificate.reasons, Reasons::Probability(_));
         let spans = self.scales.iter().map(|scale| Span {
@@ -30,7 +30,7 @@ impl Checker<'_> {
         spans
     }
 
-    /// Where the variables lie in the two parts of a case.
+    /// Returns the spans of the variables in the two parts of a split.
     fn parts(
         &self,
         variable: usize,
@@ -52,7 +52,7 @@ impl Checker<'_> {
         Ok([nearer, farther])
     }
 
-    /// Of each case where the variables lie in it; `None` for one that is not reached.
+    /// Returns, for each case, the spans of the variables; `None` if the case is not reached.
     pub(super) fn spans_of(&self, cases: &[Case]) -> Result<Vec<Option<Vec<Span>>>, Flaw> {
         let mut all: Vec<Option<Vec<Span>>> = vec![None; cases.len()];
         let mut open = vec![(0, self.spans())];
@@ -80,8 +80,8 @@ impl Checker<'_> {
         Ok(all)
     }
 
-    /// That one of these cases holds, and the greatest of their bounds, each of which follows from
-    /// what its inequalities add up to.
+    /// Checks that the cases are exhaustive, and returns the greatest of their bounds. The bound of
+    /// a case follows from the sum of its inequalities.
     pub(super) fn cases(&self, cases: &[Case], follows: &Follows<'_>) -> Result<Rational, Flaw> {
         let mut bound: Option<Rational> = None;
         let mut is_seen = vec![false; cases.len()];
@@ -143,11 +143,11 @@ impl Checker<'_> {
         if let Some(index) = is_seen.iter().position(|is_seen| !is_seen) {
             return Err(Flaw::Tree(index));
         }
-        // With nothing possible there would be no box, not even the nominal values.
+        // If all cases were impossible, there would be no box, not even the nominal values.
         bound.ok_or(Flaw::Sum(0))
     }
 
-    /// The sum of inequalities, each times its multiplier.
+    /// Returns the sum of inequalities, each times its multiplier.
     pub(super) fn sum(
         &self,
         case: usize,

@@ -9,13 +9,13 @@ use crate::flaw::Flaw;
 use crate::intervals::Intervals;
 use crate::sound::{Affine, Schedules};
 
-/// The limit on the times that are looked at, all cases together.
+/// Largest number of times to check, for all cases together.
 const MOST_TIMES: usize = 1_000_000;
 
 /// Checks that the cases have a schedule for all values in the box.
 ///
 /// # Errors
-/// The first thing that is not so.
+/// The first flaw.
 pub(super) fn check(
     certificate: &Certificate,
     intervals: &Intervals,
@@ -57,7 +57,7 @@ pub(super) fn check(
     }
 }
 
-/// Checks that times which depend on the values satisfy everything, whatever the values are.
+/// Checks that the times, as functions of the values, satisfy all constraints for all values.
 fn rule(certificate: &Certificate, intervals: &Intervals, times: &[Affine]) -> Result<(), Flaw> {
     for (point, time) in times.iter().enumerate() {
         let is_zero = time.constant.is_zero() && time.parameters.is_empty();
@@ -101,7 +101,7 @@ impl Sum {
         self
     }
 
-    /// Less so many times a limit; `None` if there is no limit.
+    /// Subtracts `sign` times a limit. Returns `None` if there is no limit.
     fn less(mut self, limit: &Limit, sign: i64) -> Option<Self> {
         match limit {
             Limit::None => return None,

@@ -1,23 +1,30 @@
-//! A closed network, for the dynamic guarantee.
+//! Closed networks, for the dynamic guarantee.
 //!
-//! Take bounds on differences as *edges* (`to - from <= bound`), and waits as edges from the point
-//! that waits to the beginning of the duration, labelled with it. The network, the edges and the
-//! waits are checked to be closed: where an edge that is not negative, or the shortest way from a
-//! duration's beginning to its end, is followed by a negative edge or a wait, there is an edge (or a
-//! wait for the same end) beside the two that is no longer than both. Waits are longer than the
-//! duration takes at least, so each has an edge beside it that counts minus that. No two of them lead
-//! back to where they begin with a negative sum, and the negative ones alone form no circle.
+//! A bound on a difference is an *edge* (`to - from <= bound`). A wait is an edge from the waiting
+//! point to the start of the duration, labelled with the duration. The check establishes three
+//! properties:
 //!
-//! That is enough for dynamic controllability (with reactions at once). By Morris & Muscettola
-//! (2005), the network is controllable if applying their reduction rules again and again leads to
-//! no negative cycle, all labels disregarded. All that the rules lead to is no shorter than some way
-//! in the closed network: such a way can be shortened, pair by pair, until its negative edges come
-//! first, and then the rule's own pair is one of those that were checked. (Where a rule takes a label
-//! away from what is no longer than the least duration, the edge beside the wait is no longer either,
-//! because only negative edges are left before it. The shortest duration followed by the edge beside a wait
-//! for its own end adds up to zero, so that nothing is lost by leaving out both.) And a negative cycle
-//! of the closed network, shortened in the same way, would leave one pair that leads back with a
-//! negative sum, or a circle of negative edges.
+//! - The network, the edges and the waits are closed. Take a first edge that is not negative, or
+//!   the edge from a duration's start to its end with the least duration. Follow it by a negative
+//!   edge or a wait. Then there is a single edge (or a wait for the same end) from the first to the
+//!   last point that is no longer than the two.
+//! - No such pair leads back to its first point with a negative sum.
+//! - The negative edges alone form no cycle.
+//!
+//! Waits that are no longer than the least duration are not used. So each wait implies an edge with
+//! minus the least duration.
+//!
+//! These properties are sufficient for dynamic controllability (with immediate reactions). By
+//! Morris & Muscettola (2005), the network is controllable if repeated application of their
+//! reduction rules leads to no negative cycle, all labels disregarded. Every edge that the rules
+//! derive is no shorter than some path in the closed network. Such a path can be shortened, pair by
+//! pair, until its negative edges come first; the pair that the rule combines is then one of the
+//! checked pairs. (A rule that removes a label from a wait that is no longer than the least
+//! duration derives nothing shorter than the edge that the wait implies, because only negative
+//! edges remain before it. The least duration followed by the edge implied by a wait for its own
+//! end adds up to zero, so both can be omitted.) A negative cycle of the closed network, shortened
+//! in the same way, would leave one pair that leads back with a negative sum, or a cycle of
+//! negative edges.
 
 use std::collections::BTreeMap;
 
@@ -30,10 +37,10 @@ use crate::intervals::Intervals;
 use crate::network::{duration, ended_by};
 use crate::sound::Strategy;
 
-/// Checks that the strategy works whatever the values in the box are.
+/// Checks that the strategy works for all values in the box.
 ///
 /// # Errors
-/// The first thing that is missing.
+/// The first missing edge or wait.
 pub(super) fn check(
     certificate: &Certificate,
     intervals: &Intervals,
@@ -58,7 +65,7 @@ pub(super) fn check(
     network.is_closed()
 }
 
-/// A duration that the world decides on.
+/// A duration that the world decides.
 struct Duration {
     from: usize,
     to: usize,
@@ -67,17 +74,17 @@ struct Duration {
 
 struct Closed {
     points: usize,
-    /// By the positions of their constraints.
+    /// Durations, by the position of their constraint.
     durations: BTreeMap<usize, Duration>,
-    /// The least bound of those that lead from a point to another one.
+    /// Least bound from one point to another.
     edges: BTreeMap<(usize, usize), Rational>,
-    /// For each point that waits for the end of a duration, how long at most after its beginning;
-    /// `None` is without limit.
+    /// For each point that waits for the end of a duration: the longest wait after the duration's
+    /// start; `None` is without limit.
     waits: BTreeMap<(usize, usize), Option<Rational>>,
 }
 
 impl Closed {
-    /// The network's own edges and waits.
+    /// Creates a network with the certificate's own edges and waits.
     fn new(certificate: &Certificate, intervals: &Intervals) -> Result<Self, Flaw> {
         let mut closed = Self {
             points: certificate.points.len(),
@@ -101,7 +108,7 @@ impl Closed {
                 closed.wait(to, index, greatest);
                 continue;
             }
-            // An upper bound at its least value, a lower one at its greatest.
+            // An upper bound counts with its least value, a lower bound with its greatest value.
             if let Some(most) = limit(&constraint.upper, intervals, false, index)? {
                 closed.add(from, to, most);
             }
@@ -112,7 +119,7 @@ impl Closed {
         Ok(closed)
     }
 
-    /// Adds an edge; whether it says anything new.
+    /// Adds an edge. Returns `true` if it is tighter than the known ones.
     fn add(&mut self, from: usize, to: usize, bound: Rational) -> bool {
         let known = self.edges.get(&(from, to));
         let is_news = known.is_none_or(|known| bound < *known);
@@ -122,7 +129,7 @@ impl Closed {
         is_news
     }
 
-    /// Adds a wait; whether it says anything new, and may be longer than the duration.
+    /// Adds a wait. Returns `true` if it is longer than the known one and than the least duration.
     fn wait(&mut self, point: usize, duration: usize, delay: Option<Rational>) -> bool {
         let Some(own) = self.durations.get(&duration) else {
             return false;
@@ -140,7 +147,7 @@ impl Closed {
         is_longer && is_news
     }
 
-    /// The negative edges that leave each point, the waits among them.
+    /// Returns the negative edges that leave each point, including the waits.
     fn negative(&self) -> Vec<Vec<usize>> {
         let mut leaving = vec![Vec::new(); self.points];
         for ((from, to), bound) in &self.edges {
@@ -154,8 +161,8 @@ impl Closed {
         leaving
     }
 
-    /// That the negative edges form no circle: points that none of them leads to are taken away, as
-    /// long as there are any.
+    /// Checks that the negative edges form no cycle: repeatedly removes points without incoming
+    /// negative edges.
     fn has_no_negative_circle(&self) -> Result<(), Flaw> {
         let leaving = self.negative();
         let mut entering = vec![0_usize; self.points];
@@ -178,7 +185,7 @@ impl Closed {
         }
     }
 
-    /// That there is an edge beside each pair.
+    /// Checks that each pair is implied by a single edge or wait.
     fn is_closed(&self) -> Result<(), Flaw> {
         let mut entering: Vec<Vec<(usize, &Rational, Option<usize>)>> =
             vec![Vec::new(); self.points];
@@ -203,7 +210,7 @@ impl Closed {
         }
         for ((point, index), delay) in &self.waits {
             for &(from, first, of) in &entering[*point] {
-                // The least duration says nothing of what waits for its own end.
+                // The least duration does not extend a wait for its own end.
                 if of != Some(*index) {
                     let delay = delay.as_ref().map(|delay| delay - first);
                     let is_there = self.has_wait(from, *index, delay.as_ref());
@@ -214,8 +221,8 @@ impl Closed {
         Ok(())
     }
 
-    /// Whether the difference is known to be at most that. What waits longer for the end of a duration
-    /// than that takes at least comes so long after its beginning in any case.
+    /// Returns `Some` if the difference is known to be at most `bound`. A wait implies an edge with
+    /// minus the least duration.
     fn has_edge(&self, from: usize, to: usize, bound: &Rational) -> Option<()> {
         if from == to {
             return (!bound.is_negative()).then_some(());
@@ -231,8 +238,8 @@ impl Closed {
         is_there.then_some(())
     }
 
-    /// Whether a point is known to wait so long for the end of a duration (`None`: without limit), or
-    /// in any case.
+    /// Returns `Some` if a point is known to wait for at least `delay` for the end of a duration
+    /// (`None`: without limit), or comes that late in any case.
     fn has_wait(&self, point: usize, duration: usize, delay: Option<&Rational>) -> Option<()> {
         let begins = self.durations[&duration].from;
         if let Some(delay) = delay

@@ -1,8 +1,8 @@
 //! Fixed times, for the strong guarantee.
 //!
-//! What the world decides on comes after the point that the executor chooses by the durations
-//! between them. Each bound has to hold for the worst of the durations that only one of its points
-//! comes after.
+//! A point that the world decides follows a point that the executor schedules; the durations
+//! between them separate the two. Each bound has to hold for the worst case of the durations that
+//! precede only one of its points.
 
 use elbowroom_num::Rational;
 
@@ -54,7 +54,7 @@ pub(super) fn check(
         }
         let Constraint { from, to, .. } = *constraint;
         let broken = || Flaw::Unmet(index);
-        // An upper bound at its least value, a lower one at its greatest.
+        // An upper bound counts with its least value, a lower bound with its greatest value.
         if let Some(most) = limit(&constraint.upper, intervals, false, index)? {
             let difference = schedule.greatest(from, to)?.ok_or_else(broken)?;
             (difference <= most).then_some(()).ok_or_else(broken)?;
@@ -67,7 +67,8 @@ pub(super) fn check(
     Ok(())
 }
 
-/// What a limit is if it has to be kept whatever its parameter is; `None` without one.
+/// Returns the value of a limit that has to hold for all values of its parameter; `None` if there
+/// is no limit.
 pub(super) fn limit(
     limit: &Limit,
     intervals: &Intervals,
@@ -92,7 +93,8 @@ struct Times<'a> {
 }
 
 impl Times<'_> {
-    /// The durations between a point and the one, chosen by the executor, from which they count.
+    /// Returns the latest preceding point that the executor schedules (or `point` itself), and the
+    /// durations from there to `point`.
     fn chain(&self, mut point: usize) -> (usize, Vec<usize>) {
         let mut links = Vec::new();
         while let Some(link) = self.ended_by[point] {
@@ -103,7 +105,7 @@ impl Times<'_> {
         (point, links)
     }
 
-    /// The greatest difference of the times of two points; `None` if there is none.
+    /// Returns the greatest difference of the times of two points; `None` if it is unbounded.
     fn greatest(&self, from: usize, to: usize) -> Result<Option<Rational>, Flaw> {
         let ((from, before), (to, after)) = (self.chain(from), self.chain(to));
         let time = |point: usize| {

@@ -28,7 +28,7 @@ struct Bound {
 /// The bounds that keep the constraints on the course of the plan.
 pub(super) struct Course(Vec<Bound>);
 
-/// The part of the course of a plan in which the conditions of a constraint have the same truth values.
+/// Part of the plan during which the conditions of a constraint keep their truth values.
 struct Phase {
     /// The points of its turn; time zero for the initial state.
     turn: Vec<usize>,

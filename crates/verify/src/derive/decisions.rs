@@ -26,11 +26,11 @@ pub(super) struct Decision {
 const MOST_DECISIONS: usize = 6;
 
 impl Histories<'_> {
-    /// Returns `true` if no plan with other decisions works, whatever the times are: in each schedule some condition of
-    /// a happening, or the goal, is false.
+    /// Returns `true` if no plan with other decisions is valid at any times: in each schedule some
+    /// condition of a happening, or the goal, is false.
     ///
-    /// So a box that has values for which a decision is another one is not inside: on the way there from the plan's own
-    /// times, some decisions change first.
+    /// So a box that has values with another decision is not inside the envelope: between these
+    /// values and the plan's own times, some decisions change first.
     pub(super) fn needs_decisions(&self, widest: &mut Distances) -> bool {
         let known: BTreeSet<GuardId> = self.decisions.iter().map(|own| own.id).collect();
         if known.len() > MOST_DECISIONS {

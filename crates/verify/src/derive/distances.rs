@@ -18,6 +18,8 @@ pub(super) struct Distances {
 }
 
 impl Distances {
+    /// Creates the distances of a certificate's network.
+    ///
     /// # Errors
     /// When a constraint names a point or a parameter that does not exist.
     pub(super) fn new(certificate: &Certificate, intervals: &Intervals) -> Result<Self, Flaw> {

@@ -1,5 +1,6 @@
-//! That no condition on numbers can fail in a schedule of the network for values in the box, and which
-//! inequalities all boxes inside the envelope satisfy because of such conditions: [`Numbers`].
+//! Check that no condition on numbers can fail in a schedule of the network for values in the box,
+//! and the inequalities that all boxes inside the envelope satisfy because of such conditions:
+//! [`Numbers`].
 
 use elbowroom_num::Rational;
 
@@ -385,8 +386,8 @@ fn moved(expression: &Linear, point: usize, time: &Linear) -> Linear {
     moved
 }
 
-/// Returns `true` if one of these sums is not negative in each box in which all expressions in `rows` are
-/// nowhere negative.
+/// Returns `true` if one of these sums is not negative in each box where all expressions in `rows`
+/// are nowhere negative.
 pub(super) fn follows(rows: &[Linear], sums: &[Sum]) -> bool {
     sums.iter().any(|sum| {
         lowest(sum).is_some_and(|own| {

@@ -319,7 +319,8 @@ impl<'a> Subject<'a> {
         is_changing
     }
 
-    /// Finds out whether the plan is plain, and checks that bounds on durations do not read durations.
+    /// Determines whether the plan is plain, and checks that bounds on durations do not read
+    /// durations.
     fn look_at_conditions(&mut self) -> Result<(), NotDerived> {
         let mut is_plain = true;
         for step in &self.steps {
@@ -360,8 +361,9 @@ impl<'a> Subject<'a> {
         Ok(())
     }
 
-    /// Returns the least and the greatest duration that the domain allows for a step, if it gives an interval of numbers.
-    /// A single duration is the planned one, from which the real one may deviate as far as it does.
+    /// Returns the least and the greatest duration that the domain allows for a step, if it gives
+    /// an interval of numbers. A single duration is the planned one. The real duration may deviate
+    /// from it, so the result has no bounds then.
     pub(super) fn domain_interval(
         &self,
         step: usize,

@@ -184,7 +184,7 @@ impl Checker<'_, '_> {
         let [start, end] = subject.ends[step];
         let time = |point: usize| &subject.points[point].time;
         let zero = Rational::ZERO;
-        // The validator has looked at no moment of an action without duration.
+        // The validator does not check the interior of an action without duration.
         if time(start) == time(end) {
             return Ok(false);
         }

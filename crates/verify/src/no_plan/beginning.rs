@@ -1,23 +1,23 @@
-//! Where a proof begins: a task's own beginning, or a situation in the middle of its execution.
+//! Initial state of a proof: the task's own, or a situation during its execution.
 
 use elbowroom_model::{RunningAction, Situation, Task, TimedHappening};
 use elbowroom_num::Rational;
 
-/// See the module.
+/// Initial time, pending timed initials and running actions.
 #[derive(Clone, Debug)]
 pub(super) struct Beginning {
-    /// Nothing happens earlier.
+    /// Initial time.
     pub(super) now: Rational,
-    /// The timed initials that are to come.
+    /// Pending timed initials.
     pub(super) timed: Vec<TimedHappening>,
-    /// The actions under way.
+    /// Running actions.
     pub(super) running: Vec<RunningAction>,
 }
 
 impl Beginning {
-    /// The beginning, and the task with what is true there as its initial state.
+    /// Returns the beginning, and the task with the facts that are true there as its initial state.
     pub(super) fn of(task: &Task, situation: &Situation) -> (Self, Task) {
-        // Timed initials of time 0 are to come in the beginning.
+        // Timed initials at time 0 are still pending in the task's own initial situation.
         let is_own = *situation == Situation::initial(task);
         let timed = task.timed().iter();
         let to_come = timed.filter(|timed| is_own || timed.time > situation.time);
@@ -35,7 +35,7 @@ impl Beginning {
     }
 }
 
-/// The durations that a running action may still turn out to have.
+/// Returns the least and the greatest duration that are still possible for a running action.
 pub(super) fn lasting(running: &RunningAction, now: &Rational) -> (Rational, Option<Rational>) {
     let passed = now - &running.start;
     let least = running.duration.lower.value().cloned();

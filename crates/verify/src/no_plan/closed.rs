@@ -1,16 +1,17 @@
-//! A closed set of states: whatever happens in one of them leads into one of them, and the goal holds in
-//! none.
+//! Closed sets of states: every happening leads from one of the states to one of them, and the goal
+//! holds in none.
 //!
-//! A state ([`Node`]) is what holds after something has happened: the facts and numbers that something
-//! reads, the actions under way, how many timed initials have happened, and bounds on the differences
-//! of times: of now, of the starts of what is under way, and of time 0. The rules for what can happen next
-//! ([`Closure::successors`]) leave out nothing that a valid plan does in the order of time
-//! (`processes`); they do not ask for ε between happenings, and not for disjunctions and
-//! numbers to hold throughout actions. Numbers that depend on durations or on continuous change may be any.
+//! A state ([`Node`]) consists of the facts and numbers after a happening (only those that
+//! something reads), the running actions, the number of timed initials that have happened, and
+//! bounds on the differences of times: the current time, the starts of running actions, and time 0.
+//! The rules for the next happening ([`Closure::successors`]) cover all steps of a valid plan in
+//! the order of time (`processes`). They do not require ε between happenings, and they do not
+//! require that disjunctions and conditions on numbers hold throughout actions. Numbers that depend
+//! on durations or on continuous change may have any value.
 //!
-//! A listed state stands for more than itself. Its bounds are of all times within them; a number that it
-//! does not list may be any; it has at least as many of the facts that nothing minds, and more are no
-//! hindrance; and objects that can change places without changing the problem (`alike`) do so.
+//! A listed state covers more than itself. Its bounds cover all times within them. A number that it
+//! does not list may have any value. It may have more facts than the covered state if these never
+//! do harm (`welcome`). Interchangeable objects (`alike`) may be exchanged.
 
 pub(super) mod alike;
 mod reading;
@@ -33,65 +34,68 @@ use view::{View, updated};
 pub use written::{Closed, ClosedState};
 use zone::Zone;
 
-/// Time 0, and now, among the times of a state; the starts of what is under way follow.
+/// Positions of time 0, of the current time, and of the first start of a running action among the
+/// times of a state.
 pub const ZERO: usize = 0;
 /// See [`ZERO`].
 pub const NOW: usize = 1;
 /// See [`ZERO`].
 pub const FIRST_START: usize = 2;
 
-/// An action under way, with the durations that it may have.
+/// A running action, with the least and the greatest duration that it may have.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct UnderWay {
     pub(super) process: usize,
-    /// At least.
+    /// Least duration.
     pub least: Rational,
-    /// At most, if there is a bound.
+    /// Greatest duration; `None`: unbounded.
     pub most: Option<Rational>,
 }
 
 /// A state.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Node {
-    /// What is under way, in order.
+    /// Running actions, sorted.
     pub under_way: Vec<UnderWay>,
-    /// How many of the timed initials to come have happened.
+    /// Number of pending timed initials that have happened.
     pub timed: usize,
     pub(super) facts: BTreeSet<FactId>,
     pub(super) values: BTreeMap<FluentId, Rational>,
-    /// The bounds on times.
+    /// Bounds on times.
     pub zone: Zone,
 }
 
-/// What can happen in a problem, from one state to the next.
+/// Successor relation of a problem.
 #[derive(Debug)]
 pub struct Closure<'a> {
     instances: &'a Instances,
     processes: Vec<Process>,
     timed: &'a [TimedHappening],
-    /// The facts and fluents that something reads.
+    /// Facts and fluents that something reads.
     read: BTreeSet<FactId>,
     read_fluents: BTreeSet<FluentId>,
-    /// Those of the fluents that change in the course of time, and may have any value.
+    /// Read fluents that change continuously; they may have any value.
     flowing: BTreeSet<FluentId>,
-    /// The facts that something reads and something changes.
+    /// Facts that something reads and something changes.
     pub(super) facts: BTreeSet<FactId>,
-    /// Those that nothing minds.
+    /// Changing facts that do no harm when they are true.
     welcome: BTreeSet<FactId>,
     pub(super) fluents: BTreeSet<FluentId>,
-    /// By name, each of an action that may start and of one under way at the beginning.
+    /// Processes by title. An action that may start and one that is running initially have
+    /// different titles.
     names: BTreeMap<String, usize>,
     exchanges: Vec<Exchange>,
 }
 
-/// The most effects of one happening of which it is open whether they come about.
+/// Largest number of effects of one happening whose conditions may be undecided.
 const MOST_OPEN: usize = 4;
 
 impl<'a> Closure<'a> {
-    /// Of the instances that the list of facts allows, with classes of objects that can change places.
+    /// Creates the closure of the instances that the list of facts allows, with classes of
+    /// interchangeable objects.
     ///
     /// # Errors
-    /// When the problem has what this does not know, or objects are not alike.
+    /// When the problem has an unsupported feature, or objects are not interchangeable.
     pub fn of(
         instances: &'a Instances,
         reached: &Reached,
@@ -125,7 +129,7 @@ impl<'a> Closure<'a> {
         Ok(closure)
     }
 
-    /// The state at the beginning.
+    /// Returns the initial state.
     pub fn initial(&self) -> Node {
         let state = self.instances.task.initial();
         let now = &self.instances.beginning.now;
@@ -161,7 +165,8 @@ impl<'a> Closure<'a> {
         }
     }
 
-    /// Whether the goal may hold in a state in which nothing is to come.
+    /// Returns `true` if the goal may hold in a state without running actions and pending timed
+    /// initials.
     pub fn is_goal(&self, node: &Node) -> bool {
         let view = View {
             closure: self,
@@ -173,10 +178,10 @@ impl<'a> Closure<'a> {
             && view.may_hold(self.instances.task.goal())
     }
 
-    /// All that one happening can lead to.
+    /// Returns all states that one happening can lead to.
     ///
     /// # Errors
-    /// When too much is open.
+    /// When too many effects are undecided.
     pub fn successors(&self, node: &Node) -> Result<Vec<Node>, NoPlanFlaw> {
         let mut found = Vec::new();
         for (number, process) in self.processes.iter().enumerate() {
@@ -200,7 +205,8 @@ impl<'a> Closure<'a> {
         Ok(found)
     }
 
-    /// Number of ground actions and happenings that [`Closure::successors`] tries in each state.
+    /// Returns the number of ground actions and happenings that [`Closure::successors`] tries in
+    /// each state.
     pub fn process_count(&self) -> usize {
         self.processes.len()
     }
@@ -285,8 +291,9 @@ impl<'a> Closure<'a> {
         Ok(())
     }
 
-    /// The times at which something can happen next, as the last of the times: the end of what is under
-    /// way, or timed initials, or anything.
+    /// Returns the zone extended by the time of the next happening, as its last time. The happening
+    /// is the end of the running action `ends`, a happening at time `at`, or any other one. Returns
+    /// `None` if there is no such time.
     fn next(&self, node: &Node, ends: Option<usize>, at: Option<&Rational>) -> Option<Zone> {
         let mut zone = node.zone.with_another();
         let then = zone.size() - 1;
@@ -308,7 +315,7 @@ impl<'a> Closure<'a> {
         zone.close().then_some(zone)
     }
 
-    /// The states after some effects, with times as they were.
+    /// Returns the states after some effects, with unchanged times.
     fn changed(
         &self,
         node: &Node,
@@ -321,7 +328,7 @@ impl<'a> Closure<'a> {
             duration,
         };
         let mut after = node.clone();
-        // Additions win over deletions, and all read the state before.
+        // Additions win over deletions, and all effects read the previous state.
         let (mut sure, mut open): (Vec<&Change>, Vec<&Change>) = (Vec::new(), Vec::new());
         for effect in effects {
             let guard = &effect.guard;
@@ -380,7 +387,7 @@ impl<'a> Closure<'a> {
         Ok(subsets.collect())
     }
 
-    /// Lists a state, unless it breaks what is needed throughout.
+    /// Records a state, unless it violates an over-all condition of a running action.
     fn keep(&self, node: Node, found: &mut Vec<Node>) {
         let view = View {
             closure: self,
@@ -396,7 +403,7 @@ impl<'a> Closure<'a> {
         }
     }
 
-    /// Whether the first state stands for the second one, too.
+    /// Returns `true` if `node` covers `other`.
     pub fn covers(&self, node: &Node, other: &Node) -> bool {
         let has = |fact: &FactId| node.facts.contains(fact);
         node.under_way == other.under_way
@@ -413,7 +420,7 @@ impl<'a> Closure<'a> {
             && other.zone.is_within(&node.zone)
     }
 
-    /// The state that stands for it where objects change places.
+    /// Returns a representative of the states that result from exchanges of objects.
     pub fn settled(&self, mut node: Node) -> Node {
         loop {
             let images = self.exchanges.iter().map(|own| own.image(&node));
@@ -427,7 +434,7 @@ impl<'a> Closure<'a> {
     /// Checks that the states are closed, and that the goal holds in none.
     ///
     /// # Errors
-    /// The first thing that is not so.
+    /// The first flaw.
     pub fn check(&self, nodes: &[Node]) -> Result<(), NoPlanFlaw> {
         let mut by_kind: BTreeMap<(&[UnderWay], usize), Vec<&Node>> = BTreeMap::new();
         for node in nodes {
@@ -469,13 +476,13 @@ impl<'a> Closure<'a> {
         self.instances
     }
 
-    /// When the timed initials to come happen.
+    /// Returns the times of the pending timed initials.
     pub fn times(&self) -> impl ExactSizeIterator<Item = &Rational> {
         self.timed.iter().map(|own| &own.time)
     }
 }
 
-/// Time 0, the last of the times as now, and the starts.
+/// Returns the positions of time 0, of the zone's last time as the current time, and of the starts.
 fn times(starts: usize, zone: &Zone) -> Vec<usize> {
     let mut order = vec![ZERO, zone.size() - 1];
     order.extend(FIRST_START..FIRST_START + starts);
@@ -490,7 +497,7 @@ fn always(change: &Change) -> Effect {
 }
 
 impl Process {
-    /// The start, or the instant.
+    /// Returns the snap action at the start, or that of an instantaneous action.
     fn first(&self) -> &SnapAction {
         match &self.body {
             elbowroom_model::ground::Body::Instantaneous(snap) => snap,

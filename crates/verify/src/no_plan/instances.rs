@@ -1,4 +1,4 @@
-//! The instances of actions, found by trying objects for parameters, and what they bring about.
+//! Action instances, found by trying objects for parameters, and the facts that they add.
 
 use std::collections::BTreeSet;
 
@@ -12,18 +12,18 @@ use super::lasting::Lasting;
 use super::moments::HeldTo;
 use super::{Fact, Moments, NoPlanFlaw, Reached};
 
-/// A fact that can become true though it is not listed, or earlier than listed.
+/// A fact that can become true although it is not listed, or earlier than listed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Breach {
     /// The fact.
     pub fact: Fact,
-    /// How early it can become true, if what was listed is so.
+    /// Earliest time at which it can become true, if the listed bounds hold.
     pub time: Rational,
-    /// What brings it about, in words.
+    /// Happening that makes it true, in words.
     pub by: String,
 }
 
-/// The instances of a task's actions whose conditions can be true by some list of facts.
+/// Instances of a task's actions whose conditions a list of facts allows.
 #[derive(Debug)]
 pub struct Instances {
     pub(super) task: Task,
@@ -35,33 +35,33 @@ pub struct Instances {
     needs: Vec<Needs>,
 }
 
-/// What all instances of a schema need, as far as it is told of objects alone.
+/// Conditions that all instances of a schema need and that mention only objects.
 #[derive(Debug, Default)]
 struct Needs {
-    /// What is needed at the start, or what nobody but timed initials makes true.
+    /// Atoms that the start needs, or that only timed initials make true.
     atoms: Vec<problem::Atom>,
-    /// Terms that have to be the same object, or different ones.
+    /// Terms that have to denote the same object (`true`) or different ones.
     pairs: Vec<(Term, Term, bool)>,
 }
 
 impl Instances {
-    /// None so far.
+    /// Creates an empty list.
     ///
     /// # Errors
-    /// When the task has what this checker does not know.
+    /// When the task has a feature that the checker does not support.
     pub fn of(task: &Task) -> Result<Self, NoPlanFlaw> {
         Self::from(task, &Situation::initial(task))
     }
 
-    /// None so far, in the middle of an execution.
+    /// Creates an empty list for a situation during an execution.
     ///
     /// # Errors
-    /// When the task has what this checker does not know.
+    /// When the task has a feature that the checker does not support.
     pub fn from(task: &Task, situation: &Situation) -> Result<Self, NoPlanFlaw> {
         if let Some(feature) = task.left_to_the_judge() {
             return Err(NoPlanFlaw::Unknown(feature));
         }
-        // Numbers of facts that only the checker mentions are its own.
+        // Ids of facts that only the checker mentions belong to its own copy of the task.
         let (beginning, task) = Beginning::of(task, situation);
         let lasting = Lasting::of(&task, &beginning);
         let schemas = task.problem().schemas.iter();
@@ -83,7 +83,7 @@ impl Instances {
     /// Creates an empty list that assumes an arbitrary value for each fluent without a value.
     ///
     /// # Errors
-    /// When the task has what this checker does not know.
+    /// When the task has a feature that the checker does not support.
     pub fn with_assumed_values(task: &Task, situation: &Situation) -> Result<Self, NoPlanFlaw> {
         let mut instances = Self::from(task, situation)?;
         instances.lasting.assumes_values = true;
@@ -93,7 +93,7 @@ impl Instances {
     /// Adds the instances that the reached facts make possible. Returns the number of tries.
     ///
     /// # Errors
-    /// [`NoPlanFlaw::TooMany`] after so many tries.
+    /// [`NoPlanFlaw::TooMany`] after `most_steps` tries.
     pub fn extend(&mut self, reached: &Reached, most_steps: u64) -> Result<u64, NoPlanFlaw> {
         let mut steps = most_steps;
         for number in 0..self.needs.len() {
@@ -139,7 +139,7 @@ impl Instances {
         Ok(())
     }
 
-    /// Whether no need that the last bound parameter completes is out of reach.
+    /// Returns `true` if all needs that the last bound parameter completes can be satisfied.
     fn may_be_bound(&self, schema: SchemaId, reached: &Reached, binding: &[ObjectId]) -> bool {
         let Needs { atoms, pairs } = &self.needs[schema.index()];
         let object = |term: &Term| match term {
@@ -162,18 +162,18 @@ impl Instances {
             })
     }
 
-    /// How many there are.
+    /// Returns the number of instances.
     pub fn len(&self) -> usize {
         self.actions.len()
     }
 
-    /// Whether there are none.
+    /// Returns `true` if there are no instances.
     pub fn is_empty(&self) -> bool {
         self.actions.is_empty()
     }
 
-    /// All that breaks the list, the earliest time of each fact. A list without any that has all
-    /// instances is an invariant.
+    /// Returns all violations of the list, with the earliest time of each fact. If there are none,
+    /// and all instances have been added, the list is an invariant.
     pub fn breaches(&self, reached: &Reached) -> Vec<Breach> {
         let mut breaches = Vec::new();
         let mut note = |fact: Fact, time: &Rational, by: &dyn Fn() -> String| {
@@ -216,7 +216,7 @@ impl Instances {
         breaches
     }
 
-    /// Whether the list leaves the goal within reach.
+    /// Returns `true` if the list does not exclude the goal.
     pub fn is_goal_in_reach(&self, reached: &Reached) -> bool {
         self.moments(reached).can_hold_in_the_end(self.task.goal())
     }
@@ -231,7 +231,7 @@ impl Instances {
     }
 }
 
-/// What an action makes true, and when at the earliest.
+/// Returns the facts that an action adds, with their earliest times.
 fn brought_about(moments: &Moments<'_>, action: &Action) -> Vec<(Fact, Rational)> {
     let mut facts = Vec::new();
     let mut add = |effects: &[Effect], start: &Rational, time: &Rational| {
@@ -265,14 +265,14 @@ fn brought_about(moments: &Moments<'_>, action: &Action) -> Vec<(Fact, Rational)
     facts
 }
 
-/// What the end of an action under way makes true, and when at the earliest.
+/// Returns the facts that the end of a running action adds, with their earliest times.
 fn brought_about_by_end(moments: &Moments<'_>, running: &RunningAction) -> Vec<(Fact, Rational)> {
     let Some(body) = running.action.durative() else {
         return Vec::new();
     };
     let (least, most) = lasting(running, moments.now);
     let earliest = &running.start + &least;
-    // What it needs throughout is not looked at: it may be made good at once.
+    // The over-all condition is ignored: another happening may establish it at once.
     let Some(end) = moments.next(&body.end.condition, &earliest, HeldTo::All) else {
         return Vec::new();
     };
@@ -289,7 +289,8 @@ fn brought_about_by_end(moments: &Moments<'_>, running: &RunningAction) -> Vec<(
     adds.collect()
 }
 
-/// See [`Needs`]. Derived facts do not count, because their rules are ground only for instances that mention them.
+/// Returns the [`Needs`] of a schema. Derived facts are left out, because their rules are ground
+/// only for instances that mention them.
 fn needs(schema: &problem::Schema, lasting: &Lasting, derived: &BTreeSet<PredicateId>) -> Needs {
     let mut needs = Needs::default();
     let is_basic = |atom: &problem::Atom| !derived.contains(&atom.predicate);
@@ -304,7 +305,8 @@ fn needs(schema: &problem::Schema, lasting: &Lasting, derived: &BTreeSet<Predica
             ..
         } => {
             collect(at_start, &is_basic, &mut needs);
-            // Over an action that may take no time, nothing is needed; so that is left to the instances.
+            // Over-all conditions of an action that may have duration 0 are left to the check of
+            // instances.
             let is_fixed = |atom: &problem::Atom| lasting.is_fixed(atom.predicate);
             collect(at_end, &is_fixed, &mut needs);
             if takes_time(schema) {
@@ -315,7 +317,7 @@ fn needs(schema: &problem::Schema, lasting: &Lasting, derived: &BTreeSet<Predica
     needs
 }
 
-/// Whether a constant bound says that all instances take time.
+/// Returns `true` if a constant lower bound implies that all instances have a positive duration.
 fn takes_time(schema: &problem::Schema) -> bool {
     let problem::Body::Durative { duration, .. } = &schema.body else {
         return false;
@@ -330,7 +332,7 @@ fn takes_time(schema: &problem::Schema) -> bool {
     })
 }
 
-/// The conjuncts that are atoms of some kind, or compare objects.
+/// Collects the conjuncts that are atoms for which `counts` is true, or compare objects.
 fn collect(condition: &Condition, counts: &dyn Fn(&problem::Atom) -> bool, needs: &mut Needs) {
     match condition {
         Condition::And(parts) => {

@@ -1,5 +1,5 @@
-//! What the problem itself says for good: facts that only timed initials change, and numbers that
-//! nothing changes.
+//! Permanent information from the problem itself: facts that only timed initials change, and
+//! numbers that nothing changes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,29 +11,30 @@ use elbowroom_num::Rational;
 use super::Fact;
 use super::beginning::Beginning;
 
-/// From when until when a fact may be true; `None`: for ever.
+/// Interval during which a fact may be true; an end of `None` is never.
 pub(super) type Span = (Rational, Option<Rational>);
 
-/// See the module.
+/// Facts and values that the problem itself determines.
 #[derive(Debug)]
 pub(super) struct Lasting {
-    /// The predicates that some action or rule can make true.
+    /// Predicates that some action or rule can make true.
     made: BTreeSet<PredicateId>,
-    /// The predicates that some action or timed initial can make false, and those of rules.
+    /// Predicates that some action or timed initial can make false, and those of rules.
     lost: BTreeSet<PredicateId>,
-    /// The functions whose values change.
+    /// Functions whose values change.
     changing: BTreeSet<FunctionId>,
-    /// The functions that some effect or timed initial assigns a value.
+    /// Functions that some effect or timed initial assigns a value.
     assigned: BTreeSet<FunctionId>,
-    /// For facts that only timed initials make true, when they may hold. No other such facts do.
+    /// Intervals of the facts that only timed initials make true. Other facts of these predicates
+    /// are never true.
     spans: BTreeMap<Fact, Vec<Span>>,
-    /// Assumes a value, which may be any, for each fluent without one.
+    /// Assumes an arbitrary value for each fluent without one.
     pub(super) assumes_values: bool,
 }
 
 impl Lasting {
-    /// Of a task that begins at a time: timed initials until then are among what it begins with, unless
-    /// it is the task's own beginning.
+    /// Collects the information for a task with this beginning. Timed initials up to that time are
+    /// part of the initial state, unless it is the task's own beginning.
     pub(super) fn of(task: &Task, beginning: &Beginning) -> Self {
         let mut lasting = Self {
             made: BTreeSet::new(),
@@ -90,7 +91,7 @@ impl Lasting {
             self.begin(task.atom(fact), &beginning.now);
         }
         for happening in &beginning.timed {
-            // What is deleted and added at one time is true.
+            // A fact that is deleted and added at one time is true.
             for change in &happening.changes {
                 if let Change::Delete(fact) = change {
                     let fact = task.atom(*fact);
@@ -120,14 +121,14 @@ impl Lasting {
         }
         let spans = self.spans.entry(fact).or_default();
         match spans.last_mut() {
-            // Of a deletion and an addition at one time, the addition wins.
+            // An addition wins over a deletion at the same time.
             Some((_, until)) if until.as_ref() == Some(time) => *until = None,
             Some((_, None)) => {}
             _ => spans.push((time.clone(), None)),
         }
     }
 
-    /// When a fact may hold, if only timed initials make facts of its kind true.
+    /// Returns the intervals of a fact, if only timed initials make facts of its predicate true.
     pub(super) fn spans(&self, fact: &Fact) -> Option<&[Span]> {
         if self.made.contains(&fact.0) {
             return None;
@@ -135,7 +136,7 @@ impl Lasting {
         Some(self.spans.get(fact).map_or(&[], Vec::as_slice))
     }
 
-    /// Whether only timed initials make facts of the predicate true.
+    /// Returns `true` if only timed initials make facts of the predicate true.
     pub(super) fn is_fixed(&self, predicate: PredicateId) -> bool {
         !self.made.contains(&predicate)
     }
@@ -145,14 +146,14 @@ impl Lasting {
         self.assigned.contains(&function)
     }
 
-    /// Whether the fact is true at all times.
+    /// Returns `true` if the fact is true at all times.
     pub(super) fn is_always_true(&self, task: &Task, fact: &Fact) -> bool {
         let found = task.find_fact(fact.0, &fact.1);
         let is_true = found.is_some_and(|found| task.initial().facts.contains(&found));
         is_true && !self.lost.contains(&fact.0)
     }
 
-    /// What is known of the value of an expression.
+    /// Returns the value of an expression, as far as it is known.
     pub(super) fn value(&self, task: &Task, expression: &Expression) -> Value {
         match self.stated_value(task, expression) {
             Value::Undefined if self.assumes_values => Value::Open,
@@ -183,13 +184,13 @@ impl Lasting {
     }
 }
 
-/// What the problem says of the value of an expression.
+/// Value of an expression, as far as the problem determines it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Value {
-    /// It is this at all times.
+    /// It has this value at all times.
     Known(Rational),
-    /// It has none at any time; nothing that reads it holds.
+    /// It never has a value; no condition that reads it holds.
     Undefined,
-    /// It may be any.
+    /// It may have any value.
     Open,
 }

@@ -1,4 +1,4 @@
-//! The earliest times at which conditions can hold, by a list of facts.
+//! Earliest times at which conditions can hold, by a list of facts.
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, DurativeBody, SnapAction};
@@ -8,27 +8,28 @@ use elbowroom_num::Rational;
 use super::lasting::{Lasting, Span, Value};
 use super::{Fact, Reached};
 
-/// What a condition is held to.
+/// Information that the check of a condition uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum HeldTo {
-    /// The list, and what the problem says.
+    /// The list of facts, and the problem.
     All,
-    /// What the problem says for good.
+    /// Only permanent information from the problem.
     Lasting,
 }
 
-/// See the module.
+/// Evaluates conditions against a list of facts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moments<'a> {
     pub(super) task: &'a Task,
     pub(super) lasting: &'a Lasting,
     pub(super) reached: &'a Reached,
-    /// Nothing happens earlier.
+    /// Initial time.
     pub(super) now: &'a Rational,
 }
 
 impl Moments<'_> {
-    /// The earliest time, not before `time`, at which a condition can hold; `None` if it never can.
+    /// Returns the earliest time, not before `time`, at which a condition can hold; `None` if it
+    /// never can.
     pub(super) fn next(
         &self,
         condition: &Condition,
@@ -38,7 +39,8 @@ impl Moments<'_> {
         self.next_while(condition, time, &Rational::ZERO, held_to)
     }
 
-    /// The earliest time, not before `time`, from which a condition can hold for so long.
+    /// Returns the earliest start, not before `time`, of an interval of this length that the
+    /// condition can hold for.
     fn next_while(
         &self,
         condition: &Condition,
@@ -58,13 +60,13 @@ impl Moments<'_> {
                     for part in parts {
                         least = self.next_while(part, &least, length, held_to)?;
                     }
-                    // Each round but the last goes on to the beginning of some span.
+                    // Each round but the last advances to the beginning of some interval.
                     if least == before {
                         return Some(least);
                     }
                 }
             }
-            // It may hold by one part after the other.
+            // Different parts may make it hold at different moments, so `length` is ignored.
             Condition::Or(parts) => {
                 let times = parts
                     .iter()
@@ -110,7 +112,8 @@ impl Moments<'_> {
         }
     }
 
-    /// Whether a condition mentions what is true at some times only, by timed initials alone.
+    /// Returns `true` if a condition mentions facts that are true only at some times, by timed
+    /// initials alone.
     pub(super) fn is_timed(&self, condition: &Condition) -> bool {
         let mut is_timed = false;
         condition.visit_facts(&mut |fact| {
@@ -123,7 +126,7 @@ impl Moments<'_> {
         is_timed
     }
 
-    /// Whether the problem itself says that a condition holds at all times.
+    /// Returns `true` if a condition holds at all times by the problem itself.
     fn is_always_true(&self, condition: &Condition) -> bool {
         match condition {
             Condition::Fact(fact) => self
@@ -139,12 +142,12 @@ impl Moments<'_> {
         }
     }
 
-    /// Whether the problem itself says that a condition holds at no time.
+    /// Returns `true` if a condition holds at no time by the problem itself.
     fn never_holds(&self, condition: &Condition) -> bool {
         self.next(condition, self.now, HeldTo::Lasting).is_none()
     }
 
-    /// Whether a condition can hold when all timed initials have happened.
+    /// Returns `true` if a condition can hold after all timed initials have happened.
     pub(super) fn can_hold_in_the_end(&self, condition: &Condition) -> bool {
         match condition {
             Condition::Fact(fact) => {
@@ -161,17 +164,18 @@ impl Moments<'_> {
         }
     }
 
-    /// The earliest time of an instant.
+    /// Returns the earliest time of an instantaneous action.
     pub(super) fn instant(&self, snap: &SnapAction) -> Option<Rational> {
         self.next(&snap.condition, self.now, HeldTo::All)
     }
 
-    /// The earliest start and end of a durative action, its later conditions being held to that.
+    /// Returns the earliest start and end of a durative action. `later` limits its later
+    /// conditions.
     pub(super) fn ends(&self, body: &DurativeBody, later: HeldTo) -> Option<(Rational, Rational)> {
         self.starts(body, self.now, HeldTo::All, later)
     }
 
-    /// The same of a start not before `time`.
+    /// Returns the earliest start, not before `time`, and end of a durative action.
     pub(super) fn starts(
         &self,
         body: &DurativeBody,
@@ -184,7 +188,7 @@ impl Moments<'_> {
         loop {
             let before = start.clone();
             start = self.next(&body.start.condition, &start, first)?;
-            // An action that may take no time has no moment in between.
+            // An action that may have duration 0 has no moment between its start and its end.
             if least > Rational::ZERO {
                 start = self.next_while(&body.over_all, &start, &least, later)?;
             }
@@ -198,8 +202,8 @@ impl Moments<'_> {
         }
     }
 
-    /// The earliest end, not before `time`, of an action that takes so long at least: what it needs
-    /// throughout holds in the last part, which is as long as that.
+    /// Returns the earliest end, not before `time`, of an action with this least duration. Its
+    /// over-all condition has to hold during the last part of the action, which has that length.
     pub(super) fn end_from(
         &self,
         body: &DurativeBody,
@@ -222,7 +226,8 @@ impl Moments<'_> {
         }
     }
 
-    /// The least and the greatest duration, as far as they do not change; `None` if there is none.
+    /// Returns the least and the greatest duration by bounds that do not change; `None` if no
+    /// duration is allowed.
     pub(super) fn duration(&self, body: &DurativeBody) -> Option<(Rational, Option<Rational>)> {
         let (mut least, mut most) = (Rational::ZERO, None::<Rational>);
         for constraint in &body.duration {

@@ -1,23 +1,25 @@
-//! Times before which two atoms are not true together (h² of temporal planning; Haslum & Geffner, ECP
-//! 2001), in the order of time.
+//! Times before which two atoms are not true together (h² of temporal planning; Haslum & Geffner,
+//! ECP 2001), in the order of time.
 //!
-//! An atom is a literal that something reads, that an action is under way, or that one which was under
-//! way at the beginning has ended. Three kinds of bounds ([`Key`]) are kept up by everything that happens:
+//! An atom is a literal that something reads, the fact that an action is running, or the fact that
+//! an action which was running initially has ended. There are three kinds of bounds ([`Key`]):
 //!
-//! - [`Key::Pair`]: whenever two atoms have become true together, it is not before this time;
-//! - [`Key::Started`]: an action that is under way, with an atom that has been true since its start, has
-//!   started no earlier than this;
-//! - [`Key::Meanwhile`]: an atom that has become true while an action is under way has done so no earlier
-//!   than this.
+//! - [`Key::Pair`]: two atoms do not become true together before this time.
+//! - [`Key::Started`]: a running action, with an atom that has been true since its start, has
+//!   started no earlier than this.
+//! - [`Key::Meanwhile`]: an atom that has become true while an action is running has done so no
+//!   earlier than this.
 //!
-//! [`Structure::earliest`] is the rule by which bounds follow from others: what a happening reads was
-//! true together just before, at least ε before if that came about by something else; what it makes true
-//! is so together with what was true before and is not ended by it. So a list of bounds of which each
-//! follows from the list, for each happening that could break it, is kept up by all of them, one after the
-//! other in the order of time (`processes` says why there is such an order).
+//! [`Structure::earliest`] is the rule that derives bounds from others. The atoms that a happening
+//! reads were true together just before it, and at least ε before if another happening made them
+//! true. The atoms that it makes true are true together with those that were true before and that
+//! it does not end. Take a list of bounds such that, for each happening that could violate a bound,
+//! the bound follows from the list. Then all happenings, one after the other in the order of time,
+//! preserve the list (`processes` shows that there is such an order).
 //!
-//! Facts that only timed initials make true are no atoms: the windows of happenings see to them. Derived
-//! facts, numbers that change, and disjunctions are taken to be as they are needed.
+//! Facts that only timed initials make true are not atoms; the time windows of happenings cover
+//! them. Derived facts, numbers that change, and disjunctions are assumed to have the needed
+//! values.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,17 +35,17 @@ pub use rules::Claims;
 mod names;
 mod rules;
 
-/// A time before which something is not so.
+/// Lower bound on a time.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Earliest {
-    /// Not before.
+    /// Not before this time.
     From(Rational),
-    /// At no time.
+    /// Never.
     Never,
 }
 
 impl Earliest {
-    /// That much later.
+    /// Returns the bound, later by `delay`.
     #[must_use]
     pub fn plus(&self, delay: &Rational) -> Self {
         match self {
@@ -53,20 +55,20 @@ impl Earliest {
     }
 }
 
-/// What can be true or not at a time.
+/// Proposition that is true or false at each time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Atom {
     Literal(Literal),
-    /// The action of this number is under way.
+    /// The action with this number is running.
     Running(usize),
-    /// The action of this number, which was under way at the beginning, has ended.
+    /// The action with this number, which was running initially, has ended.
     Ended(usize),
 }
 
-/// What a bound is about; atoms and actions by number.
+/// Subject of a bound. Atoms and actions are given by number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Key {
-    /// Two atoms, the smaller number first; one with itself for it alone.
+    /// Two atoms, the smaller number first. A single atom is a pair with itself.
     Pair(usize, usize),
     /// An action, and an atom that was true when it started.
     Started(usize, usize),
@@ -75,7 +77,7 @@ pub enum Key {
 }
 
 impl Key {
-    /// Of two atoms in any order.
+    /// Returns the key of two atoms in any order.
     pub fn pair(one: usize, other: usize) -> Self {
         Self::Pair(one.min(other), one.max(other))
     }
@@ -83,10 +85,10 @@ impl Key {
 
 /// Bounds that are known.
 pub trait Bounds {
-    /// The bound; nothing is claimed below the beginning.
+    /// Returns the bound. `None`: nothing but the initial time is claimed.
     fn get(&self, key: Key) -> Option<&Earliest>;
 
-    /// The earliest time of a happening, if it is known already.
+    /// Returns the earliest time of a happening, if it is known already.
     fn begin(&self, operator: usize) -> Option<&Earliest>;
 }
 
@@ -101,20 +103,20 @@ pub(super) enum Kind {
 #[derive(Debug)]
 pub(super) struct Operator {
     pub(super) kind: Kind,
-    /// What it reads.
+    /// Atoms that it reads.
     reads: Vec<usize>,
-    /// What is true just before, too.
+    /// Further atoms that are true just before.
     holds: Vec<usize>,
-    /// What it may make true.
+    /// Atoms that it may make true.
     pub(super) adds: Vec<usize>,
-    /// What is surely not true after it.
+    /// Atoms that are certainly not true after it.
     ends: Vec<usize>,
-    /// Whether it has to wait for timed initials.
+    /// `true` if it may have to wait for timed initials.
     has_windows: bool,
     is_possible: bool,
 }
 
-/// The atoms and the happenings of a problem.
+/// Atoms and happenings of a problem.
 #[derive(Debug)]
 pub struct Structure<'a> {
     moments: Moments<'a>,
@@ -123,28 +125,28 @@ pub struct Structure<'a> {
     pub(super) atoms: Vec<Atom>,
     pub(super) numbers: BTreeMap<Atom, usize>,
     pub(super) operators: Vec<Operator>,
-    /// The operators that may make an atom true, by atom.
+    /// Operators that may make an atom true, by atom.
     adders: Vec<Vec<usize>>,
     start_of: Vec<Option<usize>>,
     times: Vec<Rational>,
     is_initial: Vec<bool>,
-    /// From when the delete relaxation lets an atom be true.
+    /// Earliest time of each atom by the delete relaxation.
     floor: Vec<Earliest>,
-    /// Just before the beginning.
+    /// Time just before the beginning.
     before: Earliest,
-    /// What each atom brings with it: the over-all literals of an action under way.
+    /// Atoms that each atom implies: the over-all literals of a running action.
     company: Vec<Vec<usize>>,
-    /// The literals of each atom.
+    /// Literals of each atom.
     literals: Vec<Vec<Literal>>,
-    /// One of these parts of the goal has to be true in the end, each with what is known of it.
+    /// Alternatives of the goal, each with its known atoms. One of them has to be true at the end.
     goals: Vec<Vec<usize>>,
 }
 
-/// The most parts that a goal with disjunctions is split into.
+/// Largest number of alternatives of a goal with disjunctions.
 const MOST_GOALS: usize = 64;
 
 impl<'a> Structure<'a> {
-    /// Of the instances that the list of facts allows.
+    /// Creates the structure of the instances that the list of facts allows.
     pub fn of(instances: &'a Instances, reached: &'a Reached) -> Self {
         let processes = instances.processes(reached);
         let moments = instances.moments(reached);
@@ -206,7 +208,7 @@ impl<'a> Structure<'a> {
         }
         wanted.sort_unstable();
         wanted.dedup();
-        // What actions make false is an atom, even if none makes it true.
+        // A fact that actions make false is an atom, even if no action makes it true.
         let snaps = self.processes.iter();
         let snaps = snaps.flat_map(|process| process.start.iter().chain(&process.end));
         let makes: BTreeSet<Literal> = snaps.flat_map(|snap| snap.makes.iter().copied()).collect();
@@ -263,7 +265,7 @@ impl<'a> Structure<'a> {
         self.literals.push(literals);
     }
 
-    /// The literals that are atoms.
+    /// Returns the atoms of the literals that have one.
     fn known(&self, literals: &[Literal]) -> Vec<usize> {
         let atoms = literals.iter();
         atoms
@@ -334,33 +336,33 @@ impl<'a> Structure<'a> {
 }
 
 impl Structure<'_> {
-    /// How many atoms there are.
+    /// Returns the number of atoms.
     pub fn atom_count(&self) -> usize {
         self.atoms.len()
     }
 
-    /// How many actions there are, those under way at the beginning among them.
+    /// Returns the number of actions, including those running initially.
     pub fn action_count(&self) -> usize {
         self.processes.len()
     }
 
-    /// How many happenings there are.
+    /// Returns the number of happenings.
     pub fn happening_count(&self) -> usize {
         self.operators.len()
     }
 
-    /// The atoms that a happening may make true.
+    /// Returns the atoms that a happening may make true.
     pub fn made_by(&self, happening: usize) -> &[usize] {
         &self.operators[happening].adds
     }
 
-    /// The atoms that are true just before a happening.
+    /// Returns the atoms that are true just before a happening.
     pub fn needed_by(&self, happening: usize) -> impl Iterator<Item = usize> + '_ {
         let operator = &self.operators[happening];
         operator.reads.iter().chain(&operator.holds).copied()
     }
 
-    /// The action that a happening starts, and the one that it ends.
+    /// Returns the action that a happening starts, and the one that it ends.
     pub fn start_or_end(&self, happening: usize) -> [Option<usize>; 2] {
         match self.operators[happening].kind {
             Kind::Start(action) => [Some(action), None],
@@ -369,12 +371,12 @@ impl Structure<'_> {
         }
     }
 
-    /// The start of an action, unless it was under way at the beginning.
+    /// Returns the start of an action, or `None` if the action was running initially.
     pub fn start_of(&self, action: usize) -> Option<usize> {
         self.start_of[action]
     }
 
-    /// The action of an atom that says that it is under way.
+    /// Returns the action whose running the atom states.
     pub fn runs(&self, atom: usize) -> Option<usize> {
         match self.atoms[atom] {
             Atom::Running(action) => Some(action),
@@ -382,18 +384,18 @@ impl Structure<'_> {
         }
     }
 
-    /// The least duration of an action.
+    /// Returns the least duration of an action.
     pub fn least(&self, action: usize) -> &Rational {
         &self.processes[action].least
     }
 
-    /// Just before the beginning, if the atom is true then.
+    /// Returns the time just before the beginning, if the atom is true then.
     pub fn initial(&self, atom: usize) -> Option<&Earliest> {
         self.is_initial[atom].then_some(&self.before)
     }
 }
 
-/// The goal as a disjunction of conjunctions, of which the literals are listed; all else is left open.
+/// Returns the goal as a disjunction of conjunctions of literals. All other conditions are ignored.
 fn alternatives(instances: &Instances) -> Vec<Vec<Literal>> {
     let mut goals = split(instances.task.goal(), true);
     for goal in &mut goals {

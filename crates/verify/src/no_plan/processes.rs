@@ -1,16 +1,17 @@
-//! What happens in the order of time: starts, ends and instants, with the literals that they read and
-//! make true.
+//! Starts, ends and instantaneous actions in the order of time, with the literals that they read
+//! and make true.
 //!
-//! All that follows rests on one lemma. In a valid plan, what happens at one time does not interfere, so
-//! that it can be put into any order, one after the other: each condition holds in the state just before,
-//! and the state after all is the same. An over-all literal of an action that lasts holds in each of these
-//! states, from the one after its start to the one before its end, if only two things are seen to: the
-//! start comes after what makes the literal true at that time, and the end before what makes it false.
-//! Such an order exists unless starts wait for each other in a circle, or ends do. Literals in which a
-//! circle is possible are left out of [`Process::over_all`] ([`leave_out_circles`]), and so are all of an
-//! action that may take no time.
+//! The proofs rely on one lemma. In a valid plan, happenings at one time do not interfere. So they
+//! can be put into any order, one after the other: each condition holds in the state just before,
+//! and the final state is the same. An over-all literal of an action with a positive duration holds
+//! in each of these states, from the one after its start to the one before its end, if two
+//! conditions are satisfied: the start comes after the happenings at that time that make the
+//! literal true, and the end before those that make it false. Such an order exists unless starts,
+//! or ends, wait for each other in a cycle. Literals for which a cycle is possible are left out of
+//! [`Process::over_all`] ([`leave_out_circles`]), and so are all literals of an action that may
+//! have duration 0.
 //!
-//! Numbers and disjunctions of over-all conditions are left out, too.
+//! Numbers and disjunctions of over-all conditions are left out as well.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,40 +24,40 @@ use super::beginning::lasting;
 use super::instances::Instances;
 use super::{Fact, Reached};
 
-/// A fact, and whether it is true.
+/// A fact and its truth value.
 pub(super) type Literal = (FactId, bool);
 
-/// An action that plans may have, or one under way at the beginning.
+/// An action that plans may contain, or one that is running initially.
 #[derive(Clone, Debug)]
 pub(super) struct Process {
     /// `(name object …)`.
     pub(super) name: String,
     pub(super) schema: SchemaId,
     pub(super) arguments: Vec<ObjectId>,
-    /// `None` if it is under way at the beginning.
+    /// `None` if it is running initially.
     pub(super) start: Option<Snap>,
-    /// `None` if it takes no time.
+    /// `None` if it is instantaneous.
     pub(super) end: Option<Snap>,
     pub(super) body: Body,
-    /// Its durations are within these bounds.
+    /// Bounds of its durations.
     pub(super) least: Rational,
     pub(super) most: Option<Rational>,
-    /// The literals that hold whenever it is under way.
+    /// Literals that hold while it is running.
     pub(super) over_all: Vec<Literal>,
-    /// When it started, if it is under way at the beginning.
+    /// Start time, if it is running initially.
     pub(super) begun: Option<Rational>,
 }
 
-/// What a happening reads and makes true.
+/// Literals that a happening reads and makes true.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Snap {
-    /// The literals among the conjuncts of its condition.
+    /// Literals among the conjuncts of its condition.
     pub(super) reads: Vec<Literal>,
-    /// What it may make true.
+    /// Literals that it may make true.
     pub(super) makes: Vec<Literal>,
-    /// What is surely true after it by its effects.
+    /// Literals that its effects certainly make true.
     pub(super) leaves: Vec<Literal>,
-    /// Whether it changes numbers.
+    /// `true` if it changes numbers.
     changes_numbers: bool,
 }
 
@@ -73,7 +74,8 @@ impl Snap {
         }
     }
 
-    /// Of changes, and whether each of them is sure. An addition wins over a deletion.
+    /// Returns the literals of changes; `true` marks those that are certain. An addition wins over
+    /// a deletion.
     pub(super) fn changing(changes: &[(&Change, bool)]) -> Self {
         let mut snap = Self::default();
         let (mut adds, mut deletes) = (BTreeMap::new(), BTreeMap::new());
@@ -106,13 +108,13 @@ impl Snap {
         snap
     }
 
-    /// Whether the literal is surely false after it.
+    /// Returns `true` if the literal is certainly false after it.
     pub(super) fn ends(&self, literal: Literal) -> bool {
         self.leaves.contains(&(literal.0, !literal.1))
     }
 }
 
-/// The literals among the conjuncts.
+/// Returns the literals among the conjuncts.
 pub(super) fn literals(condition: &Condition) -> Vec<Literal> {
     let mut found: Vec<Literal> = Vec::new();
     for part in condition.conjuncts() {
@@ -132,8 +134,8 @@ pub(super) fn literals(condition: &Condition) -> Vec<Literal> {
 }
 
 impl Instances {
-    /// Returns all processes: by schema and arguments those that may start, then those that run at the beginning, in
-    /// the order of the situation.
+    /// Returns all processes: first those that may start, by schema and arguments, then those that
+    /// are running initially, in the order of the situation.
     pub(super) fn processes(&self, reached: &Reached) -> Vec<Process> {
         let moments = self.moments(reached);
         let of = |action: &Action| {
@@ -164,7 +166,7 @@ impl Instances {
             })
         };
         let mut processes: Vec<Process> = self.actions.iter().filter_map(of).collect();
-        // States list actions in this order, which must not depend on the rounds that found the instances.
+        // The order of actions in states must not depend on the rounds that found the instances.
         processes.sort_by(|one, other| {
             (one.schema, &one.arguments).cmp(&(other.schema, &other.arguments))
         });
@@ -175,7 +177,8 @@ impl Instances {
             };
             let (least, most) = lasting(running, &self.beginning.now);
             let mut over_all = literals(&body.over_all);
-            // What does not hold now may be made good at once.
+            // Literals that are false initially are left out: another happening may establish them
+            // at once.
             over_all.retain(|(fact, is_true)| truth.contains(fact) == *is_true);
             processes.push(Process {
                 name: running.action.name.clone(),
@@ -197,7 +200,7 @@ impl Instances {
         processes
     }
 
-    /// Whether only timed initials make the fact true, so that it is known when it may hold.
+    /// Returns `true` if only timed initials make the fact true, so that its intervals are known.
     pub(super) fn is_timed_only(&self, fact: FactId) -> bool {
         let fact: Fact = self.task.atom(fact);
         self.lasting.spans(&fact).is_some()
@@ -205,12 +208,13 @@ impl Instances {
 }
 
 impl Process {
-    /// Its name in certificates: one that may start is told from one that was under way at the beginning.
+    /// Returns its name in certificates, which distinguishes actions that may start from those
+    /// running initially.
     pub(super) fn title(&self) -> String {
         titled(self.begun.is_some(), &self.name)
     }
 
-    /// The same with other objects.
+    /// Returns its name with other arguments.
     pub(super) fn title_with(&self, task: &Task, arguments: &[ObjectId]) -> String {
         titled(
             self.begun.is_some(),
@@ -218,7 +222,7 @@ impl Process {
         )
     }
 
-    /// The condition of an instant.
+    /// Returns the condition of an instantaneous action.
     pub(super) fn instant(&self) -> &Condition {
         match &self.body {
             Body::Instantaneous(snap) => &snap.condition,
@@ -233,7 +237,8 @@ impl Process {
         }
     }
 
-    /// Whether two of it that end together began together, and leave what one of them does.
+    /// Returns `true` if two instances that end together also started together, and together have
+    /// the effects of a single one.
     fn counts_once(&self) -> bool {
         let is_fixed = self.most.as_ref() == Some(&self.least);
         let snaps = self.start.iter().chain(&self.end);
@@ -252,10 +257,11 @@ fn titled(is_begun: bool, name: &str) -> String {
     }
 }
 
-/// Leaves out over-all literals for which starts of one time, or ends, might wait for each other in a
-/// circle: see the module.
+/// Removes over-all literals for which simultaneous starts, or ends, might wait for each other in a
+/// cycle; see the module.
 fn leave_out_circles(processes: &mut [Process]) {
-    // Starts: it waits for those whose start makes true what its own does not see to.
+    // A start waits for the starts that make true an over-all literal that it neither reads nor
+    // establishes itself.
     let loose = |process: &Process| -> Vec<Literal> {
         let Some(start) = &process.start else {
             return Vec::new();
@@ -278,7 +284,7 @@ fn leave_out_circles(processes: &mut [Process]) {
             process.over_all.retain(|own| !waits.contains(own));
         }
     }
-    // Ends: it has to come before those whose end makes false what it needs throughout.
+    // An end comes before the ends that make an over-all literal of the action false.
     let needs: Vec<Vec<Literal>> = processes.iter().map(|own| own.over_all.clone()).collect();
     let breaks = |process: &Process| -> Vec<Literal> {
         let makes = process.end.as_ref().map(|end| &end.makes);
@@ -290,7 +296,7 @@ fn leave_out_circles(processes: &mut [Process]) {
     };
     let breaks: Vec<Vec<Literal>> = processes.iter().map(breaks).collect();
     let once: Vec<bool> = processes.iter().map(Process::counts_once).collect();
-    // Of actions under way each is itself, and there is no other.
+    // There is only one instance of an action that is running initially.
     let is_alone = |number: usize| once[number] || processes[number].begun.is_some();
     let is_safe = without_circles(&needs, &breaks, &is_alone);
     let broken: BTreeSet<Literal> = breaks.iter().flatten().copied().collect();
@@ -301,8 +307,9 @@ fn leave_out_circles(processes: &mut [Process]) {
     }
 }
 
-/// Those that are on no circle, and lead to none: each waits for all others that give what it waits
-/// for, and for itself unless that does not count (Kahn 1962).
+/// Returns the nodes that are on no cycle and lead to none. Each node waits for all others that
+/// give one of the literals that it waits for, and for itself unless `never_for_itself` is true
+/// (Kahn 1962).
 fn without_circles(
     waits: &[Vec<Literal>],
     gives: &[Vec<Literal>],

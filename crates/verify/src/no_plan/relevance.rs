@@ -110,7 +110,7 @@ impl<'a> Relevance<'a> {
         }
     }
 
-    /// Adds what a condition mentions.
+    /// Adds the facts and fluents that a condition mentions.
     fn need(&mut self, condition: &Condition) {
         let task = &self.instances.task;
         let is_open = |fact: FactId| {

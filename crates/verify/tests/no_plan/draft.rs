@@ -1,5 +1,5 @@
-//! Small random problems, and a checker of certificates for them that knows neither PDDL nor the model:
-//! it walks along a grid of times.
+//! Small random problems, and a checker of certificates for them that depends neither on PDDL nor
+//! on the model: it walks along a time grid.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -75,7 +75,7 @@ impl Draft {
         });
         let mut timed: Vec<(i64, usize, bool)> = timed.collect();
         timed.sort_unstable();
-        // What becomes true and false at one time is refused by the reader.
+        // The reader rejects facts that become true and false at one time.
         timed.dedup_by_key(|own| (own.0, own.1));
         let mut goal = some(random, 2);
         if goal.is_empty() {
@@ -89,7 +89,8 @@ impl Draft {
         }
     }
 
-    /// The same with less: an action, an initial fact or an addition less, or timed initials one sooner.
+    /// Returns the smaller variants: without one action, initial fact or addition, or with timed
+    /// initials one earlier.
     pub(crate) fn with_less(&self) -> Vec<Self> {
         let mut all = Vec::new();
         for number in 0..self.actions.len() {
@@ -120,7 +121,7 @@ impl Draft {
             .all(|action| action.least == action.most)
     }
 
-    /// Domain and problem.
+    /// Returns the domain and the problem as text.
     pub(crate) fn text(&self) -> (String, String) {
         let mut domain = "(:requirements :durative-actions :duration-inequalities \
                           :timed-initial-literals) (:predicates"
@@ -180,7 +181,7 @@ impl Draft {
         (domain, problem)
     }
 
-    /// Whether no action makes the fact true.
+    /// Returns `true` if no action makes the fact true.
     fn is_fixed(&self, fact: usize) -> bool {
         let adds = |effects: &[(usize, bool)]| effects.contains(&(fact, true));
         !self
@@ -189,7 +190,8 @@ impl Draft {
             .any(|own| adds(&own.start) || adds(&own.end))
     }
 
-    /// Whether a fact that no action makes true may be true just before a time given in halves.
+    /// Returns `true` if a fact that no action makes true may be true just before a time in half
+    /// units.
     fn may_hold(&self, fact: usize, halves: i64) -> bool {
         let mut holds = self.initial.contains(&fact);
         let mut times: Vec<i64> = self.timed.iter().map(|own| own.0).collect();
@@ -201,12 +203,12 @@ impl Draft {
         holds
     }
 
-    /// Whether it may be true at a moment, just before it or just after it, given in halves.
+    /// Returns `true` if the fact may be true just before or just after a time in half units.
     fn touches(&self, fact: usize, halves: i64) -> bool {
         self.may_hold(fact, halves) || self.may_hold(fact, halves + 1)
     }
 
-    /// Whether the certificate proves that there is no plan, by definition.
+    /// Returns `true` if the certificate proves, by definition, that there is no plan.
     pub(crate) fn is_proof(&self, certificate: &NoPlan) -> bool {
         let mut from: BTreeMap<usize, Rational> = BTreeMap::new();
         for group in &certificate.reached {

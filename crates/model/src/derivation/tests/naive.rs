@@ -1,4 +1,5 @@
-//! The plainest way to derive: relax levels, then apply all rules of a level until nothing grows.
+//! Reference implementation of derivation: computes levels by relaxation, then applies all rules of
+//! a level until nothing changes.
 
 use std::collections::BTreeMap;
 
@@ -6,14 +7,14 @@ use crate::derivation::{GroundRule, Moment, holds};
 use crate::ground::{Condition, Expression, FactId};
 use crate::problem::Comparison;
 
-/// For each derived fact, how many negations at most are below it; `None` if there is no bound.
+/// Returns the number of negations below each derived fact; `None` if it is unbounded.
 pub(super) fn levels(rules: &[GroundRule]) -> Option<BTreeMap<FactId, usize>> {
     let mut levels: BTreeMap<FactId, usize> = rules.iter().map(|rule| (rule.head, 0)).collect();
     loop {
         let mut has_changed = false;
         for rule in rules {
             let needed = needed(&rule.body, &levels, false);
-            // Each level above 0 needs a fact of its own below it.
+            // Each level above 0 needs a fact on the level below it.
             if needed > levels.len() {
                 return None;
             }
@@ -43,7 +44,7 @@ fn needed(body: &Condition, levels: &BTreeMap<FactId, usize>, is_negated: bool) 
     }
 }
 
-/// The truth of each derived fact; `None` where it rests on something that says nothing.
+/// Returns the truth value of each derived fact; `None` if it depends on an undefined part.
 pub(super) fn derive(
     rules: &[GroundRule],
     levels: &BTreeMap<FactId, usize>,

@@ -1,4 +1,4 @@
-//! Small random problems, each one determined by a sequence of choices.
+//! Small random problems, each determined by a sequence of choices.
 
 use elbowroom_num::Rational;
 
@@ -8,7 +8,7 @@ use crate::problem::{
     Problem, Rule, Schema, Term, TimedChange, TimedInitial, Type, TypeId, UpdateOperator, Variable,
 };
 
-/// The problem that the choices lead to; when they are used up, all further ones are 0.
+/// Builds the problem from the choices. Missing choices are 0.
 pub(super) fn problem(choices: &[u8]) -> Problem {
     let mut chooser = Chooser {
         choices: choices.iter(),
@@ -21,10 +21,10 @@ pub(super) fn problem(choices: &[u8]) -> Problem {
 
 struct Chooser<'c> {
     choices: std::slice::Iter<'c, u8>,
-    /// Each predicate's number of arguments.
+    /// Number of arguments of each predicate.
     signatures: Vec<usize>,
     function_arities: Vec<usize>,
-    /// How many predicates, the last ones, are derived.
+    /// Number of derived predicates, which come last.
     derived: usize,
 }
 
@@ -267,7 +267,7 @@ impl Chooser<'_> {
         }
     }
 
-    /// Mostly atoms, as in real problems.
+    /// Generates a conjunction, mostly of atoms, as in real problems.
     fn conjunction(&mut self, scope: usize) -> Condition {
         Condition::And(self.some(3, |c| {
             if c.one_in(4) {

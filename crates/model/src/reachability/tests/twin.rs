@@ -1,5 +1,4 @@
-//! The plainly right twin: all instances of all schemas, and sweeps over them until nothing
-//! changes.
+//! Simple reference implementation: sweeps over all instances of all schemas until nothing changes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -56,7 +55,7 @@ pub(super) fn ground(problem: &Problem) -> Expected {
                 is_goal_possible: possible.holds(&task, task.goal(), true),
             };
         }
-        // What starts and cannot end is in no plan.
+        // An instance that starts but cannot end is in no plan.
         let mut index = 0;
         candidates.retain(|_| {
             index += 1;
@@ -74,7 +73,7 @@ fn instances(task: &Task, schema: SchemaId) -> Vec<Action> {
         .collect()
 }
 
-/// All ways to put objects for the variables.
+/// Returns all choices of objects for the variables.
 fn bindings(problem: &Problem, variables: &[Variable]) -> Vec<Vec<ObjectId>> {
     let mut all: Vec<Vec<ObjectId>> = vec![Vec::new()];
     for variable in variables {
@@ -87,7 +86,7 @@ fn bindings(problem: &Problem, variables: &[Variable]) -> Vec<Vec<ObjectId>> {
     all
 }
 
-/// The fixpoint, and which candidates start and end in it.
+/// Returns the fixpoint, and the candidates that start and end in it.
 fn sweep(task: &Task, candidates: &[Action]) -> (Possible, BTreeSet<usize>, BTreeSet<usize>) {
     let mut possible = Possible {
         ever_true: task.initial().facts.clone(),
@@ -233,7 +232,7 @@ impl Possible {
         is_defined
     }
 
-    /// The value if it never changes.
+    /// Returns the value if it never changes.
     fn value(&self, task: &Task, expression: &Expression) -> Option<Rational> {
         let values: &BTreeMap<FluentId, Rational> = &task.initial().values;
         expression.evaluate(&mut |leaf| match leaf {
@@ -254,14 +253,14 @@ impl Possible {
         })
     }
 
-    /// Whether there is a duration that satisfies all constraints with a known bound.
+    /// Returns `true` if there is a duration that satisfies all constraints with a known bound.
     fn leaves_room(&self, task: &Task, constraints: &[&DurationConstraint]) -> bool {
         let is_defined = constraints.iter().all(|c| self.is_defined(task, &c.bound));
         let bounds: Vec<_> = constraints
             .iter()
             .filter_map(|c| Some((c.comparison, self.value(task, &c.bound)?)))
             .collect();
-        // If any duration will do, then 0 or one of the bounds.
+        // If any duration is allowed, then 0 or one of the bounds is.
         let mut durations = vec![Rational::ZERO];
         durations.extend(bounds.iter().map(|(_, bound)| bound.clone()));
         durations.retain(|duration| !duration.is_negative());

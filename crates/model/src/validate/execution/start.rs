@@ -1,4 +1,4 @@
-//! Judgement of commanded starts.
+//! Validation of commanded starts.
 
 use elbowroom_num::Rational;
 
@@ -65,7 +65,7 @@ impl Execution {
             })
     }
 
-    /// Returns the over-all condition that the commanded duration violates, whatever happens.
+    /// Returns the over-all condition that the commanded duration violates in every state.
     pub(super) fn too_short_or_long(
         &self,
         action: &Action,

@@ -1,4 +1,4 @@
-//! When conditions are read.
+//! Times at which conditions are read.
 
 use super::world::{World, number};
 use crate::validate::Settings;
@@ -193,7 +193,7 @@ fn a_number_left_open_cannot_be_judged() {
     );
 }
 
-/// The verdicts are those of VAL's program at `-t 0.001`, for x = 9.99995, 10, 10.00005.
+/// Expected verdicts are those of VAL at `-t 0.001`, for x = 9.99995, 10, 10.00005.
 #[test]
 fn slack_forgives_conditions_of_one_moment_and_no_over_all_condition() {
     let table = [
@@ -217,7 +217,7 @@ fn slack_forgives_conditions_of_one_moment_and_no_over_all_condition() {
                 "valid" => '+',
                 reason => {
                     assert!(reason.contains("needs"), "{reason}");
-                    // A reason is given: `x is …`.
+                    // The message has a reason: `x is …`.
                     assert!(
                         reason.contains("= 10") || reason.contains("= 9"),
                         "{reason}"

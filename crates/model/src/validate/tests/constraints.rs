@@ -10,11 +10,11 @@ use elbowroom_num::Rational;
 
 use super::world::World;
 
-/// What `(p)` and `(q)` are from a time on.
+/// Truth values of `(p)` and `(q)` from a time on.
 type State = (Rational, [bool; 2]);
 
-/// Whether a constraint is kept by a sequence of states, by the definition of Gerevini & Long, word
-/// for word.
+/// Returns `true` if a sequence of states satisfies a constraint, by the literal definition of
+/// Gerevini & Long.
 fn is_kept(states: &[State], name: &str, times: &[i64]) -> bool {
     let n = states.len();
     let time = |i: usize| states[i].0.clone();
@@ -46,7 +46,7 @@ fn is_kept(states: &[State], name: &str, times: &[i64]) -> bool {
     }
 }
 
-/// Numbers that look random.
+/// Pseudorandom numbers.
 struct Dice(u64);
 
 impl Dice {
@@ -130,7 +130,7 @@ fn the_judge_agrees_with_the_definition_on_random_courses() {
     assert!(kept.iter().all(|&kept| kept > 0 && kept < 200), "{kept:?}");
 }
 
-/// A tank that is filled from 0, a unit of time by a unit of time, until 10.
+/// Returns a world with a tank that is filled from 0 to 10, by 1 per unit of time.
 fn tank() -> World {
     World::new("(= level 0)").durative("fill", &[("duration", "(= 10)"), ("rate", "level 1")])
 }
@@ -145,7 +145,7 @@ fn numbers_that_move_are_watched_between_happenings() {
          (>= level 3) does not hold until 3.9"
             .replace("level", "(level)")
     );
-    // It holds at no moment that is not later than 4, only right after.
+    // The condition becomes true only right after 4.
     assert_ne!(judge("(within 4 (> level 3))"), "valid");
     assert_eq!(judge("(within 4.001 (> level 3))"), "valid");
     assert_eq!(judge("(at-most-once (= level 5))"), "valid");

@@ -1,4 +1,4 @@
-//! What effects do.
+//! Effects.
 
 use super::world::World;
 

@@ -32,7 +32,7 @@ impl Executed {
         Arc::new(self.task.instantiate(SchemaId::from(schema), &[]).unwrap())
     }
 
-    /// Commands a start, and returns the objection.
+    /// Commands a start, and returns the verdict.
     fn command(&mut self, id: u64, time: &str, name: &str, duration: &str) -> String {
         let action = self.action(name);
         let duration: Option<Rational> = (!duration.is_empty()).then(|| number(duration));
@@ -117,7 +117,7 @@ fn commanded_duration_satisfies_conditions_over_all_that_read_it_alone() {
     let judged = executed.command(0, "0", "soak", "2.885");
     assert!(judged.contains("(>= ?duration 3) over all"), "{judged}");
     assert_eq!(executed.command(1, "1", "soak", "3"), "valid");
-    // It has no moment between start and end.
+    // With duration 0, there is no moment between start and end.
     assert_eq!(executed.command(2, "2", "soak", "0"), "valid");
 }
 

@@ -1,4 +1,4 @@
-//! How a violation reads.
+//! Messages of violations.
 
 use super::world::{World, number};
 use crate::problem::{Body, Condition, ObjectId, Term};

@@ -1,4 +1,4 @@
-//! Text in parentheses.
+//! Parser of texts in parentheses.
 
 /// A word, or a list in parentheses.
 #[derive(Clone, Debug)]
@@ -14,7 +14,7 @@ pub(super) fn head(parts: &[Form]) -> &str {
     }
 }
 
-/// The words of a flat list, or the word itself.
+/// Returns the words of a flat list, or the word itself.
 pub(super) fn words(form: &Form) -> Vec<&str> {
     match form {
         Form::Word(word) => vec![word],

@@ -95,7 +95,7 @@ fn without_epsilon_interfering_happenings_only_must_not_coincide() {
     );
 }
 
-/// The delivery counts only if the shop has not thrown it out in the end.
+/// Returns a world where the delivery only counts if the shop has not thrown it out at the end.
 fn thrown_out() -> World {
     World::new("")
         .instant("deliver", "", "(p)")
@@ -112,16 +112,16 @@ fn the_goal_holds_after_timed_initials_that_come_after_the_plan() {
     );
     assert_eq!(world().judge("10: deliver"), "valid");
     assert_eq!(world().timed("11", "(p)").judge("1: deliver"), "valid");
-    // Without any action, too.
+    // Timed initials count even without any action.
     let given = || World::new("").timed("5", "(q)").goal("(q)");
     assert_eq!(given().judge(""), "valid");
-    // They take part like any happening.
+    // Timed initials interfere like other happenings.
     assert_eq!(
         world().judge("8.9999: deliver"),
         "at 9.000: (deliver) interferes: (deliver) at 8.9999 and a timed initial at 9.000 both \
          concern (p) and must be at least 0.001 apart"
     );
-    // A setting reads the goal after the last action.
+    // With this setting, the goal is read after the last action.
     let early = || Settings {
         counts_later_timed: false,
         ..Settings::default()
@@ -130,8 +130,8 @@ fn the_goal_holds_after_timed_initials_that_come_after_the_plan() {
     assert_ne!(given().settings(early()).judge(""), "valid");
 }
 
-/// The times are in tenths: timed initials that make one of three facts true or false, and steps of
-/// which each makes one of them true or false and needs another one.
+/// Times are in tenths. Timed initials make one of three facts true or false. Each step makes one
+/// of them true or false and needs another one.
 type Draft = (Vec<(u8, u8, bool)>, Vec<(u8, u8)>, u8);
 
 fn drafts() -> impl Strategy<Value = Draft> {
@@ -205,7 +205,7 @@ fn what_is_read_and_written_at_one_time_is_allowed_only_if_the_settings_say_so()
         world(Settings::default()).judge("1: use\n1: spoil"),
         "valid"
     );
-    // What contradicts itself is refused under any rule, and nothing sees what comes with it.
+    // Contradictory writes are rejected under all settings, before their effects are visible.
     assert!(judge("1: use\n2: spoil\n2: restore").starts_with("at 2.000: (restore) interferes"));
     let handover = handover().settings(Settings::like_unified_planning());
     assert_eq!(

@@ -1,4 +1,4 @@
-//! The cutting of pieces against looking at very many moments.
+//! Comparison of the cutting of pieces with a dense grid of moments.
 
 use proptest::prelude::*;
 
@@ -6,7 +6,7 @@ use super::world::{World, number};
 use crate::validate::Mistake;
 use elbowroom_num::Rational;
 
-/// A comparison of `x` or `y` with a small number, in one of five ways.
+/// Generates a comparison of `x` or `y` with a small number, in one of five ways.
 fn atom() -> impl Strategy<Value = String> {
     let symbol = prop::sample::select(vec!["<", "<=", "=", ">=", ">"]);
     let fluent = prop::sample::select(vec!["x", "y", "(+ x y)", "(* x y)", "(- x (* 2 y))"]);
@@ -52,7 +52,8 @@ proptest! {
                 break;
             }
         }
-        // A product may cross a bound between two grid points and back, or touch it off the grid.
+        // A product may cross a bound and return between two grid points, or touch it outside the
+        // grid.
         if condition.contains("(* x y)") {
             prop_assert!(sampled || throughout != "valid");
         } else {
@@ -60,8 +61,8 @@ proptest! {
         }
     }
 
-    /// The plan that ends where the condition is said to break is valid; one that ends a little
-    /// later is not.
+    /// The plan that ends at the reported first violation is valid; one that ends a little later is
+    /// not.
     #[test]
     fn the_first_break_is_the_first(
         condition in condition(),

@@ -1,5 +1,6 @@
-//! Whole plans against a twin that knows no pieces, groups or polynomials: it computes the state
-//! at any moment afresh from all that happened before, and looks at very many moments.
+//! Whole plans, compared with a reference implementation without pieces, groups or polynomials: it
+//! computes the state at any moment from all earlier happenings, and checks a dense grid of
+//! moments.
 
 use std::fmt::Write as _;
 
@@ -13,7 +14,8 @@ use crate::state::State;
 use crate::task::Task;
 use crate::validate::{Verdict, validate, validate_from};
 
-/// Facts `p` and `q` hold, and `x` is 5, at the beginning; `q` ends at 9/2 and returns at 11/2.
+/// Returns a world where `p` and `q` hold and `x` is 5 initially; `q` ends at 9/2 and returns at
+/// 11/2.
 fn world() -> World {
     World::new("(p) (q) (= x 5)")
         .durative(
@@ -44,7 +46,7 @@ fn world() -> World {
 
 const ACTIONS: [&str; 6] = ["lock", "drain", "fill", "raise", "lower", "spend"];
 
-/// One step: which action, and when it starts and ends.
+/// A step: its action, start and end.
 #[derive(Clone, Debug)]
 struct Step {
     action: &'static str,
@@ -59,10 +61,10 @@ struct Seen {
     x: Rational,
 }
 
-/// The state at a moment; what happens at that very moment counts only if `after`.
+/// Returns the state at a moment. Happenings at that moment count only if `after`.
 fn seen(steps: &[Step], now: &Rational, after: bool) -> Seen {
     let is_past = |time: &Rational| time < now || (after && time == now);
-    // Each change of a fact, by time; the last one counts, and the beginning counts as first.
+    // All changes of facts by time, beginning with the initial state; the last one counts.
     let mut changes = vec![
         (Rational::from(-1), 'p', true),
         (Rational::from(-1), 'q', true),
@@ -100,10 +102,10 @@ fn seen(steps: &[Step], now: &Rational, after: bool) -> Seen {
     }
 }
 
-/// Two happenings at one time must not, in some order, be one that writes and one that reads or
-/// writes the same, unless both only shift x, or write the same truth.
+/// Returns `true` if one of two simultaneous happenings writes a fact or number that the other one
+/// reads or writes, unless both only shift x, or write the same truth value.
 fn has_interference(steps: &[Step]) -> bool {
-    /// Facts and `x`, with what is done: `r`ead, made `t`rue, made `f`alse, `s`hifted.
+    /// Returns the accesses to facts and `x`: `r`ead, made `t`rue, made `f`alse, `s`hifted.
     fn uses(action: &str, at_end: bool) -> &'static [(char, char)] {
         match (action, at_end) {
             ("lock", false) => &[('p', 'r'), ('p', 'f')],
@@ -151,8 +153,8 @@ fn is_valid(steps: &[Step]) -> bool {
         }
     });
     let over_all_hold = steps.iter().all(|step| {
-        // All slopes are between -3 and 6, all times multiples of 1/2: nothing crosses a whole
-        // number off the multiples of 1/120, and between two of these nothing crosses at all.
+        // All slopes are between -3 and 6, all times are multiples of 1/2. So values cross integers
+        // only at multiples of 1/120, and nothing changes between two of these.
         let mut moment = &step.start + Rational::new(1, 240);
         while moment < step.end {
             let here = seen(steps, &moment, true);
@@ -192,7 +194,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
             end: Rational::new(start + length, 2),
         }
     });
-    // At most three fills and three drains, for the bound on slopes.
+    // At most three fills and three drains, to limit the slopes.
     prop::collection::vec(step, 0..4)
 }
 
@@ -209,7 +211,7 @@ fn text(steps: &[Step]) -> String {
     text
 }
 
-/// Where the plan stands at a moment at which nothing happens, and the plan from there.
+/// Returns the situation at a moment without happenings, and the plan from there.
 fn cut(
     task: &Task,
     plan: &TimeTriggeredPlan,
@@ -267,7 +269,7 @@ proptest! {
         let (task, plan) = world.task_and_plan(&text(&steps));
         let whole = validate(&task, &plan, &world.settings);
         let (situation, rest) = cut(&task, &plan, &steps, &now);
-        // A plan that is over at the cut reaches its goal before what is left does.
+        // If the plan is over at the cut, it reaches its goal before the remaining task does.
         if rest.steps.is_empty() {
             return Ok(());
         }

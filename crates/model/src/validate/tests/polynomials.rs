@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::world::number;
 use crate::validate::polynomial::{Polynomial, Root};
 
-/// `(τ - r1)(τ - r2)…`
+/// Returns `(τ - r1)(τ - r2)…`.
 fn with_roots(roots: &[Rational]) -> Polynomial {
     let one = Polynomial::constant(Rational::ONE);
     roots.iter().fold(one, |product, root| {

@@ -1,6 +1,6 @@
 //! Small problems without objects, written in a few lines.
 //!
-//! `(p)` is a fact and `x` a fluent, declared by being mentioned.
+//! `(p)` is a fact and `x` a fluent. A mention declares them.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub(super) struct World {
 }
 
 impl World {
-    /// A world in whose initial state these facts hold, and `(= x 3)` these values.
+    /// Creates a world with these initial facts, and initial values `(= x 3)`.
     pub(super) fn new(initial: &str) -> Self {
         let mut world = Self {
             problem: Problem::default(),
@@ -52,14 +52,14 @@ impl World {
         self
     }
 
-    /// `(within 3 (p))` and the like.
+    /// Adds a constraint such as `(within 3 (p))`.
     pub(super) fn constraint(mut self, text: &str) -> Self {
         let constraint = self.modal(text);
         self.problem.constraints.push(constraint);
         self
     }
 
-    /// The same, as a preference of that name.
+    /// Adds a preference with that name.
     pub(super) fn prefer(mut self, name: &str, text: &str) -> Self {
         let modal = self.modal(text);
         let preference = PreferenceId::from(self.problem.preferences.len());
@@ -110,7 +110,7 @@ impl World {
         self
     }
 
-    /// `(p)`, `(not (p))` or `(= x 3)` at a time.
+    /// Adds a timed initial: `(p)`, `(not (p))` or `(= x 3)`.
     pub(super) fn timed(mut self, time: &str, change: &str) -> Self {
         let form = forms(change).remove(0);
         let change = match &form {
@@ -138,8 +138,8 @@ impl World {
         self.schema(name, Body::Instantaneous { condition, effects })
     }
 
-    /// Sections: `duration`, `start`, `over all`, `end`, `start effect`, `end effect`, and
-    /// `rate` (`x 2`: x increases by 2 per unit of time).
+    /// Adds a durative action with sections `duration`, `start`, `over all`, `end`, `start effect`,
+    /// `end effect`, and `rate` (`x 2`: x increases by 2 per unit of time).
     pub(super) fn durative(mut self, name: &str, sections: &[(&str, &str)]) -> Self {
         let text = |wanted: &str| {
             let found = sections.iter().find(|(section, _)| *section == wanted);
@@ -158,7 +158,7 @@ impl World {
         self.schema(name, body)
     }
 
-    /// The judge's verdict on a plan: `valid`, or the violation.
+    /// Returns the verdict on a plan: `valid`, or the violation.
     pub(super) fn judge(&self, plan: &str) -> String {
         match self.verdict(plan) {
             Verdict::Valid(_) => "valid".to_owned(),
@@ -308,8 +308,8 @@ impl World {
         forms(text).iter().map(|form| self.effect(form)).collect()
     }
 
-    /// `(p)`, `(not (p))`, `(increase x 1)`, or `(when condition effect)`, where the condition
-    /// may be `(start …)`, `(overall …)`, else it is read at the effect's time.
+    /// Parses `(p)`, `(not (p))`, `(increase x 1)`, or `(when condition effect)`. The condition may
+    /// be `(start …)` or `(overall …)`, otherwise it is read at the effect's time.
     fn effect(&mut self, form: &Form) -> Effect {
         let Form::List(parts) = form else {
             panic!("{form:?}")

@@ -1,4 +1,4 @@
-//! What is written is read back, and nothing makes the reader panic.
+//! Files that are written can be read, and the reader never panics.
 
 use elbowroom_num::Rational;
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, NodeId, Reason, S
 use crate::testing::rover;
 use crate::valuation::ParameterId;
 
-/// Plans that files can express, as reading them gives them.
+/// Generates plans that files can express, in the form that reading them produces.
 fn plans() -> impl Strategy<Value = ParametrizedPlan> {
     let action = prop_oneof!["navigate", "beep", "collect s1", "collect s2", "refuel s1"];
     let rational = || (-2000_i64..2000, 1_i64..12).prop_map(|(n, d)| Rational::new(n, d));
@@ -109,14 +109,14 @@ fn duration_place(plan: &StnPlan, place: Pick) -> Option<InstanceId> {
     (!all.is_empty()).then(|| InstanceId::from(*place.get(&all)))
 }
 
-/// At most one numeric constraint per pair, as the writer merges them.
+/// Generates at most one numeric constraint per pair, because the writer merges them.
 fn given(nodes: usize, constraints: Vec<PickedConstraint>) -> Vec<Constraint> {
     let mut seen = std::collections::BTreeSet::new();
     let bound = |value: Option<Rational>| value.map_or(Bound::Infinite, Bound::Finite);
     constraints
         .into_iter()
         .map(|(from, to, lower, upper)| match (lower, upper) {
-            // A bound that nothing satisfies is refused.
+            // The reader rejects bounds that cannot be satisfied.
             (Some(lower), Some(upper)) if lower > upper => (from, to, Some(upper), Some(lower)),
             (lower, upper) => (from, to, lower, upper),
         })
@@ -131,7 +131,7 @@ fn given(nodes: usize, constraints: Vec<PickedConstraint>) -> Vec<Constraint> {
         .collect()
 }
 
-/// The file with some of its bytes replaced, and stretches of it copied to other places.
+/// Generates the file with some bytes replaced, and some parts copied to other places.
 fn mutated() -> impl Strategy<Value = Vec<u8>> {
     let replaced = prop::collection::vec((any::<Pick>(), any::<u8>()), 0..4);
     let copied = prop::collection::vec((any::<Pick>(), any::<Pick>(), 0..80_usize), 0..4);
@@ -159,7 +159,8 @@ proptest! {
         let task = rover();
         match read(&bytes, &task) {
             Ok(plan) => {
-                // Bounds on the same difference are merged the first time.
+                // Bounds on the same difference are merged when the file is written for the first
+                // time.
                 let written = write(&task, &plan).expect("what was read can be written");
                 let again = read(written.as_bytes(), &task).expect("what is written is right");
                 prop_assert_eq!(write(&task, &again).expect("again"), written);

@@ -1,4 +1,4 @@
-//! What a likelihood file must say.
+//! Check that likelihood files are complete.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use super::super::{PartialFlip, is_changed, names};
 use super::Reader;
 
 impl Reader<'_> {
-    /// Something is said of each fact and each action.
+    /// Checks that there is an entry for each fact and each action.
     pub(super) fn check_complete(&mut self, document: &DeTable<'_>) {
         let section = |name: &str| {
             let entry = document.iter().find(|(key, _)| key.get_ref() == name);
@@ -23,7 +23,7 @@ impl Reader<'_> {
                 continue;
             }
             if !is_mentioned && !is_changed(self.problem, id) {
-                // What never changes, and is not mentioned, stays as it is.
+                // A fact that nothing changes, and that is not mentioned, never changes by itself.
                 let never = PartialFlip::NEVER;
                 self.likelihoods.predicates.insert(id, never);
                 continue;
@@ -37,7 +37,8 @@ impl Reader<'_> {
                 continue;
             }
             let mut missing = None;
-            // Stops at the first that is not listed, so it takes no longer than the list is.
+            // Stops at the first tuple that is not listed, so the time is proportional to the
+            // length of the list.
             names::for_each_tuple(self.problem, &predicate.parameters, &mut |tuple| {
                 if self.likelihoods.flip_of(id, tuple).is_none() {
                     missing = Some(self.problem.apply_name(&predicate.name, tuple));

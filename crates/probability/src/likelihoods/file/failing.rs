@@ -1,4 +1,4 @@
-//! Failures of actions after their start, and what they leave behind.
+//! Sections about failures of actions after their start.
 
 use std::ops::Range;
 
@@ -14,19 +14,19 @@ pub(super) const KEYS: [&str; 4] = ["end", "during_per_second", "undone", "outco
 /// The keys of an outcome.
 const OUTCOME: [&str; 3] = ["probability", "becomes_true", "becomes_false"];
 
-/// What a section is about.
+/// Subject of a section.
 #[derive(Clone, Debug)]
 pub(super) enum About {
     Defaults,
-    /// An action, and perhaps its objects.
+    /// An action, with or without objects.
     Action(SchemaId, Option<Vec<ObjectId>>),
 }
 
-/// A mistake, and what was expected.
+/// A mistake, and the expected form.
 type Wrong = (String, Option<String>);
 
 impl Reader<'_> {
-    /// One of [`KEYS`]; `schema` is `None` in the defaults.
+    /// Reads one of [`KEYS`]; `schema` is `None` in the defaults.
     pub(super) fn failing(
         &mut self,
         schema: Option<SchemaId>,
@@ -91,7 +91,7 @@ impl Reader<'_> {
                 continue;
             };
             sum += outcome.probability;
-            // Tenths do not add up to 1 in binary.
+            // Decimal fractions do not add up to exactly 1 in binary.
             if sum > 1.0 + 1e-9 {
                 let message = format!("with this outcome the probabilities add up to {sum}");
                 let expected = "shares of the failures, so 1 is the most".to_owned();
@@ -111,7 +111,7 @@ impl Reader<'_> {
             return None;
         };
         let mut entries: Vec<_> = table.iter().collect();
-        // In the order of the file, so that of two mistakes the second is the mistake.
+        // In the order of the file, so that the second of two conflicting entries is reported.
         entries.sort_by_key(|(key, _)| key.span().start);
         let mut probability = None;
         let mut changes = Vec::new();
@@ -137,7 +137,7 @@ impl Reader<'_> {
             self.mistakes.mistake(entry.span(), message, expected);
             return None;
         }
-        // As in world files: first what becomes true, then what becomes false.
+        // As in world files: first the facts that become true, then those that become false.
         changes.sort_by_key(|change| !change.becomes);
         Some(Outcome {
             probability,
@@ -145,7 +145,7 @@ impl Reader<'_> {
         })
     }
 
-    /// A list of facts.
+    /// Reads a list of facts.
     fn changes(
         &mut self,
         schema: Option<SchemaId>,
@@ -187,7 +187,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A fact, with objects, and with parameters of the action: `(on ?box floor)`.
+    /// Reads a fact with objects and parameters of the action: `(on ?box floor)`.
     fn changed_fact(
         &self,
         schema: Option<SchemaId>,
@@ -226,7 +226,7 @@ impl Reader<'_> {
         Ok((predicate, arguments))
     }
 
-    /// The place of a parameter among those of an action, if some object fits both it and `types`.
+    /// Returns the position of a parameter of an action, if some object fits both it and `types`.
     fn parameter(
         &self,
         schema: Option<SchemaId>,
@@ -252,7 +252,7 @@ impl Reader<'_> {
         };
         let own = &schema.parameters[place].types;
         let mut objects = self.problem.objects_of(own);
-        // Where there are no objects at all, nothing is started either.
+        // Without any objects, the action cannot be started, so any parameter is allowed.
         let is_empty = self.problem.objects_of(own).next().is_none();
         if is_empty || objects.any(|object| self.problem.has_type(object, types)) {
             Ok(place)
@@ -262,14 +262,14 @@ impl Reader<'_> {
         }
     }
 
-    /// Takes note of a section that says what failures leave behind.
+    /// Records a section with effects of failures.
     pub(super) fn note_leftovers(&mut self, key: &Key<'_>, failing: &Failing, about: About) {
         if failing.has_leftovers() {
             self.leftovers.push((key.span(), about));
         }
     }
 
-    /// Who says what failures leave behind says also how actions fail.
+    /// Checks that each section with effects of failures also has a failure probability.
     pub(super) fn check_leftovers(&mut self) {
         let leftovers = std::mem::take(&mut self.leftovers);
         for (span, about) in leftovers {

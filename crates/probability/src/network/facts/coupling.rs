@@ -1,4 +1,4 @@
-//! Which facts are coupled: how they get into one cluster, and out of it again.
+//! Coupling of facts: entering a cluster and leaving it.
 
 use elbowroom_model::ground::FactId;
 
@@ -8,7 +8,7 @@ use super::{Facts, MOST_COUPLED, Record};
 use crate::model::Model;
 
 impl Facts {
-    /// The facts among these that are not certain in the present layer.
+    /// Returns those of these facts that are not certain in the present layer.
     pub(super) fn open(&mut self, model: &Model, facts: &[usize]) -> Vec<usize> {
         let mut open = Vec::new();
         for &fact in facts {
@@ -24,9 +24,9 @@ impl Facts {
         open
     }
 
-    /// The truth of a basic fact, those of a cluster being as the bits of `index` say.
+    /// Returns the truth value of a basic fact; those of a cluster are the bits of `index`.
     ///
-    /// Facts on their own are certain where this is asked.
+    /// Independent facts must be certain.
     pub(super) fn is_true(
         &self,
         model: &Model,
@@ -43,7 +43,7 @@ impl Facts {
         }
     }
 
-    /// Puts facts into one cluster, with all that they are already coupled to.
+    /// Puts facts into one cluster, with all facts that they are already coupled to.
     pub(super) fn couple(&mut self, model: &Model, facts: &[usize]) -> Result<u32, usize> {
         let mut slots: Vec<u32> = Vec::new();
         let mut singles: Vec<usize> = Vec::new();
@@ -91,7 +91,7 @@ impl Facts {
         Ok(slot)
     }
 
-    /// Lets facts that have become certain go their own way.
+    /// Removes facts that have become certain from the cluster.
     pub(super) fn release_certain(&mut self, slot: u32) {
         let Some(mut cluster) = self.clusters[slot as usize].clone() else {
             return;
@@ -127,7 +127,8 @@ impl Facts {
         }
     }
 
-    /// Takes a fact out of its cluster, if it is in one; from the present layer it has `p`.
+    /// Removes a fact from its cluster, if it is in one. Its probability is `p` from the present
+    /// layer on.
     pub(super) fn split_off(&mut self, fact: usize, p: f64) {
         let record = Record {
             layer: self.layer,
@@ -144,7 +145,8 @@ impl Facts {
         self.put_record(fact, record);
     }
 
-    /// The same, for a fact that forgets its past and has `p` from the layer `next`.
+    /// Removes a fact from its cluster, for a fact whose value no longer depends on its past. Its
+    /// probability is `p` from the layer `next` on.
     pub(super) fn forget(&mut self, model: &Model, fact: usize, p: f64, next: u32) {
         if let Some(slot) = self.records[fact].cluster {
             self.cluster(model, slot);
@@ -153,7 +155,7 @@ impl Facts {
         self.set_record_at(fact, p, next);
     }
 
-    /// A cluster, brought up to the present layer.
+    /// Returns a cluster, updated to the present layer.
     pub(super) fn cluster(&mut self, model: &Model, slot: u32) -> &Cluster {
         let layer = self.layer;
         let is_behind = |cluster: &Cluster| cluster.layer < layer;

@@ -1,19 +1,19 @@
-//! The distribution as one value, to be compared with others: [`Snapshot`].
+//! The distribution as one value, for comparisons: [`Snapshot`].
 
 use super::Facts;
 use crate::model::Model;
 
-/// The distribution of some facts at one moment.
+/// Distribution of some facts at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Snapshot {
-    /// P(true) of facts on their own.
+    /// P(true) of independent facts.
     pub(crate) single: Vec<(usize, f64)>,
     /// Coupled facts, sorted, with the weights of their assignments.
     pub(crate) coupled: Vec<(Vec<usize>, Vec<f64>)>,
 }
 
 impl Facts {
-    /// The distribution of the facts that matter; a cluster matters as a whole.
+    /// Returns the distribution of the relevant facts. A cluster is relevant as a whole.
     pub(in crate::network) fn snapshot(
         &mut self,
         model: &Model,

@@ -1,10 +1,11 @@
-//! How much time the rests of an order have: [`Rests`].
+//! Time windows of the rests (suffixes) of an order: [`Rests`].
 //!
-//! The same as [`Rooms`](super::Rooms), from the end backwards. To what is known when a rest begins only
-//! few of its time points matter: zero, its first happening, the ends of what is under way then, and what
-//! may come less than ε after the first happening. The network of each rest, projected on these, is
-//! made once, each from the one behind it. With what has been observed put in, it says when the first
-//! happening may be, which takes time in proportion to what is under way and not to what is left.
+//! The same as [`Rooms`](super::Rooms), computed backwards from the end. When a rest begins, only
+//! few of its time points are constrained by the past: zero, its first happening, the ends of
+//! running actions, and happenings that may come less than ε after the first one. The network of
+//! each rest, projected on these, is computed once, each from the next one. Combined with the
+//! observed times, it gives the window of the first happening, in time proportional to the number
+//! of running actions and not to the length of the rest.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
@@ -15,45 +16,45 @@ use crate::circumstances::Circumstances;
 use crate::model::Model;
 use crate::total_order::Slot;
 
-/// With more points than this, a rest and those before it are not projected: a matrix for each place in
-/// an order would take more than what it saves.
+/// With more points than this, a rest and those before it are not projected: a matrix for each
+/// position in an order would cost more than it saves.
 const MOST_POINTS: usize = 40;
 
-/// The rests of a sequence, by the position at which they begin.
+/// The rests of a sequence, by their first position.
 #[derive(Clone, Debug)]
 pub(crate) struct Rests {
-    /// Where the first of them begins.
+    /// First position.
     from: usize,
     /// By position, from `from` on.
     by_position: Vec<Rest>,
-    /// How many timed initials have passed before each position, and at the end.
+    /// Number of timed initials that have passed before each position, and at the end.
     timed_before: Vec<usize>,
 }
 
-/// The network of a rest.
+/// Network of a rest.
 #[derive(Clone, Debug)]
 enum Rest {
-    /// There is never time for it.
+    /// It has no schedule at any time.
     Never,
     Projected(Room),
-    /// Too much is under way at once.
+    /// Too many actions are running at once.
     Wide,
 }
 
-/// What the rests say of a first happening.
+/// Time window of a first happening.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum First {
-    /// It may be in this window.
+    /// The window.
     In(Slot),
-    /// There is no time for it and what follows.
+    /// There is no schedule.
     Never,
-    /// The rests were made for other timed initials to have passed, or are not projected.
+    /// The rests are for another number of passed timed initials, or are not projected.
     Unknown,
 }
 
 impl Rests {
-    /// Those of `sequence` from position `from` on, before which so many of the timed initials that
-    /// matter have passed; `running` is under way after the sequence.
+    /// Computes the rests of `sequence` from position `from` on. `passed` is the number of relevant
+    /// timed initials before it; `running` are the running actions after the sequence.
     pub(crate) fn of(
         model: &Model,
         separations: &Separations,
@@ -88,7 +89,7 @@ impl Rests {
                         Some(room) => Rest::Projected(room),
                     }
                 }
-                // What comes before adds constraints.
+                // Earlier happenings only add constraints.
                 Rest::Never => Rest::Never,
                 Rest::Wide => Rest::Wide,
             };
@@ -102,19 +103,19 @@ impl Rests {
         }
     }
 
-    /// Whether they were made for so many timed initials to have passed before this position.
+    /// Returns `true` if the rests are for `passed` timed initials before this position.
     pub(crate) fn are_for(&self, position: usize, passed: usize) -> bool {
         position >= self.from && self.timed_before[position - self.from] == passed
     }
 
-    /// Whether timed initials are part of the rest.
+    /// Returns `true` if timed initials are part of the rest.
     pub(crate) fn have_timed(&self, position: usize) -> bool {
         let before = position.checked_sub(self.from);
         before.is_none_or(|before| Some(&self.timed_before[before]) != self.timed_before.last())
     }
 
-    /// The window of the happening at this position, if the rest begins now. What is under way must be
-    /// what the order has under way there.
+    /// Returns the window of the happening at this position, if the rest begins now. The running
+    /// actions must be those of the order there.
     pub(crate) fn first(
         &self,
         separations: &Separations,
@@ -138,8 +139,8 @@ impl Rests {
 }
 
 impl Room {
-    /// The room of a rest that has one more happening in front, `behind` being the one that was first;
-    /// `None` if there is no time for it.
+    /// Returns the room of a rest with one more happening in front; `behind` is the previous first
+    /// one. Returns `None` if it has no schedule.
     fn before(
         &self,
         model: &Model,
@@ -189,8 +190,8 @@ impl Room {
         Some(room)
     }
 
-    /// Drops what is at least ε after the first happening, whatever happens, and what nothing has to
-    /// be ε apart from.
+    /// Drops happenings that are always at least ε after the first one, and those that need no
+    /// separation from any other one.
     fn keep_near(&mut self, separations: &Separations) {
         let Some(first) = self.place(Point::Last) else {
             return;
@@ -208,7 +209,7 @@ impl Room {
         self.retain(|place| is_near[place]);
     }
 
-    /// The window of the first happening of a rest that begins in these circumstances.
+    /// Returns the window of the first happening of a rest that begins in these circumstances.
     fn begun(
         mut self,
         separations: &Separations,
@@ -218,7 +219,7 @@ impl Room {
         let (zero, first) = (self.place(Point::Zero)?, self.place(Point::Last)?);
         let now = &circumstances.now;
         self.at_least(zero, first, now)?;
-        // What is not near comes ε after now or later.
+        // Points that are not near come at least ε after the present time.
         for (recent, time) in &circumstances.recent {
             let apart = time + &separations.epsilon;
             for place in 0..self.points.len() {

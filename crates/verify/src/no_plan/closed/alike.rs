@@ -1,4 +1,4 @@
-//! Objects that can change places without changing the problem.
+//! Interchangeable objects: exchanging them does not change the problem.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use elbowroom_model::problem::ObjectId;
 use super::{Closure, FIRST_START, NOW, Node, UnderWay, ZERO};
 use crate::no_plan::NoPlanFlaw;
 
-/// Two objects that change places: what becomes of facts, fluents and actions.
+/// Exchange of two objects, as a mapping of facts, fluents and processes.
 #[derive(Debug)]
 pub(in crate::no_plan) struct Exchange {
     facts: BTreeMap<FactId, FactId>,
@@ -17,10 +17,10 @@ pub(in crate::no_plan) struct Exchange {
     processes: Vec<usize>,
 }
 
-/// The exchanges of neighbours in classes of objects.
+/// Returns the exchanges of neighbours in classes of interchangeable objects.
 ///
 /// # Errors
-/// When the problem is not the same after one of them.
+/// When an exchange changes the problem.
 pub(super) fn exchanges(
     closure: &Closure<'_>,
     alike: &[Vec<ObjectId>],
@@ -41,7 +41,7 @@ pub(super) fn exchanges(
 }
 
 impl Exchange {
-    /// The state in which the objects have changed places.
+    /// Returns the state after the exchange.
     pub(super) fn image(&self, node: &Node) -> Node {
         let mut under_way: Vec<(UnderWay, usize)> = Vec::new();
         for (place, own) in node.under_way.iter().enumerate() {
@@ -73,7 +73,7 @@ impl Exchange {
 }
 
 impl Closure<'_> {
-    /// Whether two objects can change places.
+    /// Returns `true` if two objects are interchangeable.
     pub fn are_alike(&self, one: ObjectId, other: ObjectId) -> bool {
         self.exchange((one, other)).is_some()
     }
@@ -82,8 +82,9 @@ impl Closure<'_> {
         &self.instances().task
     }
 
-    /// The exchange of two objects, if the problem is the same after it: the domain mentions neither, and
-    /// what is read and never changes, timed initials, the goal and the actions are the same.
+    /// Returns the exchange of two objects, or `None` if it changes the problem. The domain must
+    /// mention neither object. Constant facts and numbers that are read, timed initials, the goal
+    /// and the actions must be the same after the exchange.
     fn exchange(&self, pair: (ObjectId, ObjectId)) -> Option<Exchange> {
         let task = self.task();
         let problem = task.problem();
@@ -174,7 +175,7 @@ impl Closure<'_> {
         })
     }
 
-    /// Whether timed initials of one time do the same.
+    /// Returns `true` if the timed initials of one time stay the same.
     fn is_kept(&self, changes: &[Change], map: &Map<'_>) -> bool {
         let mut own = BTreeSet::new();
         let mut images = BTreeSet::new();
@@ -187,7 +188,7 @@ impl Closure<'_> {
                         images.insert((truth, (map.fact)(*fact)));
                     }
                 }
-                // Numbers of one kind and another: not looked at.
+                // Changes of numbers are not compared: the exchange must keep the fluent.
                 Change::Update { fluent, .. } => {
                     if self.read_fluents.contains(fluent) && (map.fluent)(*fluent) != Some(*fluent)
                     {
@@ -206,7 +207,7 @@ struct Map<'a> {
 }
 
 impl Map<'_> {
-    /// Whether a condition becomes another one, in any order of its parts.
+    /// Returns `true` if the exchange maps a condition to another one, in any order of its parts.
     fn is_same(&self, own: &Condition, other: &Condition) -> bool {
         match (own, other) {
             (Condition::Fact(own), Condition::Fact(other)) => (self.fact)(*own) == Some(*other),

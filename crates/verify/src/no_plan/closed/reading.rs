@@ -1,4 +1,4 @@
-//! What of facts and numbers matters at all.
+//! Facts and fluents that are relevant in states.
 
 use std::collections::BTreeSet;
 
@@ -9,20 +9,20 @@ use elbowroom_model::ground::{
 use crate::no_plan::instances::Instances;
 use crate::no_plan::processes::Process;
 
-/// See the module.
+/// Sets of relevant facts and fluents.
 #[derive(Debug, Default)]
 pub(super) struct Reading {
-    /// The facts that something reads.
+    /// Facts that something reads.
     pub(super) read: BTreeSet<FactId>,
-    /// Those of them that something changes.
+    /// Read facts that something changes.
     pub(super) facts: BTreeSet<FactId>,
-    /// Those of these of which only the truth is asked for, never the falsehood, and not by guards.
+    /// Changing facts that are read only positively, and not by conditions of effects.
     pub(super) welcome: BTreeSet<FactId>,
-    /// The fluents that something reads.
+    /// Fluents that something reads.
     pub(super) read_fluents: BTreeSet<FluentId>,
-    /// Those of them that something changes, but not in the course of time.
+    /// Read fluents that something changes, but not continuously.
     pub(super) fluents: BTreeSet<FluentId>,
-    /// Those that change in the course of time.
+    /// Read fluents that change continuously.
     pub(super) flowing: BTreeSet<FluentId>,
     minded: BTreeSet<FactId>,
     changed: BTreeSet<FactId>,
@@ -51,7 +51,7 @@ impl Reading {
         for happening in &instances.beginning.timed {
             own.note(&happening.changes.iter().collect::<Vec<_>>());
         }
-        // What a number that matters is made of matters, too.
+        // Fluents that determine the value of a relevant fluent are relevant.
         loop {
             let before = own.read_fluents.len();
             for process in processes {

@@ -1,4 +1,4 @@
-//! A state in which conditions are read, some of which may be open.
+//! Evaluation of conditions in a state; the result may be undecided.
 
 use elbowroom_model::derivation::{Moment, holds};
 use elbowroom_model::ground::{Condition, Expression, FactId};
@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 
 use super::{Closure, Node};
 
-/// The value after an update; unknown if what it rests on is.
+/// Returns the value after an update; `None` if a value that it depends on is unknown.
 pub(super) fn updated(
     operator: UpdateOperator,
     old: Option<Rational>,
@@ -23,7 +23,7 @@ pub(super) fn updated(
     }
 }
 
-/// A state in which conditions are read.
+/// A state as seen by conditions.
 pub(super) struct View<'a> {
     pub(super) closure: &'a Closure<'a>,
     pub(super) node: &'a Node,
@@ -53,7 +53,7 @@ impl View<'_> {
         })
     }
 
-    /// `Err` if it is open.
+    /// Returns the truth value of the condition, or `Err` if it is undecided.
     pub(super) fn holds(&self, condition: &Condition) -> Result<bool, ()> {
         holds(condition, self)
     }

@@ -1,4 +1,4 @@
-//! Closed sets of states as they are written.
+//! File format of closed sets of states.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,10 +11,10 @@ use crate::Exact;
 use crate::no_plan::instances::Instances;
 use crate::no_plan::{NoPlanFlaw, Reached, fact};
 
-/// States into one of which whatever happens leads.
+/// Closed set of states: every happening leads from one of them to one of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Closed {
-    /// Classes of objects that can change places.
+    /// Classes of interchangeable objects.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alike: Vec<Vec<String>>,
     /// The states.
@@ -24,20 +24,20 @@ pub struct Closed {
 /// A state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClosedState {
-    /// The facts that are true, of those that change and that something reads.
+    /// True facts, among those that change and that something reads.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub facts: Vec<String>,
-    /// The numbers that are known, of those that change and that something reads.
+    /// Known numbers, among those that change and that something reads.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<String, Exact>,
-    /// What is under way, with the least and the greatest duration.
+    /// Running actions, with the least and the greatest duration.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub under_way: Vec<(String, Exact, Option<Exact>)>,
-    /// How many of the timed initials have happened.
+    /// Number of timed initials that have happened.
     #[serde(default, skip_serializing_if = "is_none")]
     pub timed: usize,
-    /// By how much one time is later than another at most: 0 is time 0, 1 is now, and the starts of what
-    /// is under way follow.
+    /// Upper bounds on differences of times. Position 0 is time 0, position 1 is the current time,
+    /// and the starts of running actions follow.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub times: Vec<(usize, usize, Exact)>,
 }
@@ -48,10 +48,10 @@ fn is_none(number: &usize) -> bool {
 }
 
 impl Closed {
-    /// The objects that are said to be alike.
+    /// Returns the classes of interchangeable objects.
     ///
     /// # Errors
-    /// When there are no such objects, or one is named twice.
+    /// When an object does not exist or is listed twice.
     fn objects(&self, instances: &Instances) -> Result<Vec<Vec<ObjectId>>, NoPlanFlaw> {
         let problem = instances.task.problem();
         let mut seen = BTreeSet::new();
@@ -79,7 +79,7 @@ impl Closed {
         let closure = Closure::of(instances, reached, &self.objects(instances)?)?;
         let mut nodes = Vec::new();
         for state in &self.states {
-            // What can be at no time need not be looked at.
+            // States without possible times need no check.
             nodes.extend(closure.read(state)?);
         }
         closure.check(&nodes)
@@ -87,7 +87,7 @@ impl Closed {
 }
 
 impl Closure<'_> {
-    /// The state as it is written.
+    /// Returns the state in the file format.
     pub fn written(&self, node: &Node) -> ClosedState {
         let task = &self.instances.task;
         let values = node.values.iter();
@@ -120,7 +120,7 @@ impl Closure<'_> {
         }
     }
 
-    /// The state that is meant; `None` if there are no such times.
+    /// Converts a state from the file format; `None` if its bounds on times are contradictory.
     fn read(&self, state: &ClosedState) -> Result<Option<Node>, NoPlanFlaw> {
         let task = &self.instances.task;
         let unknown = |name: &String| NoPlanFlaw::NoSuchFact(name.clone());

@@ -2,7 +2,7 @@
 
 use elbowroom_num::Rational;
 
-/// For each two of some times, how much later one may be than the other at most.
+/// Upper bounds on the pairwise differences of a sequence of times.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Zone {
     size: usize,
@@ -11,7 +11,7 @@ pub struct Zone {
 }
 
 impl Zone {
-    /// Any times.
+    /// Returns a zone without bounds.
     pub fn any(size: usize) -> Self {
         let mut zone = Self {
             size,
@@ -23,17 +23,17 @@ impl Zone {
         zone
     }
 
-    /// How many times there are.
+    /// Returns the number of times.
     pub fn size(&self) -> usize {
         self.size
     }
 
-    /// How much later one is than the other at most.
+    /// Returns the upper bound of `time[one] - time[other]`, if there is one.
     pub fn get(&self, one: usize, other: usize) -> Option<&Rational> {
         self.most[one * self.size + other].as_ref()
     }
 
-    /// One is at most so much later than the other.
+    /// Adds the bound `time[one] - time[other] <= most`.
     pub fn limit(&mut self, one: usize, other: usize, most: &Rational) {
         let known = &mut self.most[one * self.size + other];
         if known.as_ref().is_none_or(|known| most < known) {
@@ -41,14 +41,14 @@ impl Zone {
         }
     }
 
-    /// Takes a bound away.
+    /// Removes a bound.
     pub fn forget(&mut self, one: usize, other: usize) {
         if one != other {
             self.most[one * self.size + other] = None;
         }
     }
 
-    /// Works out what follows from the bounds; false if there are no such times (Floyd & Warshall).
+    /// Adds all implied bounds; returns `false` if the bounds are contradictory (Floyd & Warshall).
     #[must_use]
     pub fn close(&mut self) -> bool {
         let size = self.size;
@@ -68,7 +68,7 @@ impl Zone {
         (0..size).all(|one| !self.get(one, one).is_some_and(Rational::is_negative))
     }
 
-    /// These of the times, in this order; one may be there twice.
+    /// Returns the zone of these times, in this order. A time may be listed twice.
     #[must_use]
     pub fn select(&self, times: &[usize]) -> Self {
         let pairs = times
@@ -82,7 +82,7 @@ impl Zone {
         }
     }
 
-    /// The same with one more time, which may be any.
+    /// Returns the zone with one more time, which is unbounded.
     #[must_use]
     pub fn with_another(&self) -> Self {
         let mut zone = Self::any(self.size + 1);
@@ -94,7 +94,7 @@ impl Zone {
         zone
     }
 
-    /// Whether all these times, of which all bounds have been worked out, are within the others.
+    /// Returns `true` if all times of this zone, which has to be closed, are within the other one.
     pub fn is_within(&self, other: &Self) -> bool {
         self.size == other.size
             && self

@@ -1,4 +1,4 @@
-//! How atoms and claims are written.
+//! File format of atoms and claims.
 
 use super::{Atom, Claims, Earliest, Key, Structure};
 use crate::Exact;
@@ -15,7 +15,7 @@ impl Structure<'_> {
         }
     }
 
-    /// The claims as the certificate lists them.
+    /// Returns the claims in the format of the certificate.
     pub fn written(&self, claims: &Claims) -> Vec<Apart> {
         let mut groups: Vec<Apart> = Vec::new();
         let mut sorted: Vec<(&Earliest, &Key)> = claims.iter().map(|(k, t)| (t, k)).collect();
@@ -53,10 +53,10 @@ impl Structure<'_> {
         groups
     }
 
-    /// The claims of a certificate.
+    /// Reads the claims of a certificate.
     ///
     /// # Errors
-    /// When it names what there is not, or claims something twice.
+    /// When a name does not exist, or a claim is repeated.
     pub fn read(&self, groups: &[Apart]) -> Result<Claims, NoPlanFlaw> {
         let mut names = std::collections::BTreeMap::new();
         for atom in 0..self.atoms.len() {
@@ -107,7 +107,7 @@ impl Structure<'_> {
         self.numbers.get(&literal).copied()
     }
 
-    /// A claim in words.
+    /// Returns a claim in words.
     pub fn in_words(&self, key: Key) -> String {
         match key {
             Key::Pair(one, other) if one == other => format!("`{}`", self.name(one)),
@@ -129,7 +129,7 @@ impl Structure<'_> {
         }
     }
 
-    /// A happening in words.
+    /// Returns a happening in words.
     pub fn happening(&self, number: usize) -> String {
         match self.start_or_end(number) {
             [Some(action), _] => format!("`{}`", self.processes[action].name),

@@ -1,4 +1,4 @@
-//! The rules by which bounds follow from others, and the check that a list keeps itself up.
+//! Rules that derive bounds from others, and the check that a list of bounds is inductive.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 use super::{Atom, Bounds, Earliest, Key, Kind, Structure};
 use crate::no_plan::moments::HeldTo;
 
-/// Claims, to be checked.
+/// Claimed bounds, to be checked.
 pub type Claims = BTreeMap<Key, Earliest>;
 
 impl Bounds for Claims {
@@ -21,7 +21,7 @@ impl Bounds for Claims {
 }
 
 impl Structure<'_> {
-    /// Whether no state has both.
+    /// Returns `true` if the atoms have contradictory literals.
     pub fn excludes(&self, one: usize, other: usize) -> bool {
         let theirs = &self.literals[other];
         let mut literals = self.literals[one].iter();
@@ -32,7 +32,7 @@ impl Structure<'_> {
         known.get(key).unwrap_or(&self.before)
     }
 
-    /// The earliest time at which two atoms have become true together.
+    /// Returns the earliest time at which two atoms have become true together.
     pub fn pair<'b>(&'b self, known: &'b impl Bounds, one: usize, other: usize) -> &'b Earliest {
         let own = self.at_least(known, Key::pair(one, other));
         if one == other {
@@ -47,7 +47,8 @@ impl Structure<'_> {
         own.max(alone[0]).max(alone[1]).max(floor)
     }
 
-    /// Visits the pairs that are true together just before a happening, and how long before at least.
+    /// Visits the pairs that are true together just before a happening, and the least time before
+    /// it.
     pub fn visit(&self, happening: usize, visit: &mut impl FnMut(usize, usize, &Rational)) {
         let operator = &self.operators[happening];
         for (place, &one) in operator.reads.iter().enumerate() {
@@ -62,7 +63,7 @@ impl Structure<'_> {
         }
     }
 
-    /// The earliest time of a happening.
+    /// Returns the earliest time of a happening.
     pub fn earliest(&self, number: usize, known: &impl Bounds) -> Earliest {
         if let Some(begin) = known.begin(number) {
             return begin.clone();
@@ -82,7 +83,8 @@ impl Structure<'_> {
         self.when_possible(number, time)
     }
 
-    /// When a happening is possible at the earliest by itself: never, if the atom is not true after it.
+    /// Returns the earliest time of a happening without other bounds: never, if the atom `with` is
+    /// not true after it.
     pub fn earliest_alone(&self, happening: usize, with: Option<usize>) -> Earliest {
         let operator = &self.operators[happening];
         let is_ended = with.is_some_and(|atom| operator.ends.contains(&atom));
@@ -92,12 +94,12 @@ impl Structure<'_> {
         self.when_possible(happening, Earliest::From(self.moments.now.clone()))
     }
 
-    /// The least separation of what interferes.
+    /// Returns the least separation of interfering happenings.
     pub fn epsilon(&self) -> &Rational {
         self.epsilon
     }
 
-    /// When an action has started, at the earliest.
+    /// Returns the earliest start of an action.
     pub fn begun(&self, process: usize, known: &impl Bounds) -> Earliest {
         match (&self.processes[process].begun, self.start_of[process]) {
             (Some(begun), _) => Earliest::From(begun.clone()),
@@ -106,7 +108,8 @@ impl Structure<'_> {
         }
     }
 
-    /// Visits what is true together with an atom just before a happening, which is true after it, too.
+    /// Visits the atoms that are true together with `atom` just before a happening after which
+    /// `atom` is still true.
     pub fn visit_with(&self, happening: usize, atom: usize, visit: &mut impl FnMut(usize, usize)) {
         let operator = &self.operators[happening];
         for &one in operator.reads.iter().chain(&operator.holds) {
@@ -120,8 +123,8 @@ impl Structure<'_> {
         }
     }
 
-    /// The earliest time of a happening after which an atom is true that was true before; `begin` is
-    /// the earliest time of the happening.
+    /// Returns the earliest time of a happening that keeps an atom true; `begin` is the earliest
+    /// time of the happening.
     pub fn earliest_with(
         &self,
         number: usize,
@@ -144,13 +147,13 @@ impl Structure<'_> {
         self.when_possible(number, time)
     }
 
-    /// The earliest end of an action with an atom that has been true since its start, and with one that
-    /// has become true since.
+    /// Returns the earliest end of an action with an atom that has been true since its start, and
+    /// with one that has become true since.
     pub fn while_running(&self, process: usize, atom: usize, known: &impl Bounds) -> [Earliest; 2] {
         let own = &self.processes[process];
         let started = match &own.begun {
             None => self.at_least(known, Key::Started(process, atom)).clone(),
-            // It is the only one, so there is no other that is under way when it ends.
+            // Only one instance was running initially, so no other one is running when it ends.
             Some(begun) if self.is_initial[atom] && self.atoms[atom] != Atom::Running(process) => {
                 Earliest::From(begun.clone())
             }
@@ -160,7 +163,8 @@ impl Structure<'_> {
         [started.plus(&own.least), since.clone()]
     }
 
-    /// The earliest time, not before `time`, at which timed initials and durations allow the happening.
+    /// Returns the earliest time, not before `time`, at which timed initials and durations allow
+    /// the happening.
     pub fn when_possible(&self, happening: usize, time: Earliest) -> Earliest {
         let operator = &self.operators[happening];
         let Earliest::From(time) = time else {
@@ -195,8 +199,8 @@ impl Structure<'_> {
         possible.map_or(Earliest::Never, Earliest::From)
     }
 
-    /// What may bring it about that a bound counts: a happening, with the atom that is true before and
-    /// after it, if one is.
+    /// Returns the happenings that can make a bound applicable, each with the atom that is true
+    /// before and after it, if any.
     pub fn occasions(&self, key: Key) -> Vec<(usize, Option<usize>)> {
         match key {
             Key::Pair(one, other) => {
@@ -227,7 +231,7 @@ impl Structure<'_> {
         }
     }
 
-    /// The earliest time of an occasion.
+    /// Returns the earliest time of an occasion.
     pub fn occasion(
         &self,
         (operator, with): (usize, Option<usize>),
@@ -240,7 +244,8 @@ impl Structure<'_> {
         }
     }
 
-    /// The first claim that something breaks, and what that is.
+    /// Returns the first violated claim, with the happening that violates it; `None` for the
+    /// initial state.
     pub fn first_broken(&self, claims: &Claims) -> Option<(Key, Option<usize>)> {
         for (&key, claimed) in claims {
             let is_from_the_start = match key {
@@ -266,19 +271,19 @@ impl Structure<'_> {
         None
     }
 
-    /// Whether each part of the goal needs two atoms that are never true together.
+    /// Returns `true` if each alternative of the goal needs two atoms that are never true together.
     pub fn is_goal_excluded(&self, known: &impl Bounds) -> bool {
         self.goals
             .iter()
             .all(|goal| self.contradiction(goal, known).is_some())
     }
 
-    /// What the parts of the goal need.
+    /// Returns the atoms that each alternative of the goal needs.
     pub fn goals(&self) -> &[Vec<usize>] {
         &self.goals
     }
 
-    /// From when two atoms can be true together, as far as is known without any bounds.
+    /// Returns the earliest time at which two atoms can be true together, without any bounds.
     pub fn floor(&self, one: usize, other: usize) -> &Earliest {
         if one != other && self.excludes(one, other) {
             return &Earliest::Never;
@@ -286,7 +291,7 @@ impl Structure<'_> {
         Ord::max(&self.floor[one], &self.floor[other])
     }
 
-    /// Two atoms among these that are never true together.
+    /// Returns two of these atoms that are never true together.
     pub fn contradiction(&self, atoms: &[usize], known: &impl Bounds) -> Option<(usize, usize)> {
         let places = atoms.iter().enumerate();
         let mut pairs =
@@ -296,7 +301,7 @@ impl Structure<'_> {
 }
 
 impl Earliest {
-    /// Becomes as late as that, and a delay after it.
+    /// Raises the bound to `time` plus a delay, if that is later.
     pub fn raise(&mut self, time: &Self, delay: &Rational) {
         let is_later = match (&*self, time) {
             (Self::Never, _) => false,
