@@ -1,4 +1,4 @@
-//! What happens when this program is wrong.
+//! Panic hook: prints a request for a bug report and exits with code 70.
 
 use std::panic::{self, PanicHookInfo};
 

@@ -1,4 +1,4 @@
-//! How the command ends: `docs/exit-codes.md`.
+//! Exit codes and failures of the command: `docs/exit-codes.md`.
 
 use std::fmt::{self, Write as _};
 
@@ -10,7 +10,7 @@ use elbowroom_executive::messages::counted;
 /// The meaning of an exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Exit {
-    /// The answer is yes, or what was asked for is done.
+    /// The answer is yes, or the command has succeeded.
     Yes = 0,
     /// The answer is no.
     No = 1,
@@ -24,14 +24,14 @@ pub(crate) enum Exit {
     Interrupted = 130,
 }
 
-/// Why there is no answer: the input cannot be understood, or the outside world failed.
+/// Reason why there is no answer: the input is wrong, or the environment failed.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Failure {
     /// The error message, in lower case.
     message: String,
     /// Advice: what the user can do about it.
     advice: Option<String>,
-    /// Where it is wrong, if it is a text.
+    /// Errors in input texts, with their positions.
     diagnostics: Vec<Record>,
     /// The message as a terminal shows it.
     #[serde(skip)]
@@ -68,12 +68,12 @@ impl Failure {
         }
     }
 
-    /// What is wrong, in lower case.
+    /// Returns the error message, in lower case.
     pub(crate) fn message(&self) -> &str {
         &self.message
     }
 
-    /// What is wrong, in a sentence: of a text, the first mistake in it.
+    /// Returns the first error of a text with its position, or else the message.
     pub(crate) fn sentence(&self) -> String {
         match self.diagnostics.first() {
             Some(first) => {
@@ -84,14 +84,14 @@ impl Failure {
         }
     }
 
-    /// What the user can do about it.
+    /// Returns the advice for the first error of a text, or else the general advice.
     pub(crate) fn advice(&self) -> Option<&str> {
         let first = self.diagnostics.first();
         let own = first.and_then(|first| first.advice.as_deref());
         own.or(self.advice.as_deref())
     }
 
-    /// Where texts are wrong.
+    /// Returns the errors in input texts.
     pub(crate) fn diagnostics(&self) -> &[Record] {
         &self.diagnostics
     }

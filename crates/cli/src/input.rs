@@ -84,10 +84,10 @@ pub(crate) fn any_plan(
     Ok(AnyPlan::TimeTriggered(plan))
 }
 
-/// The advice for who gives a network where a plan with fixed times is needed.
+/// Advice if a plan with fixed times is needed and an STN plan is given.
 pub(crate) const FIXED_TIMES: &str = "give a plan with fixed times; its network is made from it";
 
-/// Reads a plan with fixed times; the advice is for who gives a network.
+/// Reads a plan with fixed times. `advice` is shown if the file is an STN plan.
 pub(crate) fn time_triggered(
     task: &Task,
     path: &Path,

@@ -65,7 +65,7 @@ impl Interrupt {
         self.0.request();
     }
 
-    /// Whether Ctrl-C was pressed, or a stop was asked for in another way.
+    /// Returns `true` if Ctrl-C was pressed or a stop was requested in another way.
     pub(crate) fn is_requested(&self) -> bool {
         self.0.is_requested()
     }

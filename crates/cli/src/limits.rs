@@ -1,4 +1,4 @@
-//! What limits each end of each interval, with the ends that share a reason together.
+//! Limiting reasons of the ends of intervals, grouped by reason.
 //!
 //! ```text
 //! What limits the ends

@@ -1,4 +1,4 @@
-//! What the output is shown on: how wide it is, and which characters and colours it has.
+//! Properties of the output device: width, character set and colours.
 
 use std::env;
 use std::io::{self, IsTerminal};
@@ -15,7 +15,7 @@ const MAX_WIDTH: usize = 110;
 pub(crate) struct Look {
     /// Columns to stay within.
     pub(crate) width: usize,
-    /// Whether there are more characters than ASCII.
+    /// `true` if characters beyond ASCII may be used.
     pub(crate) unicode: bool,
 }
 
@@ -39,13 +39,14 @@ impl Look {
     }
 }
 
-/// How wide the terminal is that standard output is shown on, if it is one and says so.
+/// Returns the width of the terminal on standard output, or `None` if it is not a terminal or does
+/// not report its width.
 pub(crate) fn columns() -> Option<usize> {
     if !io::stdout().is_terminal() {
         return None;
     }
     let known = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
-    // A terminal without a height, as behind a serial line or `script`, can have a width all the same.
+    // A terminal without a height (serial line, `script`) can still have a width.
     #[cfg(unix)]
     let known = known.or_else(|| {
         let size = rustix::termios::tcgetwinsize(io::stdout()).ok()?;
@@ -54,7 +55,8 @@ pub(crate) fn columns() -> Option<usize> {
     known
 }
 
-/// Whether the locale's character encoding is UTF-8, by the variables in POSIX order.
+/// Returns `true` if the locale's character encoding is UTF-8. The variables are read in POSIX
+/// order.
 fn locale_is_utf8() -> bool {
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"]
         .iter()
@@ -71,7 +73,7 @@ fn locale_is_utf8() -> bool {
 
 /// For what the eye should find first.
 pub(crate) const STRONG: Style = Style::new().bold();
-/// For what may be overlooked.
+/// Style of secondary information.
 pub(crate) const FAINT: Style = Style::new().dimmed();
 /// For good news.
 pub(crate) const GOOD: Style = AnsiColor::Green.on_default().bold();

@@ -27,11 +27,11 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
 pub(crate) struct Output {
     /// The warnings that were printed.
     warnings: Vec<Record>,
-    /// Whether standard output has its document.
+    /// `true` if a document was written to standard output.
     has_document: bool,
 }
 
-/// The member of documents that lists warnings, and what is wrong in a text.
+/// Member of documents that lists warnings and errors in input texts.
 const DIAGNOSTICS: &str = "diagnostics";
 
 impl Output {
@@ -63,7 +63,7 @@ impl Output {
     pub(crate) fn fail(&mut self, failure: &Failure, as_json: bool) {
         tell(&failure.to_string());
         if as_json && !self.has_document {
-            // That standard output cannot be written to is told by the exit code.
+            // If standard output cannot be written to, the exit code reports it.
             let _ = self.document(&failure.document());
         }
     }

@@ -15,7 +15,7 @@ use elbowroom_executive::clock::Clock;
 /// Searches that end sooner than this show no line at all.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// How often the line turns.
+/// Interval between frames of the spinner.
 const TURN: Duration = Duration::from_millis(250);
 
 /// The time between two lines where standard error is not a terminal.

@@ -240,7 +240,8 @@ fn so_has_each_trial_without_time() {
     );
 }
 
-/// The experiment "detour" with `guarded` alone, and a second column that goes by the world of this file.
+/// The experiment "detour" with `guarded` only, and a second column with `world` as its believed
+/// world.
 fn with_believed(world: &str) -> PathBuf {
     let text = fs::read_to_string(root().join("experiments/detour.toml")).expect("the experiment");
     let (head, column) = text.split_once("[[column]]").expect("a column");

@@ -1,5 +1,5 @@
-//! What users of plan executors complain about, one test for each row of `docs/complaints.md`: a small
-//! scenario like that of the thread, and what happens here.
+//! Typical complaints about plan executors: one test for each row of `docs/complaints.md`, with a
+//! small scenario like that of the thread and the behaviour of this executor.
 
 mod command;
 #[path = "complaints/toy.rs"]
@@ -121,7 +121,8 @@ fn who_never_answers_is_given_up_and_the_run_ends_with_that_reason() {
             .any(|it| it.to_string().contains("(fetch "))
     );
     assert!(world.open.is_empty(), "nothing is left running");
-    // Where the plan has a limit, that is the end of waiting, and what else there is is done in time.
+    // If the plan imposes a limit, waiting ends there, and the alternative action is executed in
+    // time.
     let domain = "(define (domain ways) (:requirements :durative-actions :timed-initial-literals)
         (:predicates (path) (open) (there))
         (:durative-action walk :parameters () :duration (= ?duration 2)
@@ -323,7 +324,8 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
             "{done:?}"
         );
     }
-    // What runs goes on in a pause; what runs at the end is told to stop, and has stopped.
+    // Running actions continue during a pause. Actions that run at the end are cancelled and have
+    // stopped.
     let (last, others) = report.executed.split_last().expect("something was done");
     assert_eq!(last.ending, Some(Ending::Cancelled), "{report:?}");
     let has_succeeded = |done: &ExecutedStep| done.ending == Some(Ending::Succeeded);
@@ -334,8 +336,8 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
     };
     assert!(others.iter().any(runs_on), "{report:?}");
     assert!(world.open.is_empty());
-    // Whether the time is up, no plan is left, or somebody asks for the end: it is waited for until a robot
-    // that slides on has stopped.
+    // The run waits until a robot that stops slowly has stopped, whether it ends by the time limit,
+    // for lack of a plan, or on request.
     let ends: [(Rational, Option<Faults>); 2] = [
         (Rational::from(5), None),
         (
@@ -406,7 +408,7 @@ fn what_an_action_should_have_done_is_compared_with_what_is_seen() {
         "{:?}",
         report.reasons
     );
-    // What has to hold throughout is heeded throughout: the other way is taken once the path is gone.
+    // Over-all conditions are monitored: the other way is used once the path is gone.
     let domain = "(define (domain ways) (:requirements :durative-actions)
         (:predicates (path) (there))
         (:durative-action walk :parameters () :duration (= ?duration 10)
@@ -448,7 +450,7 @@ fn a_plan_and_its_progress_can_be_seen_in_time() {
         assert!(text.contains(words), "{words}");
     }
     let _ = (fs::remove_file(trace), fs::remove_file(page));
-    // While it goes on, the same page is served, and each line of the trace as it comes.
+    // A running run serves the same page, and each line of the trace as it is recorded.
     let arguments = [&["run"], &DELIVERY[..], &["--realtime", "20", "--serve=0"]].concat();
     let mut run = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .args(arguments)

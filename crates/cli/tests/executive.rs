@@ -53,7 +53,8 @@ fn ctl(line: &[&str]) -> Output {
     command::elbowroom(&[&["ctl"], line].concat())
 }
 
-/// Whether robots can be made; if not, that is said.
+/// Returns `true` if Python is available for simulated robots; otherwise reports the test as
+/// skipped.
 fn python_is_there() -> bool {
     let is_there = Command::new("python3").arg("--version").output().is_ok();
     if !is_there {
@@ -147,7 +148,7 @@ fn what_is_changed_while_it_runs_is_followed() {
     assert!(!facts.contains(&json!("(done b2)")), "{state}");
 }
 
-/// Who is told that something was taken in sees it in every later answer.
+/// An accepted request is visible in every later answer.
 #[test]
 fn what_was_taken_in_counts_for_the_next_request() {
     let own = simulated("at-once");

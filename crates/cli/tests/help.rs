@@ -6,7 +6,8 @@ mod skipped;
 
 use std::process::Command;
 
-/// The help of a subcommand, or of the whole command, on a terminal of so many columns.
+/// Returns the help of a subcommand, or of the whole command, for a terminal with `columns`
+/// columns.
 fn help(subcommand: Option<&str>, columns: u32) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .args(subcommand)
@@ -34,7 +35,7 @@ fn subcommands() -> Vec<String> {
     names
 }
 
-/// What follows the options, which the argument parser lays out.
+/// Returns the lines after the options. clap lays out the lines before.
 fn after_the_options(help: &str) -> Vec<&str> {
     let lines: Vec<&str> = help.lines().collect();
     let last = lines.iter().rposition(|line| line.contains("--version"));

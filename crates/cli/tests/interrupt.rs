@@ -16,7 +16,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// A search that goes on for long: many ends, each halved more than a thousand times.
+/// Files of a long search: many interval ends, each bisected more than a thousand times.
 struct Long {
     folder: PathBuf,
 }

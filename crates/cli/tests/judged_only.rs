@@ -1,5 +1,5 @@
-//! Parts of the language that only the judge heeds: every other command refuses them by name, but
-//! for envelopes, which heed processes and events.
+//! Language features that only the validator supports. Every other command refuses them by name;
+//! `envelope` also supports processes and events.
 
 mod command;
 
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use command::elbowroom;
 
-/// What stands in the domain, a step of a plan for it, and the name under which it is refused.
+/// Part of the domain, step of a plan for it, and the name in the refusal.
 const FEATURES: [(&str, &str, &str); 3] = [
     (
         "(:process fills :parameters () :precondition (open) :effect (increase (level) (* #t 1)))
@@ -55,7 +55,7 @@ const REFUSING: [&str; 19] = [
     "compare EXPERIMENT",
 ];
 
-/// Those among them that heed processes and events, or want no network at all.
+/// Commands that support processes and events, or that do not accept a network at all.
 const HEEDING_NATURE: [&str; 4] = [
     "envelope D P PLAN",
     "envelope D P NETWORK",

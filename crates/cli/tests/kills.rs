@@ -1,4 +1,5 @@
-//! Runs that are killed at any moment, executive, world and planner, and go on with `--resume`.
+//! Runs whose executive, world or planner is killed at random moments, and which are continued with
+//! `--resume`.
 //!
 //! `ELBOWROOM_KILLS=1000 cargo test --workspace --test kills -- --nocapture` makes a thousand of
 //! them. The number of a run is the seed of the moments at which it is killed.
@@ -37,7 +38,7 @@ fn python_is_there() -> bool {
     is_there
 }
 
-/// How many runs there are at a time.
+/// Number of concurrent runs.
 const WORKERS: u8 = 4;
 
 /// A folder that no other test uses.
@@ -107,8 +108,8 @@ fn awaited(mut child: Child, what: &str) -> Output {
     panic!("{what}: the run is stuck");
 }
 
-/// Kills the process whose number is in this file, if it is still one that was told this folder.
-/// Returns whether it was.
+/// Kills the process whose number is in `file`, if its command line still contains `folder`.
+/// Returns `true` if a process was killed.
 fn kill_by(folder: &Path, file: &str) -> bool {
     let Ok(pid) = fs::read_to_string(folder.join(file)) else {
         return false;
@@ -123,7 +124,7 @@ fn kill_by(folder: &Path, file: &str) -> bool {
     }
 }
 
-/// Who is killed.
+/// Process to kill.
 #[derive(Clone, Copy, PartialEq)]
 enum Victim {
     Executive,
@@ -182,7 +183,7 @@ fn judge(folder: &Path, output: &Output, what: &str) {
     judge_what_was_done(folder, what, &text);
 }
 
-/// What the robot itself has written down.
+/// Checks the robot's own records: each errand was done.
 fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
     judge_what_was_begun(folder, what);
     let done = lines(folder, "done").join("\n");
@@ -194,7 +195,8 @@ fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
     }
 }
 
-/// Nothing was begun twice: neither under the number of its start, nor under another one what was done already.
+/// Checks that nothing was started twice: no ticket was started twice, and no finished errand was
+/// done again under another ticket.
 fn judge_what_was_begun(folder: &Path, what: &str) {
     let mut done = BTreeMap::new();
     for line in lines(folder, "done") {
@@ -214,8 +216,8 @@ fn judge_what_was_begun(folder: &Path, what: &str) {
     );
 }
 
-/// Kills a run up to three times, and has it go on each time. Every third run has a planner that can be
-/// killed, too.
+/// Kills a run up to three times and resumes it each time. Every third run has a planner, which may
+/// also be killed.
 fn killed(number: u64) -> u64 {
     let (folder, mut dice) = (folder(&format!("kill-{number}")), Dice(number));
     dice.below(2);
@@ -245,7 +247,8 @@ fn killed(number: u64) -> u64 {
         kills += 1;
         if child.try_wait().expect("it can be asked").is_none() {
             if victim == Victim::Planner {
-                // It is asked once more, and nobody misses a planner that has planned.
+                // The planner is called once more, or is no longer needed because it has returned a
+                // plan.
                 break awaited(child, &what);
             }
             let _ = child.kill();
@@ -280,8 +283,8 @@ fn judge_the_end(folder: &Path, output: &Output, what: &str) {
     }
 }
 
-/// A planner that dies is asked once more; if it dies again, the run ends in order and says why, and
-/// goes on when there is a planner.
+/// A planner that dies is called once more. If it dies again, the run ends in order with the
+/// reason, and can be resumed when there is a planner.
 #[cfg(unix)]
 #[test]
 fn a_run_whose_planner_dies_again_and_again_ends_and_goes_on_when_there_is_one() {
@@ -391,7 +394,7 @@ fn a_journal_is_neither_overwritten_nor_gone_on_with_after_its_end() {
     let text = String::from_utf8_lossy(&resumed.stdout).into_owned();
     assert_eq!(resumed.status.code(), Some(0), "{resumed:?}");
     assert!(text.contains("has reached its goal before"), "{text}");
-    // It is a trace for whoever reads one.
+    // The journal is also a valid trace.
     let report = elbowroom(&["report", &journal]);
     assert!(report.status.success(), "{report:?}");
     // Damage is not taken for a torn end.
@@ -406,7 +409,7 @@ fn a_journal_is_neither_overwritten_nor_gone_on_with_after_its_end() {
     let text = String::from_utf8_lossy(&damaged.stderr).into_owned();
     assert!(text.contains("damaged in the middle"), "{text}");
     assert!(text.contains("help: what comes behind"), "{text}");
-    // Only where not even one record is whole can nobody have been told anything.
+    // Only if no record is complete, no command can have been sent yet.
     for (kept, expected) in [
         (header.replace('\n', "\r\n"), "its first record is damaged"),
         (

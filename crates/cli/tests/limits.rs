@@ -49,7 +49,7 @@ fn limited(arguments: &[&str]) -> Value {
 fn a_domain_that_never_comes_to_its_end_does_not_outlast_the_time_limit() {
     let folder = Folder::new("endless");
     let domain = folder.file("domain.pddl");
-    // Whoever reads it waits for somebody to write.
+    // A reader of the named pipe blocks until another process writes to it.
     let made = Command::new("mkfifo").arg(&domain).status();
     assert!(made.expect("mkfifo can be started").success());
     for planner in ["embedded", "sh -c 'true' {domain} {problem}"] {

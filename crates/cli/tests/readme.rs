@@ -1,4 +1,4 @@
-//! What README.md shows of the command is what the command prints.
+//! Checks that the command prints the output shown in README.md.
 
 mod command;
 

@@ -1,4 +1,4 @@
-//! What the command does not understand, or could not honour, it refuses; nothing is ignored.
+//! Inputs that the command does not understand or cannot satisfy are refused, never ignored.
 
 mod command;
 
@@ -14,7 +14,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// What the command says when it refuses something: exit code 2, nothing on standard output.
+/// Returns the message of a refusal: exit code 2, nothing on standard output.
 fn refusal(arguments: &[&str]) -> String {
     let output = elbowroom(arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {output:?}");
@@ -354,7 +354,7 @@ fn a_folder_that_cannot_be_written_is_told_before_the_trials() {
     let bad = folder.join("experiment.toml/results").display().to_string();
     let said = refusal(&["compare", &file, "-o", &bad]);
     assert!(said.contains("cannot make the folder"), "{said}");
-    // What cannot be written is printed all the same.
+    // The results are printed although they cannot be written.
     let file = experiment(&folder, &[("trials = 6", "trials = 1")]);
     let taken = folder.join("out");
     fs::create_dir_all(taken.join("results.json")).expect("made");
@@ -430,7 +430,7 @@ fn a_misspelt_key_of_a_world_is_shown_with_the_one_that_was_meant() {
     fs::remove_dir_all(folder).expect("it was there");
 }
 
-/// With `--json`, a program is told what a person is told.
+/// With `--json`, the failure document contains the message shown to users.
 #[test]
 fn a_failure_is_a_document_where_one_is_asked_for() {
     let output = elbowroom(&[

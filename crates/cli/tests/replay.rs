@@ -1,4 +1,4 @@
-//! Stored runs are played back to the same decisions, whoever decided.
+//! Replays of stored runs make the same decisions, for all executors.
 
 mod command;
 
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use command::{elbowroom, root};
 
-/// A file that is removed when nobody needs it any more.
+/// A file that is removed on drop.
 struct Temporary(PathBuf);
 
 impl Temporary {
@@ -50,7 +50,7 @@ fn played_back(name: &str, arguments: &[&str]) -> String {
     text
 }
 
-/// Whether a replay of this trace differs, and where.
+/// Returns the line of the first difference between a trace and its replay, if any.
 fn difference(trace: &str, name: &str) -> Option<u64> {
     let file = Temporary::new(name, trace);
     let replay = elbowroom(&["run", "--json", "--replay", &file.name()]);
@@ -86,7 +86,7 @@ fn causes(trace: &str) -> Vec<String> {
 
 const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
 
-/// Two orders, the nearer of which has next to no time to spare: `live:5` drops it.
+/// Two orders. The nearer one has almost no slack, so `live:5` abandons it.
 #[test]
 fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
     let text = fs::read_to_string(root().join("experiments/table1/problem.pddl")).expect("read");

@@ -18,8 +18,8 @@ use serde_json::Value;
 
 const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
 
-/// A robot that writes down what it is told. Each wait takes a fifth of a second. What it starts
-/// never ends, but for the action with the number `$2`, which fails; it stops what is cancelled.
+/// A robot that logs its messages. Each wait takes 0.2 s. Started actions never end, except the one
+/// with the number `$2`, which fails. Cancelled actions stop.
 const ROBOT: &str = r#"
 log=$1; fails=$2; now=0; news=
 number() { n=${line#*\"ticket\":}; n=${n%%[!0-9]*}; }
@@ -73,7 +73,7 @@ impl Place {
         fs::read_to_string(self.0.join(name)).unwrap_or_default()
     }
 
-    /// What the world was told, message by message.
+    /// Returns the messages sent to the world.
     fn told(&self) -> Vec<Value> {
         let text = self.read("log");
         let lines = text.lines().map(serde_json::from_str);
@@ -121,7 +121,7 @@ fn send(child: &Child, signal: u32) {
     assert!(killed.success());
 }
 
-/// How often the world was told this.
+/// Returns the number of messages of this type.
 fn count(told: &[Value], kind: &str) -> usize {
     told.iter()
         .filter(|message| message["type"] == kind)
@@ -218,7 +218,7 @@ fn third_ctrl_c_ends_the_run_at_once_and_the_second_does_not() {
     assert!(output.stdout.is_empty(), "{output:?}");
 }
 
-/// One action fails while another one runs, and nobody makes another plan.
+/// One action fails while another one runs, and the planner finds no plan or fails.
 #[test]
 fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop() {
     let planners = [
@@ -301,7 +301,7 @@ fn a_full_disk_does_not_hide_the_verdict() {
     );
 }
 
-/// What was finished is kept, and says that it is not all.
+/// Finished trials are kept, and the results are marked as incomplete.
 #[test]
 fn a_comparison_that_is_interrupted_keeps_what_is_finished() {
     for (name, experiment) in [

@@ -25,7 +25,7 @@ fn temporary(name: &str, content: &str) -> PathBuf {
     path
 }
 
-/// A planner that knows one plan, whatever it is asked; its command line.
+/// Writes a planner that always returns the same plan. Returns its file and its command line.
 fn one_plan(name: &str) -> (PathBuf, String) {
     let plan = fs::read_to_string(root().join("cases/delivery/plan.plan")).expect("a plan");
     let script = temporary(name, &format!("cat <<'END'\n{plan}\nEND\n"));

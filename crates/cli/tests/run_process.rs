@@ -197,7 +197,8 @@ fn every_way_to_be_no_world_ends_the_run_and_is_named() {
     }
 }
 
-/// A world like `examples/world.py`, but for what it says first in its first answer.
+/// Runs with a world like `examples/world.py` that sends the line `first` at the start of its first
+/// answer.
 fn example_that_says(name: &str, first: &str, options: &[&str]) -> Option<(Output, String)> {
     if Command::new("python3").arg("--version").output().is_err() {
         return None;
@@ -243,7 +244,7 @@ fn every_fact_of_the_problem_may_be_reported() {
     }
 }
 
-/// A robot's slip of the tongue is no reason to end its mission, unless somebody wants it so.
+/// By default, an invalid message of the robot does not end the run.
 #[test]
 fn what_cannot_be_understood_is_a_remark_in_the_trace() {
     let fact = |fact: &str| format!(r#"{{"type":"fact","fact":"{fact}","becomes":true,"time":0}}"#);
@@ -279,7 +280,8 @@ fn what_cannot_be_understood_is_a_remark_in_the_trace() {
     }
 }
 
-/// What other programs say cannot move the cursor, and lines stay within eighty columns.
+/// Control characters in messages of other programs are escaped, and lines are wrapped at 80
+/// columns.
 #[test]
 fn what_a_world_says_is_shown_tame_and_wrapped() {
     let why = format!(r"line\n\u001b[2J {}", "word ".repeat(60));
@@ -343,7 +345,8 @@ fn planning_takes_time_on_a_wall_clock() {
         fs::remove_file(trace).expect("the trace is there");
         took
     };
-    // There is no time for so much planning; whether the parcel is delivered is not the question.
+    // There is not enough time for that much planning. The test does not depend on the delivery of
+    // the parcel.
     let measured = took(&["--realtime", "1000"]);
     assert!(measured[0].abs() < 1e-9, "{measured:?}");
     assert!(measured[1..].iter().all(|it| *it >= 200.0), "{measured:?}");
@@ -365,7 +368,7 @@ fn a_world_that_cannot_be_started_ends_the_run_with_a_message() {
         ("no-such-program", "cannot start the world"),
         ("./crates", "`./crates` is a folder, not a program"),
         ("./README.md", "you may not execute `./README.md`"),
-        // Whether it is noticed when telling or when listening is a matter of chance.
+        // The exit may be detected during a write or during a read.
         ("true", "has ended (exit status: 0)"),
         ("echo hello", ""),
         ("yes hello", "it said `hello`"),
@@ -433,7 +436,7 @@ fn a_run_that_is_killed_leaves_its_trace() {
     fs::remove_file(trace).expect("the trace is there");
 }
 
-/// A run in which walking takes so long; the plan reckons with 15 seconds at most.
+/// Runs with a walking time of `seconds`. The plan assumes at most 15 s.
 fn walking(seconds: &str) -> (String, Option<i32>) {
     let world = format!("python3 crates/cli/tests/files/late/world.py {seconds}");
     let files = ["domain.pddl", "problem.pddl", "plan.plan"];

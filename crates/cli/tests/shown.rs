@@ -1,5 +1,5 @@
-//! Runs that are shown elsewhere, too: for other viewers, and in browsers while they go on. What
-//! browsers see is tested in `crates/page/tests/browser/live.cjs`.
+//! Runs shown elsewhere: exports for other viewers, and live pages. The live page itself is tested
+//! in `crates/page/tests/browser/live.cjs`.
 
 mod command;
 

@@ -37,7 +37,7 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
     cases
 }
 
-/// What the command prints, and its exit code.
+/// Returns the output and exit code of the command with `--json`.
 fn said(arguments: &[&str]) -> (String, i32) {
     let output = Command::new(COMMAND)
         .args(arguments)

@@ -1,5 +1,5 @@
-//! Programs that are worlds: what is wrong with them is named, and the library for Python makes
-//! right ones.
+//! `world-check` names the faults of programs that are worlds, and the Python library makes correct
+//! ones.
 
 mod command;
 #[path = "../../../testing/skipped.rs"]
@@ -119,8 +119,8 @@ fn nothing_is_wrong_with_a_world_that_keeps_to_the_protocol() {
     }
     let (right, file) = world("right");
     let (remembers, script) = with_a_ledger();
-    // Those of which nothing is kept have no occasion to resume, or to hear of beliefs. The last one speaks the first
-    // version of the protocol.
+    // Worlds without a ledger skip the checks of resuming and of beliefs. The last one speaks
+    // version 1 of the protocol.
     for (command, speaks, skips) in [
         (right.as_str(), 2, &[][..]),
         (&remembers, 2, &[]),
@@ -157,7 +157,7 @@ fn nothing_is_wrong_with_a_world_that_keeps_to_the_protocol() {
     }
 }
 
-/// A world of the library for Python that writes down what it begins, and hears of what is believed.
+/// A world of the Python library that keeps a ledger of its starts and receives beliefs.
 fn with_a_ledger() -> (String, String) {
     let script = "import os, sys
 sys.path.insert(0, os.path.join(os.getcwd(), 'clients', 'python'))
@@ -189,8 +189,8 @@ fn a_world_that_cannot_be_started_is_no_answer() {
     assert!(text.contains("cannot start the world"), "{text}");
 }
 
-/// A robot's arm has a clock of its own, which is ahead and twice as fast. What it reports of has happened when
-/// that clock says, and not when it is heard.
+/// The clock of a robot's arm is ahead and runs twice as fast. Reported events have the time of
+/// that clock, converted to the world's time, and not the time of their arrival.
 #[test]
 fn what_another_clock_has_seen_has_happened_when_it_says() {
     if !python_is_there() {
@@ -260,7 +260,7 @@ world.run()
     }
 }
 
-/// How far a running action has come is in the trace, and changes no decision.
+/// The progress of running actions is recorded in the trace and changes no decision.
 #[test]
 fn feedback_is_recorded_and_replayed() {
     if !python_is_there() {
@@ -303,7 +303,8 @@ fn the_library_for_python_and_the_bridges_pass_their_own_tests() {
     }
 }
 
-/// The beginning is told whole, and then each change once; in the end the program knows what the judge says.
+/// The initial state is sent completely, and then each change once. At the end the program has the
+/// same state as the validator.
 #[test]
 fn a_program_that_wants_to_hear_what_is_believed_is_told_all_of_it_once() {
     if !python_is_there() {

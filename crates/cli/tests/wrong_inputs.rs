@@ -47,7 +47,7 @@ impl Drop for Temporary {
     }
 }
 
-/// What the command says on standard error when it ends with this exit code.
+/// Runs the command, checks its exit code, and returns standard error.
 fn said(code: i32, arguments: &[&str]) -> String {
     let output = elbowroom(arguments);
     assert_eq!(
@@ -263,7 +263,7 @@ fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
     assert!(said.contains("no proof"), "{said}");
 }
 
-/// A world that answers with a ticket that it never got lets no time pass, and is told so.
+/// A world that answers with an unknown ticket without advancing its time is reported.
 #[test]
 fn a_ticket_that_was_never_given_is_named() {
     let world = Temporary::new(

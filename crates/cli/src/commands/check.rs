@@ -20,7 +20,7 @@ use crate::output::Output;
 use crate::{input, number, output};
 use elbowroom_executive::messages::counted;
 
-/// The advice for who gives a network.
+/// Advice if the given plan is an STN plan.
 const FOR_NETWORKS: &str = "`elbowroom envelope` says whether all of them work; `check` judges a plan with \
                             fixed times";
 
@@ -169,7 +169,7 @@ fn push_values(text: &mut String, values: &[FluentValue]) {
     }
 }
 
-/// What the plan violates of the preferences.
+/// Appends the preferences that the plan violates.
 fn push_preferences(text: &mut String, preferences: &[PreferenceAnswer], look: Look) {
     if !preferences.is_empty() {
         let _ = write!(text, "\n{}\n", styled(STRONG, "Violated preferences"));

@@ -22,11 +22,11 @@ use crate::stopwatch::Stopwatch;
 use crate::{input, output};
 use elbowroom_executive::messages::plain;
 
-/// Where traces of failed trials go, beside the results.
+/// Folder for the traces of failed trials, inside the folder of the results.
 pub(crate) const FAILURES: &str = "failures";
-/// So many kinds of failure of one executor in one world have a trace.
+/// Maximum number of kinds of failure, for each executor and world, whose trace is written.
 const MOST_OF_A_CELL: usize = 3;
-/// So many traces are written at most.
+/// Maximum number of traces written in total.
 const MOST_FAILURES: usize = 60;
 
 /// Makes an experiment, or a part of it, or puts parts together.
@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
         merged(&arguments.merge, &experiment)?
     };
     let table = answer.table(&experiment)?;
-    // What was computed is shown, whatever becomes of the files.
+    // The results are printed even if the files cannot be written.
     let written = match &arguments.output {
         Some(folder) => write(folder, &answer, &table, records)
             .and_then(|()| write_failures(folder, &experiment, &answer)),
@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     } else {
         output::print(&table.within(Look::of_stdout().width))?;
     }
-    // What was ended early is shown and kept, but is not what was asked for.
+    // The results of an interrupted experiment are printed and written, but the exit code is not 0.
     written.map(|()| {
         let invalid = answer.invalid_notes();
         if !invalid.is_empty() {

@@ -168,7 +168,7 @@ impl Client<'_> {
         Ok((document, value))
     }
 
-    /// Why the executive does not do what it is asked, in its own words.
+    /// Converts the executive's refusal to a failure with the same message and advice.
     fn refused(&self, status: u16, text: &str) -> Failure {
         match serde_json::from_str::<Refusal>(text) {
             Ok(refusal) => Failure::new(

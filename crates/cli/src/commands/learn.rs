@@ -21,7 +21,7 @@ use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
 use elbowroom_executive::messages::counted;
 
-/// Reads the logs, and says what they tell.
+/// Reads the logs and prints the learnt model.
 pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
     let is_on_stdout = arguments
         .output
@@ -294,7 +294,7 @@ fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
     }
 }
 
-/// Whether the rate that was expected lies outside the 95 % interval of what was seen.
+/// Returns `true` if the expected rate lies outside the 95 % interval of the observations.
 fn is_surprising(rate: &RateLearnt) -> bool {
     let Some((expected, (lower, upper))) = rate.expected.zip(rate.interval) else {
         return false;

@@ -1,4 +1,5 @@
-//! `elbowroom network`: what can be promised about a temporal network of the field.
+//! `elbowroom network`: consistency and controllability of a temporal network in an exchange
+//! format.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -20,7 +21,7 @@ use elbowroom_executive::messages::counted;
 /// Bounds of a reason that people get to see; `--json` has all.
 const STEPS_SHOWN: usize = 12;
 
-/// Reads a network, answers, and writes what else was asked for.
+/// Reads a network, decides its properties, and writes the requested files.
 pub(crate) fn run(arguments: &NetworkArgs, output: &mut Output) -> Answer {
     let outputs = [&arguments.minimal, &arguments.dispatchable];
     let on_stdout = outputs
@@ -157,8 +158,8 @@ fn report(name: &str, found: &Found, look: Look) -> String {
     text
 }
 
-/// Why the promises that cannot be made cannot: the first of them for sure, the others where they
-/// have reasons of their own.
+/// Appends the reasons why properties do not hold. After a reason why the network is not consistent
+/// or not weakly controllable, further reasons are omitted.
 fn push_reasons(text: &mut String, promises: &[(&str, Option<&Promise>)], look: Look) {
     let mut is_explained = false;
     for (what, promise) in promises {
@@ -174,7 +175,7 @@ fn push_reasons(text: &mut String, promises: &[(&str, Option<&Promise>)], look: 
         let Some(reason) = &promise.reason else {
             continue;
         };
-        // What has no schedule at all needs no further reason.
+        // A network without any schedule needs no further reason.
         if is_explained {
             continue;
         }

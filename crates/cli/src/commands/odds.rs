@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
             None => {}
         }
     }
-    // What was computed is shown, whatever becomes of the picture.
+    // The answer is printed even if the picture cannot be written.
     if arguments.json {
         output.document(&answer)?;
     } else {

@@ -33,7 +33,7 @@ const SEARCHES: usize = 40;
 
 /// Plans.
 pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
-    // A misspelt planner is told before files are read.
+    // Reports a misspelt planner before any file is read.
     let planner = if arguments.planner.eq_ignore_ascii_case(EMBEDDED) {
         None
     } else {

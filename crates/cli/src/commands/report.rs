@@ -1,4 +1,4 @@
-//! `elbowroom report`: a page to look at, and a run for another viewer.
+//! `elbowroom report`: a page for a browser, or a run for another viewer.
 
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::{input, output};
 /// The file that `compare -o DIR` writes its results to.
 const RESULTS: &str = "results.json";
 
-/// Writes what is asked for.
+/// Writes the page, or the run for other viewers.
 pub(crate) fn run(arguments: &ReportArgs) -> Answer {
     let path = if arguments.input.is_dir() {
         arguments.input.join(RESULTS)

@@ -142,8 +142,8 @@ pub(super) fn access(
         .transpose()
 }
 
-/// The problem of a specification, and the plan to begin with. What is wrong with a file is told
-/// before anything is done.
+/// Reads the problem of a specification, and the first plan if one is given. Errors in files are
+/// reported before the run starts.
 pub(super) fn checked(
     arguments: &RunArgs,
     spec: &mut RunSpec,
@@ -230,7 +230,7 @@ pub(super) fn conclude(
     ))
 }
 
-/// The problem of a specification, with its warnings told.
+/// Reads the problem of a specification and prints its warnings.
 pub(super) fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure> {
     let (domain, problem) = (spec.domain.source(), spec.problem.source());
     let read = elbowroom::pddl::read_problem(&domain, &problem);

@@ -1,4 +1,4 @@
-//! What a shell and a reader of manuals want to know of the command.
+//! Shell completions and manual pages.
 
 use std::path::Path;
 

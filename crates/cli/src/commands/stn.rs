@@ -13,7 +13,7 @@ use crate::look::{BAD, Look, styled};
 use crate::output::Output;
 use crate::{input, output};
 
-/// Writes the STN plan, and what else was asked for.
+/// Writes the STN plan and the other requested output.
 pub(crate) fn run(arguments: &StnArgs, output: &mut Output) -> Answer {
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let rule = RoundingRule::with_tolerance(arguments.tolerance.clone());

@@ -15,10 +15,10 @@ use crate::look::{HINT, styled};
 use crate::output::Output;
 use crate::{input, output};
 
-/// The advice for who gives a network.
+/// Advice if the given plan is an STN plan.
 const FOR_NETWORKS: &str = "`elbowroom envelope` says whether all of them work";
 
-/// Digits after the point; times with so many are told apart by whoever reads them.
+/// Number of decimal digits printed for times.
 const DIGITS: u32 = 6;
 
 /// Judges all plans, as VAL's `Validate` does.
@@ -221,7 +221,7 @@ fn push_happenings(
         .filter(|time| until.is_none_or(|until| *time <= until))
     {
         let mut time = time.to_decimal(DIGITS);
-        // A point is looked for.
+        // Programs that parse this line expect a decimal point.
         if !time.contains('.') {
             time.push_str(".0");
         }

@@ -214,7 +214,7 @@ fn proven(name: &str, verified: &Verified, is_derived: bool, look: Look) -> Stri
     text
 }
 
-/// What is proved of the box being inside the envelope.
+/// Describes the proof that the box is inside the envelope.
 fn inside(inside: Option<Inside>) -> String {
     let Some(inside) = inside else {
         return "That the box is inside is not part of the certificate: `elbowroom envelope ... \

@@ -26,7 +26,7 @@ use player::{Gone, Player};
 use resumed::resumed;
 use table::{Check, Findings, Outcome, Row};
 
-/// What a world is told to do when there is no plan.
+/// Default domain, for checks without a plan.
 const DOMAIN: &str = "(define (domain world-check) (:requirements :durative-actions)
     (:predicates (waited))
     (:durative-action wait-a-second :parameters () :duration (= ?duration 1)
@@ -38,10 +38,10 @@ const ACTION: &str = "(wait-a-second)";
 /// Three times as long as planned, and this many seconds more, an action may take here.
 const PATIENCE: i64 = 10;
 
-/// How long a cancelled action may take to stop, in seconds of the world.
+/// Maximum time from a cancel to the end of the action, in seconds of the world.
 const OBEDIENCE: i64 = 5;
 
-/// Plays through the protocol, and says what is wrong.
+/// Runs the protocol with the world and prints the violations.
 pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
     let (task, actions) = script(arguments, output)?;
     let program = launch(&arguments.command).map_err(|why| {
@@ -137,7 +137,7 @@ fn script(
 }
 
 fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Result<(), Gone> {
-    // Nothing has been told, so time passes.
+    // Time must pass although no action was started.
     pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
     if player.can(Capability::Beliefs) {
         let faults = player.findings.faults();
@@ -168,7 +168,7 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
         return player.look();
     }
 
-    // What is over, or was never heard of.
+    // Messages about a finished start and about unknown ones.
     player.findings.look_at(Check::IgnoresTheUnknown);
     player.cancel(0)?;
     player.mumble()?;
@@ -205,7 +205,7 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
     Ok(())
 }
 
-/// Tells what is so at the beginning, that a value is not known any more, and that it is known again.
+/// Sends the initial beliefs, then that a value is unknown, then that it is known again.
 fn beliefs(player: &mut Player, task: &Task) -> Result<(), Gone> {
     let initial = task.initial();
     let values = || initial.values.iter();
@@ -299,7 +299,7 @@ fn pass(
     Ok(())
 }
 
-/// So many answers in a row may leave the time unchanged.
+/// Maximum number of consecutive answers that leave the time unchanged.
 const MOST_IDLE: usize = 100;
 
 fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {

@@ -8,7 +8,7 @@ pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// What the command answers to these arguments.
+/// Runs the command with these arguments and returns its output.
 pub(crate) fn elbowroom(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .current_dir(root())

@@ -1,4 +1,4 @@
-//! What an executive says of itself, and what it makes of what it is told.
+//! State and explanations that an executive reports, and its handling of new information.
 
 use std::fs;
 use std::net::TcpListener;
@@ -60,7 +60,7 @@ fn a_world_that_stands_still_is_named() {
     assert_eq!(begun.len(), 6, "{begun:?}");
 }
 
-/// The time goes on where nothing happens.
+/// Time advances although nothing happens.
 #[test]
 fn who_asks_is_told_what_time_it_is() {
     let own = simulated("time");
@@ -86,7 +86,8 @@ fn the_guarantee_says_what_its_quantities_are() {
     assert!(told.contains("duration of (do "), "{told}");
 }
 
-/// A number that is told counts in the next plan: where more has to stay in the battery, it is charged first.
+/// A reported number is used in the next plan: if the battery needs a larger reserve, it is charged
+/// first.
 #[test]
 fn a_number_is_taken_in_and_planned_with() {
     let battery = ["domain", "problem"].map(|it| format!("cases/battery/{it}.pddl"));
@@ -159,7 +160,7 @@ fn only_this_machine_reaches_an_executive() {
     );
 }
 
-/// Whether a value is as a schema says, and has nothing of which that says nothing.
+/// Checks that a value conforms to a schema and has no members that the schema does not define.
 fn conforms(value: &Value, schema: &Value, all: &Value) -> Result<(), String> {
     let wrong = |why: &str| Err(format!("{why}: {value} for {schema}"));
     if let Some(name) = schema["$ref"].as_str() {
@@ -227,7 +228,7 @@ fn answers_are_as_the_interface_says() {
     let (status, refusal) = own.post("/v1/goals", &json!({"goal": "(nonsense)"}));
     assert_eq!(status, 422);
     is_right(&refusal, "/v1/goals", "post", "default");
-    // It tells right from wrong.
+    // `conforms` detects wrong values.
     let mut state = own.get("/v1/state").1;
     state["plans"] = json!("many");
     assert!(conforms(&state, &all["State"], all).is_err());
@@ -237,7 +238,7 @@ fn answers_are_as_the_interface_says() {
     assert!(conforms(&state, &all["State"], all).is_err());
 }
 
-/// Who is stopped still has his port.
+/// A suspended process keeps its port open.
 #[test]
 fn an_executive_that_does_not_answer_is_told_apart_from_one_that_is_not_there() {
     let stopped = TcpListener::bind("127.0.0.1:0").expect("a port");

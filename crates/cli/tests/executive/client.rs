@@ -16,7 +16,7 @@ use crate::command::root;
 
 pub(crate) const TOKEN: &str = "a-token-of-some-length";
 
-/// How often it is looked whether something has happened, and how many times at most: a minute.
+/// Polling interval. With [`MOST_GLANCES`], polling ends after one minute.
 const GLANCE: Duration = Duration::from_millis(20);
 const MOST_GLANCES: usize = 3000;
 
@@ -41,7 +41,7 @@ pub(crate) fn write_token(folder: &Path) -> String {
 /// An executive.
 pub(crate) struct Executive {
     child: Option<Child>,
-    /// What else it has said.
+    /// Reader of the rest of standard error.
     errors: Option<JoinHandle<String>>,
     folder: PathBuf,
     port: u16,
@@ -59,7 +59,7 @@ impl Executive {
         Self::with_token(folder, line, None)
     }
 
-    /// The same, which can write no file that is longer than so many kilobytes.
+    /// Starts an executive that cannot write files longer than `kilobytes`.
     pub(crate) fn confined(folder: &Path, line: &[&str], kilobytes: u32) -> Self {
         Self::with_token(folder, line, Some(kilobytes))
     }
@@ -225,13 +225,13 @@ impl Executive {
         Some((status, serde_json::from_str(text).ok()?))
     }
 
-    /// What is there in place of the page at this moment, with its status.
+    /// Returns the current response at the address of the page, with its status.
     pub(crate) fn page_now(&self) -> (u16, String) {
         let stream = TcpStream::connect(self.address()).expect("it listens");
         said(stream, "GET", "/", None, "")
     }
 
-    /// The page, which is there as soon as the problem is taken up.
+    /// Waits for the page, which exists once the executive has accepted the problem.
     pub(crate) fn page(&self) -> String {
         let mut last = String::new();
         for _ in 0..MOST_GLANCES {

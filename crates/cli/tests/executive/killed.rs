@@ -1,8 +1,9 @@
-//! Executives that are killed at any moment while goals come and go, journals that begin anew included.
+//! Executives that are killed at random moments while goals are added and cancelled, also while
+//! their journals are rotated.
 //!
-//! `ELBOWROOM_SERVE_KILLS=100 cargo test --workspace --test executive whenever -- --nocapture` makes a
-//! hundred of them. The number of one is the seed of what is asked, and of the moments at which it is
-//! killed.
+//! `ELBOWROOM_SERVE_KILLS=100 cargo test --workspace --test executive whenever -- --nocapture` runs
+//! a hundred of them. The number of an executive is the seed of the requests and of the moments at
+//! which it is killed.
 
 #![allow(
     clippy::print_stdout,
@@ -21,7 +22,7 @@ use super::command;
 use super::{lines, python_is_there, with_robot};
 
 const DONE: [&str; 6] = ["a1", "a2", "a3", "b1", "b2", "b3"];
-/// A journal begins anew after every few actions, and none of it is lost.
+/// Options that rotate the journal after every few actions and keep all segments.
 const SEGMENTS: [&str; 4] = ["--journal-size", "30K", "--journal-segments", "1000"];
 
 /// Numbers that look random.
@@ -37,7 +38,7 @@ impl Dice {
     }
 }
 
-/// What was asked of an executive, and what it has said to that.
+/// Requests sent to an executive, and its answers.
 #[derive(Default)]
 struct Asked {
     goals: u64,
@@ -46,7 +47,7 @@ struct Asked {
 }
 
 impl Asked {
-    /// Asks something; `None` when nobody is there any more.
+    /// Sends a random request. Returns `None` if the executive is gone.
     fn ask(&mut self, own: &Executive, dice: &mut Dice) -> Option<()> {
         let job = DONE[usize::try_from(dice.below(6)).expect("small")];
         if dice.below(5) == 0 {
@@ -76,7 +77,7 @@ impl Asked {
     }
 }
 
-/// Has a process killed in so many milliseconds, whatever happens meanwhile.
+/// Starts a shell that kills a process after a delay.
 fn kill_later(process: u32, milliseconds: u64) -> std::process::Child {
     let seconds = format!("{}.{:03}", milliseconds / 1000, milliseconds % 1000);
     Command::new("sh")
@@ -119,13 +120,14 @@ fn reached(journal: &str) -> BTreeSet<String> {
     reached
 }
 
-/// How often an executive was killed, and its journal begun anew: at rest, and while it took up a plan.
+/// Number of kills, and of rotations of the journal: when idle (`at_rest`), and on adoption of a
+/// plan (`amid`).
 #[derive(Clone, Copy, Debug, Default)]
 struct Killed {
     kills: u64,
     at_rest: usize,
     amid: usize,
-    /// Of these, while something was under way.
+    /// Rotations while actions were running.
     under_way: usize,
 }
 
@@ -263,8 +265,8 @@ fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
     assert!(amid > 0, "no journal was begun anew amid a run");
 }
 
-/// Wherever a program is killed while it begins its journal anew, the next one goes on: from the old
-/// segment as long as the new one has not its name.
+/// The run can be resumed wherever the program is killed during a rotation: from the old segment
+/// until the new one is renamed.
 #[test]
 fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
     if !python_is_there() {
@@ -321,7 +323,7 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
     own.post("/v1/stop", &Value::Null);
     assert_eq!(own.end().status.code(), Some(0));
     assert!(!new.exists(), "half a segment is left");
-    // What was there before may have been in the segment that was removed above.
+    // Earlier goals may have been recorded in the segment that was removed above.
     let reached = reached(&journal);
     for name in ["step-3", "step-4"] {
         assert!(reached.contains(name), "{name} was lost: {reached:?}");

@@ -1,4 +1,4 @@
-//! `elbowroom envelope --method exact`: with which values does the plan work?
+//! `elbowroom envelope --method exact`: the set of all values for which the plan works.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::output::{self, Output};
 use crate::stopwatch::{Stopwatch, duration};
 use elbowroom_executive::messages::counted;
 
-/// So many of the reasons for an inequality are printed; `--json` has all.
+/// Maximum number of reasons printed for an inequality; `--json` has all.
 const REASONS_SHOWN: usize = 2;
 /// Exact volumes with more digits than this are printed as powers of ten.
 const MOST_DIGITS: usize = 24;
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     )
     .map_err(failure)?;
     let drawn = draw(arguments, plane.as_ref(), &outcome, &mut watch);
-    // What was computed is shown, whatever becomes of the picture.
+    // The answer is printed even if the picture cannot be written.
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {

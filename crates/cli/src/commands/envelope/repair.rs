@@ -1,4 +1,4 @@
-//! `elbowroom envelope --repair`: what is the least that has to change for the plan to work?
+//! `elbowroom envelope --repair`: the cheapest change that makes the plan work.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -22,9 +22,9 @@ use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::{Stopwatch, duration};
 
-/// So many digits of numbers are printed; `--json` has all.
+/// Number of digits printed; `--json` has exact numbers.
 const DIGITS: u32 = 6;
-/// So many of the reasons are printed; `--json` has all.
+/// Maximum number of reasons printed; `--json` has all.
 const REASONS_SHOWN: usize = 8;
 /// The limit of the answer where other orders were not searched to the end.
 const OTHER_ORDERS: &str =
@@ -91,7 +91,8 @@ fn named(option: &str, texts: &[String]) -> Failure {
     Failure::new(failures.next().unwrap_or_default(), "")
 }
 
-/// What is said of quantities that are opened is said of these options here.
+/// Converts a request error to a failure. Messages about `--vary` name `--change` and `--keep`
+/// instead.
 fn refused(error: RequestError) -> Failure {
     match error {
         RequestError::Flow(error) => {

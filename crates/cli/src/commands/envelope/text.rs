@@ -94,7 +94,7 @@ fn push_timeout(text: &mut String, outcome: &EnvelopeOutcome, look: Look) {
     }
 }
 
-/// Why the plan does not work, with an example.
+/// Appends the reason why the plan does not work, with an example.
 fn push_reason(
     text: &mut String,
     request: &EnvelopeRequest,
@@ -115,7 +115,7 @@ fn push_reason(
     }
 }
 
-/// The table, what it means, what limits it, and how it was found.
+/// Renders the tolerance table, its meaning, its limits and the end of the search.
 fn envelope(
     request: &EnvelopeRequest,
     outcome: &EnvelopeOutcome,
@@ -241,7 +241,8 @@ fn headline(balance: &Balance, parameters: &[Room]) -> String {
     line
 }
 
-/// How conditions that are no bounds on one difference are met, and what the dispatcher keeps to beside the network.
+/// Describes how conditions that are not bounds on a single time difference are met, and which
+/// bounds the dispatcher enforces in addition to the network.
 fn met(conditions: &Conditions) -> Option<String> {
     let mut met = Vec::new();
     if conditions.all_schedules > 0 {
@@ -305,7 +306,7 @@ fn quantity(range: &Range) -> &str {
     }
 }
 
-/// Which durations do not vary because the executor chooses them.
+/// Lists the durations that do not vary because the executor chooses them.
 fn executor_chooses(chosen: &[Chosen]) -> Option<String> {
     /// Of a long list only the first are named.
     const MOST_NAMED: usize = 4;
@@ -343,7 +344,7 @@ fn sentence(text: &str) -> String {
     format!("{}.", text.trim_end_matches('.'))
 }
 
-/// How the search ended.
+/// Describes how the search ended.
 fn ended(
     request: &EnvelopeRequest,
     stop: Stop,
@@ -403,7 +404,7 @@ fn ended(
     }
 }
 
-/// Whether nothing is known to limit one of the finite ends.
+/// Returns `true` if a finite end of the interval has no known limiting reason.
 fn is_untold(room: &Room) -> bool {
     let ends = [
         (&room.range.lower, &room.lower_limit),

@@ -1,8 +1,8 @@
-//! Watches the clock and Ctrl-C while an envelope is computed, and shows how far it has come.
+//! Time limit, Ctrl-C and progress line for the computation of an envelope.
 //!
-//! A single question to the library can take long, and it looks at no clock. So it works on a
-//! thread of its own: when it has not come to an end soon after its time is up, what it told last
-//! is the answer.
+//! A single call of the library can take long without checking the time. The computation therefore
+//! runs on its own thread. If it does not return shortly after the limit, the last reported
+//! envelope is the answer.
 
 use std::ops::ControlFlow;
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -19,9 +19,9 @@ use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::stopwatch::{Stopwatch, duration};
 
-/// How often the clock is looked at.
+/// Interval between checks of the time limit and Ctrl-C.
 const TICK: Duration = Duration::from_millis(10);
-/// How long the library has for an answer when its time is up: more than most of its steps take.
+/// Grace period for an answer after the time limit; longer than most steps of the library take.
 const GRACE: Duration = Duration::from_millis(50);
 /// As much as the main thread has.
 const STACK: usize = 64 << 20;
@@ -31,7 +31,7 @@ pub(super) struct Watch {
     stopwatch: Stopwatch,
 }
 
-/// What the library has told.
+/// Last progress reported by the library.
 #[derive(Default)]
 struct Told {
     found: Option<(Arc<ParametrizedPlan>, DecoupledEnvelope)>,
@@ -48,7 +48,7 @@ impl Watch {
         }
     }
 
-    /// The answer, or what had been found when there was no more time for it.
+    /// Computes the answer, or returns the best envelope found when the time is up.
     pub(super) fn answer(
         mut self,
         request: &Arc<EnvelopeRequest>,
@@ -99,7 +99,7 @@ impl Watch {
     }
 }
 
-/// What watches on the library's thread.
+/// Watcher on the library's thread.
 struct Listener {
     stopwatch: Stopwatch,
     told: Arc<Mutex<Told>>,

@@ -16,7 +16,7 @@ use crate::output::Output;
 /// As much as the main thread has: files nest.
 const STACK: usize = 16 << 20;
 
-/// How often the watch is asked.
+/// Interval between calls of the watch.
 const QUESTION: Duration = Duration::from_millis(10);
 
 /// Reads domain, problem and calendar, as long as the watch says so. Warnings go to standard error.

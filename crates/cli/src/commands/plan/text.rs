@@ -1,4 +1,4 @@
-//! What came of it, for people.
+//! Text output of planning.
 
 use std::fmt::Write as _;
 
@@ -14,8 +14,8 @@ use crate::number;
 use crate::wrap::wrapped;
 use elbowroom_executive::messages::counted;
 
-/// The plan as text, with a last line, a comment, that says what it is worth where that is not
-/// simply when it ends.
+/// Renders the plan as text. If its metric differs from its makespan, a comment at the end states
+/// the metric.
 pub(super) fn plan(finding: &PlanFinding) -> Option<String> {
     let PlanFinding::Plan {
         plan,
@@ -33,7 +33,7 @@ pub(super) fn plan(finding: &PlanFinding) -> Option<String> {
     Some(text)
 }
 
-/// What the plan is worth, for people: makespan, metric, and whether there may be better ones.
+/// Describes the plan: makespan, metric, and whether better plans may exist.
 pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     let PlanFinding::Plan {
         makespan, metric, ..
@@ -86,7 +86,7 @@ pub(super) fn certified(answer: &PlanAnswer, look: Look) -> Option<String> {
     Some(styled(FAINT, &wrapped(&line, look.width, 0)))
 }
 
-/// What a plan is worth by its objective, beside the shortest one.
+/// Describes the plan's objective value, compared with that of the shortest plan.
 fn chosen(choice: &PlanChoice) -> String {
     let PlanChoice {
         objective,
@@ -154,7 +154,7 @@ pub(super) fn failure(failure: PlannerFailure) -> Failure {
     }
 }
 
-/// Excerpts longer than this hide what they are shown for.
+/// Maximum number of lines of an excerpt.
 const MOST_LINES: usize = 12;
 
 fn with_excerpt(message: String, title: &str, excerpt: &str, help: &str) -> Failure {

@@ -1,4 +1,4 @@
-//! How a search is getting on, and when it has to stop.
+//! Progress and limits of a search for a plan.
 
 use std::fmt::{self, Write as _};
 use std::ops::ControlFlow;
@@ -15,7 +15,8 @@ use crate::stopwatch::{Stopwatch, duration};
 use elbowroom_executive::memory_limit::MemoryLimit;
 use elbowroom_executive::messages::counted;
 
-/// Watches the plans that come, Ctrl-C, and, for who keeps no time of its own, the time.
+/// Watcher that reports plans and checks Ctrl-C. It also checks time and memory, unless the planner
+/// does so itself.
 pub(super) struct Watch {
     stopwatch: Stopwatch,
     line: Progress,
@@ -50,7 +51,8 @@ impl Watch {
         }
     }
 
-    /// Leaves the limits to a planner that keeps them itself: what is left of the time.
+    /// Stops checking the limits, for a planner that checks them itself. Returns the remaining
+    /// time.
     pub(super) fn hand_over_the_limits(&mut self) -> Option<Duration> {
         self.stopwatch = self.stopwatch.clone().until(None);
         self.memory = None;

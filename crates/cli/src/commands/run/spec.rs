@@ -58,7 +58,7 @@ pub(in crate::commands) fn of(
         epsilon: arguments.epsilon.clone(),
         ..RunSpec::new(empty(), empty())
     };
-    // A misspelt planner is told before files are read.
+    // Reports a misspelt planner before any file is read.
     spec.check_planner().map_err(contradiction)?;
     spec.domain = (&input::source(domain, "domain")?).into();
     spec.executor = arguments
@@ -151,8 +151,8 @@ pub(super) fn fit_model(
     Ok(())
 }
 
-/// How many threads a planner of this name has. By default one: beside a run, the other processors have
-/// the robot to look after.
+/// Returns the number of threads for a planner of this name. The default is one, because the robot
+/// needs the other processors during a run.
 pub(super) fn threads_of(arguments: &RunArgs, planner: &str) -> Result<usize, Failure> {
     let is_embedded = planner.eq_ignore_ascii_case(EMBEDDED);
     threads::of(arguments.jobs, 1, is_embedded)

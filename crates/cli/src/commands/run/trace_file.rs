@@ -59,7 +59,7 @@ impl TraceFile {
         Some(path.display().to_string())
     }
 
-    /// Why not all lines were written, if so.
+    /// Closes the file. Returns a message if some lines could not be written.
     pub(super) fn close(self) -> Option<String> {
         let ((_, name), error) = (self.file?, self.error?);
         let why = plain(&error);

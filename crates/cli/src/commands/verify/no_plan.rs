@@ -16,7 +16,7 @@ use crate::number::nearest;
 use crate::output::{self, Output};
 use elbowroom_executive::messages::counted;
 
-/// Whether the text is an answer of `elbowroom plan`.
+/// Returns `true` if the text is an answer of `elbowroom plan`.
 pub(super) fn is_meant(text: &str) -> bool {
     let document: Result<Value, _> = serde_json::from_str(text);
     document.is_ok_and(|document| document["format"] == "elbowroom-plan")
@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
     Ok(if verdict.is_ok() { Exit::Yes } else { Exit::No })
 }
 
-/// Why there is no plan, by a certificate that is accepted.
+/// Describes why there is no plan, based on an accepted certificate.
 fn why(certificate: &NoPlan) -> String {
     match certificate.kind() {
         Kind::Apart => {

@@ -1,4 +1,4 @@
-//! How good the best box is, in words.
+//! Description of the quality of the best box.
 
 use elbowroom::answers::envelope::{Best, Probability, Relax, Room, Worth};
 use elbowroom::envelope::Objective;
@@ -6,7 +6,7 @@ use elbowroom::num::Rational;
 
 use crate::number::{self, Rounding};
 
-/// Which bounds it would be worth most to relax.
+/// Lists the bounds whose relaxation gains most, or returns `None` if there are none.
 pub(super) fn gained(best: &Best) -> Option<String> {
     /// Of a long list only the first are named.
     const MOST_NAMED: usize = 3;
@@ -39,7 +39,7 @@ pub(super) fn gained(best: &Best) -> Option<String> {
     (!named.is_empty()).then(|| format!("Bounds that are worth most: {}.", named.join("; ")))
 }
 
-/// How large the product of the widths is.
+/// Describes the volume as the geometric mean of the widths.
 fn spacious(best: &Best, parameters: &[Room]) -> String {
     let weights: Rational = parameters
         .iter()
@@ -64,7 +64,7 @@ fn spacious(best: &Best, parameters: &[Room]) -> String {
     )
 }
 
-/// How likely all durations stay inside.
+/// Describes the probability that all durations stay inside the box.
 fn likely(best: &Best, probability: &Probability) -> String {
     let percent = |value: &Rational, rounding| {
         let percent = value * &Rational::from(100);
@@ -89,7 +89,7 @@ fn likely(best: &Best, probability: &Probability) -> String {
     )
 }
 
-/// How good the box is.
+/// Describes the objective value of the box, and its proved upper bound.
 pub(super) fn goodness(best: &Best, parameters: &[Room]) -> String {
     if let Some(probability) = &best.probability {
         return likely(best, probability);

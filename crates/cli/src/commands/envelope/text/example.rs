@@ -1,4 +1,4 @@
-//! Why a plan does not work, with values and a schedule that show it.
+//! Explanation of why a plan does not work, with example values and a schedule.
 
 use std::fmt::Write as _;
 
