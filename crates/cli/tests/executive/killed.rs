@@ -120,7 +120,7 @@ fn reached(journal: &str) -> BTreeSet<String> {
     reached
 }
 
-/// Number of kills, and of rotations of the journal: when idle (`at_rest`), and on adoption of a
+/// Numbers of kills and of rotated journals: rotated when idle (`at_rest`) and on the adoption of a
 /// plan (`amid`).
 #[derive(Clone, Copy, Debug, Default)]
 struct Killed {
