@@ -16,11 +16,11 @@ pub(crate) enum Exit {
     No = 1,
     /// The input or the command line is wrong.
     BadInput = 2,
-    /// A limit was reached with nothing to show.
+    /// A limit was reached without a result.
     Limit = 3,
-    /// A mistake in this program.
+    /// A bug of this program.
     Bug = 70,
-    /// Somebody asked the run to end before it was over.
+    /// The run was stopped on request before it was over.
     Interrupted = 130,
 }
 
@@ -38,7 +38,7 @@ pub(crate) struct Failure {
     text: String,
 }
 
-/// The answer to a command, already printed; or why there is none.
+/// Result of a command whose answer is already printed, or its failure.
 pub(crate) type Answer = Result<Exit, Failure>;
 
 /// A failure as a document: `docs/formats/diagnostics.md`.
@@ -51,7 +51,7 @@ pub(crate) struct FailureDocument<'a> {
 }
 
 impl Failure {
-    /// A failure with what to do about it.
+    /// Creates a failure with advice.
     pub(crate) fn new(message: impl fmt::Display, advice: impl fmt::Display) -> Self {
         let (message, advice) = (message.to_string(), advice.to_string());
         let label = crate::look::styled(crate::look::BAD, "error");
@@ -96,7 +96,7 @@ impl Failure {
         &self.diagnostics
     }
 
-    /// The same with advice, if it has none of its own.
+    /// Adds advice if the failure has none.
     pub(crate) fn advised(mut self, advice: &str) -> Self {
         if self.advice.is_none() {
             let label = crate::look::styled(crate::look::HINT, "help");
@@ -106,7 +106,7 @@ impl Failure {
         self
     }
 
-    /// The document that `--json` prints.
+    /// Returns the document that `--json` prints.
     pub(crate) fn document(&self) -> FailureDocument<'_> {
         FailureDocument {
             format: "elbowroom-failure",
@@ -122,7 +122,7 @@ impl From<elbowroom_executive::Error> for Failure {
     }
 }
 
-/// A text cannot be used.
+/// Converts errors in a text to a failure.
 impl From<Diagnostics> for Failure {
     fn from(diagnostics: Diagnostics) -> Self {
         let count = counted(diagnostics.errors().count(), "error");

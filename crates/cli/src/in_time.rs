@@ -13,7 +13,7 @@ use crate::stopwatch::Stopwatch;
 const TICK: Duration = Duration::from_millis(10);
 /// Grace period for an answer after the time limit; longer than most steps of the library take.
 const GRACE: Duration = Duration::from_millis(50);
-/// As much as the main thread has.
+/// Stack size of the worker, in bytes: that of the main thread.
 const STACK: usize = 64 << 20;
 
 /// Returns the result of `work`, or that of `so_far` shortly after the time limit or Ctrl-C. The
@@ -27,17 +27,17 @@ pub(crate) fn in_time<T: Send + 'static>(
     let (sender, receiver) = mpsc::channel();
     let theirs = work.clone();
     let worker = thread::Builder::new().stack_size(STACK).spawn(move || {
-        // Nobody listens any more when there was no time left.
+        // After the time limit, the receiver is gone.
         let _ = sender.send(theirs());
     });
     if worker.is_err() {
-        // A system without threads to spare: the limit is kept between the steps.
+        // No thread is available: the limit is checked between steps only.
         return work();
     }
     loop {
         match receiver.recv_timeout(TICK) {
             Ok(answer) => return answer,
-            // A thread that is gone without an answer has panicked, which has ended the program.
+            // The thread has ended without an answer: it panicked, which has ended the program.
             Err(RecvTimeoutError::Disconnected) => return work(),
             Err(RecvTimeoutError::Timeout) => {}
         }

@@ -11,7 +11,7 @@ use unicode_width::UnicodeWidthStr;
 
 use crate::look::{FAINT, Look, STRONG, styled};
 
-/// The limits, one reason after the other; empty without limits.
+/// Renders the limits, one reason after the other; empty without limits.
 pub(crate) fn render(limits: &[LimitGroup], look: Look) -> String {
     if limits.is_empty() {
         return String::new();

@@ -5,28 +5,28 @@ use std::io::{self, IsTerminal};
 
 use anstyle::{AnsiColor, Style};
 
-/// Width assumed where there is no terminal to ask.
+/// Width assumed without a terminal.
 const DEFAULT_WIDTH: usize = 80;
-/// Wider lines are hard to read.
+/// Maximum width; longer lines are hard to read.
 const MAX_WIDTH: usize = 110;
 
 /// Layout of text: width and character set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Look {
-    /// Columns to stay within.
+    /// Maximum number of columns.
     pub(crate) width: usize,
     /// `true` if characters beyond ASCII may be used.
     pub(crate) unicode: bool,
 }
 
 impl Look {
-    /// The look of plain text: what pipes and files get.
+    /// Layout of plain text, for pipes and files.
     pub(crate) const PLAIN: Self = Self {
         width: DEFAULT_WIDTH,
         unicode: false,
     };
 
-    /// The look of standard output.
+    /// Returns the layout for standard output.
     pub(crate) fn of_stdout() -> Self {
         if !io::stdout().is_terminal() {
             return Self::PLAIN;
@@ -71,20 +71,21 @@ fn locale_is_utf8() -> bool {
     }
 }
 
-/// For what the eye should find first.
+/// Style of headings and results.
 pub(crate) const STRONG: Style = Style::new().bold();
 /// Style of secondary information.
 pub(crate) const FAINT: Style = Style::new().dimmed();
-/// For good news.
+/// Style of success.
 pub(crate) const GOOD: Style = AnsiColor::Green.on_default().bold();
-/// For bad news.
+/// Style of errors.
 pub(crate) const BAD: Style = AnsiColor::Red.on_default().bold();
-/// The style of what needs attention.
+/// Style of warnings.
 pub(crate) const WARNING: Style = AnsiColor::Yellow.on_default().bold();
-/// For advice.
+/// Style of advice.
 pub(crate) const HINT: Style = AnsiColor::Cyan.on_default().bold();
 
-/// The text in a style. Escape sequences are removed again where the output takes no colours.
+/// Returns the text with escape sequences for a style. They are removed if the output does not
+/// support colours.
 pub(crate) fn styled(style: Style, text: &str) -> String {
     if text.is_empty() {
         return String::new();

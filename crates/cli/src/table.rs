@@ -33,15 +33,15 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// The smaller one of the two deviations that there is room for, in relation to the nominal
-    /// value where that is not 0.
+    /// Returns the smaller one of the two tolerated deviations, relative to the nominal value
+    /// unless that is 0.
     pub(crate) fn room(&self) -> Rational {
         let (lower, upper) = (&self.interval.lower, &self.interval.upper);
         let distance = |end: &End| Some((end.value()? - &self.nominal).abs());
         let room = [distance(lower), distance(upper)];
         let room = room.into_iter().flatten().min();
         let share = |room: Rational| room.checked_div(&self.nominal.abs()).unwrap_or(room);
-        // Without any end there is more room than anywhere.
+        // An interval without ends has the most slack.
         room.map_or_else(|| Rational::from(i64::MAX), share)
     }
 
@@ -63,14 +63,14 @@ impl Row {
 pub(crate) const CRITICAL: i64 = 10;
 /// Possible scales of the bars: the deviation at their ends, in percent.
 const SCALES: [i64; 7] = [1, 2, 5, 10, 20, 50, 100];
-/// Columns of the bar: the first of these that fits.
+/// Possible widths of the bar in columns; the first one that fits is used.
 const BARS: [usize; 3] = [11, 9, 7];
-/// Names up to this width have a column of their own even where the numbers stand below.
+/// Maximum width of a separate column of names if the numbers are on their own lines.
 const SHORT_NAME: usize = 12;
 /// Left margin, and gap between columns.
 const GAP: usize = 2;
 
-/// The rows as a table, each line ended; empty without rows.
+/// Renders the rows as a table; empty without rows.
 pub(crate) fn render(rows: &[Row], look: Look) -> String {
     if rows.is_empty() {
         return String::new();
@@ -121,7 +121,7 @@ struct Layout {
     names: usize,
     /// Start column of the numbers, without the gap.
     text: usize,
-    /// Columns of the bar; 0 if there is no room for one.
+    /// Columns of the bar; 0 if it does not fit.
     bar: usize,
     /// `true` if the numbers are on a line of their own below name and quantity.
     stacked: bool,
@@ -157,7 +157,7 @@ impl Layout {
     }
 }
 
-/// The texts of one row's numbers.
+/// Formatted numbers of one row.
 struct Cells {
     nominal: String,
     lower: String,
@@ -203,7 +203,7 @@ fn slack(nominal: &Rational, end: &End, sign: char) -> String {
     )
 }
 
-/// The widths of the number columns. Decimal points stand below each other.
+/// Widths of the number columns, with aligned decimal points.
 struct Numbers {
     nominal: Split,
     lower: Split,
@@ -335,10 +335,10 @@ fn bar(row: &Row, scale: i64, width: usize, unicode: bool) -> String {
     format!("{blank}{below}{dot}{above}")
 }
 
-/// The number of columns that a share of the nominal value takes, the nearest one; `None` if it is
-/// more than the scale has.
+/// Returns the number of columns for a fraction of the nominal value, rounded to the nearest;
+/// `None` if it exceeds the scale.
 fn columns(share: &Rational, scale: i64, middle: usize) -> Option<usize> {
-    // Few columns, so a linear search says it best.
+    // There are few columns, so a linear search is the simplest solution.
     let steps = i64::try_from(middle).expect("a narrow bar");
     let part = (share * &Rational::from(100)).checked_div(&Rational::from(scale))?;
     if part > Rational::ONE {
@@ -359,7 +359,7 @@ fn pad_right(text: &str, width: usize) -> String {
     format!("{text}{:missing$}", "")
 }
 
-/// The text, with its middle left out where it is wider than `width`.
+/// Shortens the text to `width` columns by omitting its middle.
 fn shorten(text: &str, width: usize, unicode: bool) -> String {
     if UnicodeWidthStr::width(text) <= width {
         return text.to_owned();

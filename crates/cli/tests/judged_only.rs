@@ -63,7 +63,7 @@ const HEEDING_NATURE: [&str; 4] = [
     "run D P --plan NETWORK",
 ];
 
-/// A folder with files for a domain with this in it.
+/// Creates a folder with the files of a domain that contains `content`.
 fn folder(number: usize, (content, step, _): (&str, &str, &str)) -> PathBuf {
     let name = format!("elbowroom-{}-judged-{number}", std::process::id());
     let folder = std::env::temp_dir().join(name);
@@ -140,7 +140,7 @@ fn what_only_the_judge_heeds_is_judged_and_refused_by_name_by_all_others() {
             let output = run("envelope D P PLAN");
             assert_eq!(output.status.code(), Some(0), "{output:?}");
         }
-        // A repair finds that nothing has to change, but gives no guarantee, and says why.
+        // The repair finds that no change is needed, but gives no guarantee, and states the reason.
         let repaired = run("envelope D P PLAN --repair");
         let said = String::from_utf8(repaired.stdout).expect("text");
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -50,7 +50,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// The command that begins a run in this folder; with a planner of its own, it has no plan yet.
+/// Returns the command that begins a run in this folder. With a planner, it has no first plan.
 fn beginning(folder: &Path, journal: &str, has_planner: bool) -> Vec<String> {
     let world = format!(
         "python3 crates/cli/tests/files/robot.py {}",
@@ -83,7 +83,7 @@ fn started(line: &[String]) -> Child {
         .expect("the command can be started")
 }
 
-/// Numbers that look random: the upper bits of a linear congruential generator.
+/// Pseudo-random numbers: the upper bits of a linear congruential generator.
 struct Dice(u64);
 
 impl Dice {
@@ -96,7 +96,7 @@ impl Dice {
     }
 }
 
-/// The output of a program that must end by itself.
+/// Returns the output of a program that must end by itself.
 fn awaited(mut child: Child, what: &str) -> Output {
     for _ in 0..1200 {
         if child.try_wait().expect("it can be asked").is_some() {
@@ -129,9 +129,9 @@ fn kill_by(folder: &Path, file: &str) -> bool {
 enum Victim {
     Executive,
     ExecutiveAndWorld,
-    /// The executive says so, and ends.
+    /// The executive reports it and ends.
     World,
-    /// As soon as it runs, for at most two seconds.
+    /// Killed as soon as it runs, within at most two seconds.
     Planner,
 }
 
@@ -147,7 +147,7 @@ impl Victim {
         }
     }
 
-    /// Kills it, unless it is the executive, whose process is at hand elsewhere.
+    /// Kills the process, unless it is the executive, which the caller kills.
     fn kill(self, folder: &Path, dice: &mut Dice) {
         match self {
             Self::Executive => {}
@@ -174,7 +174,7 @@ fn lines(folder: &Path, file: &str) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// Nothing was begun twice, and what counts as done was done.
+/// Checks that nothing was started twice, and that everything reported as done was done.
 fn judge(folder: &Path, output: &Output, what: &str) {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -226,7 +226,7 @@ fn killed(number: u64) -> u64 {
     let resume = ["run".to_owned(), "--resume".to_owned(), journal.clone()];
     let (mut kills, most) = (0, 1 + dice.below(3));
     let output = loop {
-        // A journal without a first record is that of a run that never began.
+        // Without a first record, the run never began.
         let has_begun = fs::read_to_string(&journal).is_ok_and(|text| text.contains('\n'));
         let line = if has_begun {
             resume.to_vec()
@@ -274,7 +274,7 @@ fn killed(number: u64) -> u64 {
     kills
 }
 
-/// A run ends with its goal.
+/// Checks that a run ended with its goal.
 fn judge_the_end(folder: &Path, output: &Output, what: &str) {
     if String::from_utf8_lossy(&output.stdout).contains("has reached its goal before") {
         judge_what_was_done(folder, what, "it was over when it was killed");
@@ -331,7 +331,7 @@ fn whenever_a_run_is_killed_it_goes_on_and_nothing_is_started_twice() {
         .ok()
         .and_then(|runs| runs.parse().ok());
     let runs: u64 = runs.unwrap_or(20);
-    // They mostly sleep.
+    // More workers than processors, because they mostly sleep.
     let workers: Vec<_> = (0..u64::from(WORKERS))
         .map(|worker| {
             let numbers = (worker..runs).step_by(usize::from(WORKERS));
@@ -345,7 +345,7 @@ fn whenever_a_run_is_killed_it_goes_on_and_nothing_is_started_twice() {
     println!("{runs} runs, killed {kills} times");
 }
 
-/// Two that write one journal would start everything twice.
+/// Two programs with one journal would start everything twice.
 #[cfg(unix)]
 #[test]
 fn a_run_that_is_under_way_is_not_gone_on_with_beside_it() {
@@ -363,7 +363,7 @@ fn a_run_that_is_under_way_is_not_gone_on_with_beside_it() {
         std::thread::sleep(Duration::from_millis(50));
     }
     let resume = ["run", "--resume", &journal].map(str::to_owned);
-    // Both wait a little for the journal, and the first run does not last long.
+    // Both wait for the journal for a short time, which is less than the first run takes.
     for second in [started(&resume), started(&line)] {
         let second = awaited(second, "the second");
         let text = String::from_utf8_lossy(&second.stderr).into_owned();
@@ -397,7 +397,7 @@ fn a_journal_is_neither_overwritten_nor_gone_on_with_after_its_end() {
     // The journal is also a valid trace.
     let report = elbowroom(&["report", &journal]);
     assert!(report.status.success(), "{report:?}");
-    // Damage is not taken for a torn end.
+    // Damage is distinguished from a truncated end.
     let text = fs::read_to_string(&journal).expect("the journal");
     let header = format!("{}\n", text.lines().next().expect("a record"));
     fs::write(

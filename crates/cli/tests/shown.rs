@@ -39,7 +39,7 @@ fn what_cannot_be_shown_is_told_before_anything_is_done() {
             &["--realtime", "1", "--serve", "--token", nowhere],
             "cannot read the token",
         ),
-        // The old name of the option.
+        // The former name of the option.
         (
             &["--realtime", "1", "--serve", "--control", nowhere],
             "cannot read the token",

@@ -27,7 +27,7 @@ fn python_is_there() -> bool {
     is_there
 }
 
-/// The document about this world, and the exit code.
+/// Returns the document about this world, and the exit code.
 fn checked(command: &str, options: &[&str]) -> (Value, Option<i32>) {
     let line = [&["world-check", command, "--json"][..], options].concat();
     let output = elbowroom(&line);
@@ -36,14 +36,15 @@ fn checked(command: &str, options: &[&str]) -> (Value, Option<i32>) {
     (document, output.status.code())
 }
 
-/// The checks with that outcome.
+/// Returns the checks with that outcome.
 fn with_outcome<'a>(document: &'a Value, outcome: &str) -> Vec<&'a str> {
     let checks = document["checks"].as_array().expect("checks");
     let checks = checks.iter().filter(|check| check["outcome"] == outcome);
     checks.filter_map(|check| check["check"].as_str()).collect()
 }
 
-/// A program of `tests/files/worlds.py`, whose fault has no spaces on a command line.
+/// Writes a program of `tests/files/worlds.py` with this fault. Returns its command line and its
+/// file.
 fn world(fault: &str) -> (String, String) {
     let script = fs::read_to_string(root().join("crates/cli/tests/files/worlds.py"));
     let script = script.expect("the worlds");
@@ -246,7 +247,7 @@ world.run()
         if seen["type"] == "ended" {
             let ticket = seen["ticket"].as_u64().expect("a ticket");
             let time = seen["time"]["decimal"].as_f64().expect("a time");
-            // The reading took a moment.
+            // Reading the clock takes a moment.
             assert!(
                 (time - happened[&ticket]).abs() < 0.2,
                 "{line}: {happened:?}"
@@ -358,7 +359,7 @@ fn a_program_that_wants_to_hear_what_is_believed_is_told_all_of_it_once() {
         let name = it["fluent"].as_str().expect("a name");
         let (told, judged) = (values[name].as_f64(), it["value"]["decimal"].as_f64());
         let off = told.zip(judged).map(|(told, judged)| (told - judged).abs());
-        // The simulation's clock counts in floats.
+        // The simulation's clock uses floats.
         assert!(
             off.is_some_and(|it| it < 1e-9),
             "{name}: {told:?}, {judged:?}"

@@ -8,7 +8,7 @@ use crate::commands::compare::{FAILURES, traces};
 use crate::exit::{Answer, Exit, Failure};
 use crate::{input, output};
 
-/// The file that `compare -o DIR` writes its results to.
+/// File with the results of `compare -o DIR`.
 const RESULTS: &str = "results.json";
 
 /// Writes the page, or the run for other viewers.
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &ReportArgs) -> Answer {
     Ok(Exit::Yes)
 }
 
-/// The input's name with another ending.
+/// Returns the input's name with another extension.
 fn suggested(input: &Path) -> PathBuf {
     let stem = input.file_stem().filter(|stem| *stem != "-");
     Path::new(stem.unwrap_or_else(|| "report".as_ref())).with_extension("html")

@@ -26,7 +26,7 @@ use elbowroom_executive::{Error, make_persistent};
 /// Default length of a journal at which it is rotated, in bytes.
 const LONG: u64 = 10_000_000;
 
-/// The name of a problem that a client gives.
+/// The name of a problem submitted by a client.
 const GIVEN: &str = "the problem that was given";
 
 /// Runs the executive until it is stopped.
@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         let of = (&mut spec, worlds.as_slice());
         let Some(((task, first), at, client)) = await_problem(&router, arguments, of, output)
         else {
-            // It was asked to end before there was a problem.
+            // The executive was stopped before it received a problem.
             router.close();
             return Ok(Exit::Yes);
         };
@@ -124,7 +124,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     in_order(answer)
 }
 
-/// A problem, and the plan to begin with.
+/// A problem, and its first plan if one is given.
 type Begun = (Arc<Task>, Option<TimeTriggeredPlan>);
 
 /// Waits for a problem that can be executed. Rejects other problems with the reason. Returns `None`
@@ -180,8 +180,8 @@ fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) {
     make_persistent(spec);
 }
 
-/// Refuses a domain with errors, or whose problems cannot be executed, before a problem is given. Warnings are printed
-/// with the problem.
+/// Rejects a domain with errors, or one whose problems cannot be executed, before a problem is
+/// given. Warnings are printed with the problem.
 fn check_domain(domain: &NamedText) -> Result<(), Failure> {
     let mut words = domain.text.split(['(', ')', ' ', '\t', '\r', '\n']);
     let words = &mut words.by_ref().filter(|word| !word.is_empty());
@@ -248,7 +248,7 @@ fn open(
     )
 }
 
-/// Prints where the executive listens. If it has a problem, it accepts requests about it by then.
+/// Prints the address of the executive. If it has a problem, it already accepts requests about it.
 fn announce(arguments: &ServeArgs, router: &ApiRouter) {
     let with_token = match &arguments.run.token {
         Some(_) => "",

@@ -1,4 +1,4 @@
-//! `elbowroom stn`: the plan without its needless times and orderings.
+//! `elbowroom stn`: relaxation of a plan to an STN.
 
 use elbowroom::RoundingRule;
 use elbowroom::answers::stn::{StnFinding, StnOutcome, StnRequest, stn};
@@ -51,7 +51,8 @@ fn network(
     Ok(Exit::Yes)
 }
 
-/// A plan that is not valid has no room. Standard output is for the network alone.
+/// Reports that the plan is invalid and has no network. Standard output is reserved for the
+/// network.
 fn invalid(arguments: &StnArgs, outcome: &StnOutcome, output: &mut Output) -> Answer {
     let file = arguments.plan.display();
     if arguments.json {

@@ -1,4 +1,4 @@
-//! The command, run from the root of the project.
+//! Runs of the command in the root of the project.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,4 +1,4 @@
-//! The world of the scenarios: actions take as long as they were planned to, but for its faults.
+//! World of the scenarios: actions take their planned durations, except for injected faults.
 
 use std::sync::{Arc, Mutex};
 
@@ -11,7 +11,7 @@ use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 
-/// Two robots that fetch things, in ten seconds each.
+/// Domain with two robots that fetch items. Each errand takes 10 s.
 pub(crate) const ERRANDS: &str =
     "(define (domain errands) (:requirements :durative-actions :typing)
     (:types robot item)

@@ -9,7 +9,7 @@ use super::client::{Executive, folder};
 use super::skipped::skipped;
 use super::{command, ctl, exact, lines, python_is_there, signal, simulated, with_robot};
 
-/// A program that hangs is named, and no request is said to wait for a plan because of it.
+/// A hanging program is named, and requests are not reported as waiting for a plan.
 #[test]
 fn a_world_that_stands_still_is_named() {
     if !python_is_there() {
@@ -78,7 +78,7 @@ fn the_guarantee_says_what_its_quantities_are() {
     for parameter in parameters {
         let meaning = parameter["meaning"].as_str().expect("words");
         assert!(meaning.starts_with("duration of (do "), "{meaning}");
-        // Nothing limits these durations from above.
+        // These durations have no upper limit.
         assert_eq!(parameter["most"]["exact"], "inf", "{guarantee}");
     }
     let told = ctl(&["--to", &own.address(), "guarantee"]);
@@ -126,11 +126,11 @@ fn a_number_is_taken_in_and_planned_with() {
         charges.count()
     };
     assert_eq!(run("as-it-was", None), 0);
-    // Of 80, the survey uses 40.
+    // The survey uses 40 of 80.
     assert!(run("told", Some("50")) > 0);
 }
 
-/// Without `--http`, only this machine is listened to.
+/// By default, only this machine can connect.
 #[test]
 fn only_this_machine_reaches_an_executive() {
     let own = simulated("local");
@@ -151,7 +151,7 @@ fn only_this_machine_reaches_an_executive() {
         .filter(|it| it.ends_with(&format!(":{port:04X}")))
         .collect();
     assert!(!listening.is_empty(), "{text}");
-    // 127.0.0.1, its bytes in the order of the machine.
+    // 127.0.0.1 in the machine's byte order.
     assert!(
         listening
             .iter()

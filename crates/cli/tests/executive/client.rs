@@ -1,4 +1,4 @@
-//! An executive that was started, and a client that knows nothing of the command.
+//! A running executive, and a client that is independent of the command.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read, Write};
@@ -54,7 +54,7 @@ impl Drop for Executive {
 }
 
 impl Executive {
-    /// One whose token, socket and trace are in `folder`.
+    /// Starts an executive with token, socket and trace in `folder`.
     pub(crate) fn start(folder: &Path, line: &[&str]) -> Self {
         Self::with_token(folder, line, None)
     }
@@ -91,7 +91,7 @@ impl Executive {
     fn spawn(folder: &Path, line: &[&str], most_blocks: Option<u32>) -> Self {
         let mut command = Command::new("env");
         if let Some(most) = most_blocks {
-            // The signal that would end the program is ignored, and writing fails.
+            // Writing fails without the signal, which would end the program.
             let script = format!("trap '' XFSZ; ulimit -f {most}; exec \"$@\"");
             command.args(["bash", "-c", &script, "bash"]);
         }
@@ -115,7 +115,7 @@ impl Executive {
                 break port.parse().expect("a port");
             }
         };
-        // Whatever else it says must not fill the pipe.
+        // Drains standard error, so that the pipe does not fill up.
         let errors = std::thread::spawn(move || {
             let mut rest = String::new();
             let _ = said.read_to_string(&mut rest);
@@ -148,12 +148,12 @@ impl Executive {
         }
     }
 
-    /// The number of its process.
+    /// Returns the process number.
     pub(crate) fn process(&self) -> u32 {
         self.child.as_ref().expect("it runs").id()
     }
 
-    /// Waits for its end.
+    /// Waits for the end of the process.
     pub(crate) fn end(&mut self) -> Output {
         let mut child = self.child.take().expect("it runs");
         let mut is_over = || child.try_wait().expect("it can be asked").is_some();
@@ -203,7 +203,8 @@ impl Executive {
         talk(stream, verb, path, token, body)
     }
 
-    /// The same of one that may be killed meanwhile: then there is no answer.
+    /// The same for an executive that may be killed in the meantime. Returns `None` without an
+    /// answer.
     pub(crate) fn ask_if_there(
         &self,
         verb: &str,
@@ -246,7 +247,7 @@ impl Executive {
         panic!("there is no page: {last}");
     }
 
-    /// Waits until things stand like that.
+    /// Waits for a state with this property.
     #[track_caller]
     pub(crate) fn await_state(&self, is_so: impl Fn(&Value) -> bool) -> Value {
         let mut last = Value::Null;

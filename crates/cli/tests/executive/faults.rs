@@ -53,7 +53,7 @@ fn when_the_disk_is_full_the_client_and_the_report_say_so() {
     }
     let place = folder("full-disk");
     let journal = place.join("journal").display().to_string();
-    // It rests at once, so that hardly anything but requests is recorded.
+    // The executive becomes idle at once, so that almost only requests are recorded.
     let text = fs::read_to_string(root().join(PROBLEM)).expect("a problem");
     let problem = place.join("problem.pddl");
     let text = text.replace("(:goal (and (done a3) (done b3)))", "(:goal (and))");
@@ -62,11 +62,12 @@ fn when_the_disk_is_full_the_client_and_the_report_say_so() {
     let mut line = with_robot(&place, &journal);
     line[1].clone_from(&problem);
     let line: Vec<&str> = line.iter().map(String::as_str).collect();
-    // The first goal fits, and the first of the second one's two records does not: that is before it is taken in.
+    // The first goal fits into the file. The first of the second goal's two records does not, so
+    // the goal is never accepted.
     let mut own = Executive::confined(&place, &line, 30);
     own.await_state(|state| state["activity"] == "resting");
     assert_eq!(own.post("/v1/pause", &Value::Null).0, 200);
-    // Each is recorded twice, and longer than everything else.
+    // Each goal is recorded twice, and is longer than all other records.
     let goal = format!("(and {})", "(done a1) ".repeat(1000));
     let answers = (0..10).map(|number| {
         let asked = json!({"goal": goal, "name": format!("goal-{number}")});

@@ -1,4 +1,4 @@
-//! The first problem of an executive that was started without one.
+//! First problem of an executive that was started without one.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -97,7 +97,7 @@ fn a_first_problem_that_is_taken_survives_kill_9() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// A problem that can be read, and not executed as the command line has it.
+/// A readable problem that cannot be executed with this command line.
 #[test]
 fn a_first_problem_that_cannot_be_executed_is_refused_and_another_one_is_taken() {
     let vary = ["--vary", "deadline (open nothing)"];
@@ -143,8 +143,8 @@ fn an_executive_without_a_problem_ends_when_it_is_told_to() {
     assert_eq!(own.end().status.code(), Some(0));
 }
 
-/// The calendar of the command line is about the problem that a client gives; its windows stay when a further
-/// problem comes.
+/// The calendar of the command line applies to the client's problem. Its windows are kept for
+/// further problems.
 #[test]
 fn calendar_is_applied_to_first_problem_and_kept_for_further_ones() {
     let place = folder("first-dated");

@@ -25,7 +25,7 @@ const DONE: [&str; 6] = ["a1", "a2", "a3", "b1", "b2", "b3"];
 /// Options that rotate the journal after every few actions and keep all segments.
 const SEGMENTS: [&str; 4] = ["--journal-size", "30K", "--journal-segments", "1000"];
 
-/// Numbers that look random.
+/// Pseudo-random numbers.
 struct Dice(u64);
 
 impl Dice {
@@ -42,7 +42,7 @@ impl Dice {
 #[derive(Default)]
 struct Asked {
     goals: u64,
-    /// Goals that it said it had taken in, and whether they may have been cancelled since.
+    /// Accepted goals, with `true` if they may have been cancelled since.
     taken: BTreeMap<String, bool>,
 }
 
@@ -61,14 +61,14 @@ impl Asked {
             }
             return Some(());
         }
-        // It has come undone, and is to be done again.
+        // The errand is undone and has to be repeated.
         let undone = json!({"fact": format!("(done {job})"), "becomes": false});
         own.ask_if_there("POST", "/v1/facts", &undone)?;
         self.goals += 1;
         let name = format!("g{}", self.goals);
         let goal = json!({"name": name, "goal": format!("(done {job})")});
         let (status, answer) = own.ask_if_there("POST", "/v1/goals", &goal)?;
-        // It listens a moment before it knows its run again.
+        // A resumed executive listens before it has replayed its journal.
         assert!([200, 202, 409].contains(&status), "{answer}");
         if answer["taken"] == true {
             self.taken.insert(name, false);
@@ -96,16 +96,16 @@ fn segments(journal: &str) -> Vec<String> {
     all
 }
 
-/// The names of the goals that some segment says were reached.
+/// Returns the names of the goals that were reached according to any segment.
 fn reached(journal: &str) -> BTreeSet<String> {
     let mut reached = BTreeSet::new();
     for segment in segments(journal) {
-        // While the segments get their next numbers, one is not where it was.
+        // A segment may be missing while the segments are renumbered.
         let text = fs::read_to_string(&segment).unwrap_or_default();
         let is_about_goals =
             |line: &&str| line.contains("\"resting\"") || line.contains("\"event\":\"goal\"");
         for line in text.lines().filter(is_about_goals) {
-            // The last line may be in the writing.
+            // The last line may be incomplete.
             let Ok(line) = serde_json::from_str::<Value>(&line[9..]) else {
                 continue;
             };
@@ -120,8 +120,8 @@ fn reached(journal: &str) -> BTreeSet<String> {
     reached
 }
 
-/// Numbers of kills and of rotated journals: rotated when idle (`at_rest`) and on the adoption of a
-/// plan (`amid`).
+/// Number of kills, and of new journal segments: those written when idle (`at_rest`), and those
+/// written on the adoption of a plan (`amid`).
 #[derive(Clone, Copy, Debug, Default)]
 struct Killed {
     kills: u64,
@@ -131,7 +131,7 @@ struct Killed {
     under_way: usize,
 }
 
-/// Kills an executive some times.
+/// Kills an executive several times.
 fn killed(number: u64) -> Killed {
     let (place, mut dice) = (folder(&format!("serve-kill-{number}")), Dice(number));
     dice.below(2);
@@ -155,7 +155,7 @@ fn killed(number: u64) -> Killed {
     }
     let what = format!("executive {number} after {kills} kills");
     let mut own = launched(&place, &journal, &beginning);
-    // It takes in nothing before it has gone through its journal. All that are still open can be reached.
+    // Goals are only accepted after the replay of the journal. All open goals can be reached.
     let last = json!({"name": "last", "goal": "(done a1)"});
     while own.post("/v1/goals", &last).0 != 200 {
         std::thread::sleep(std::time::Duration::from_millis(100));
@@ -224,7 +224,7 @@ fn killed(number: u64) -> Killed {
 }
 
 fn launched(place: &Path, journal: &str, beginning: &[String]) -> Executive {
-    // A journal without a first record is that of an executive that never began.
+    // Without a first record, the executive never began.
     let has_begun = fs::read(journal).is_ok_and(|text| text.contains(&b'\n'));
     let line: Vec<&str> = if has_begun {
         vec!["--resume", journal]
@@ -235,8 +235,8 @@ fn launched(place: &Path, journal: &str, beginning: &[String]) -> Executive {
     Executive::start(place, &[&line[..], &SEGMENTS].concat())
 }
 
-/// No goal that was taken in is lost, nothing is started twice, and every segment of the journal can be
-/// played back.
+/// No accepted goal is lost, nothing is started twice, and every segment of the journal can be
+/// replayed.
 #[test]
 fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
     if !python_is_there() {
@@ -287,12 +287,12 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
         let written = [0, text.len() / 2, text.len(), text.len(), text.len()][step];
         fs::write(&new, &text[..written]).expect("written");
         if step == 3 {
-            // The old segment has its second name already.
+            // The old segment already has its second name.
             let _ = fs::remove_file(&earlier);
             fs::hard_link(&journal, &earlier).expect("a second name");
         }
         if step == 4 {
-            // The earlier segments have their next numbers already, and the old segment has none.
+            // The earlier segments are already renumbered, and the old segment has no number.
             let all = segments(&journal).len() - 1;
             for number in (1..=all).rev() {
                 let to = format!("{journal}.{}", number + 1);
@@ -311,7 +311,7 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
             let second = text.lines().nth(1).map(str::to_owned);
             second.is_some_and(|it| it.contains("\"snapshot\""))
         };
-        // A goal that was taken in is not among the goals at once.
+        // An accepted goal appears among the goals with a delay.
         own.await_state(|_| begins_with_snapshot() && reached(&journal).contains(&name));
         own.kill();
         for segment in segments(&journal) {
@@ -344,7 +344,8 @@ fn passed(journal: &str) -> Vec<Value> {
         .collect()
 }
 
-/// The time while no executive is there counts also, for a world on the real clock that has forgotten it.
+/// Time also passes while no executive runs, for a world on the real clock that does not remember
+/// it.
 #[test]
 fn time_passes_between_kill_and_resume() {
     if !python_is_there() {
@@ -374,7 +375,7 @@ fn time_passes_between_kill_and_resume() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// An executive that was idle since its beginning has no report of its world in the journal.
+/// The journal of an executive that was always idle contains no report of its world.
 #[test]
 fn time_passes_while_an_executive_is_idle_from_its_beginning() {
     if !python_is_there() {
@@ -397,7 +398,7 @@ fn time_passes_while_an_executive_is_idle_from_its_beginning() {
     assert_eq!(passed(&journal), Vec::<Value>::new());
     std::thread::sleep(pause);
     let mut again = Executive::start(&place, &["--resume", &journal]);
-    // The world is started after the journal was replayed.
+    // The world is started after the replay of the journal.
     let state = again.await_state(|state| super::exact(&state["now"]) > 0.0);
     assert!(
         super::exact(&state["now"]) >= 2.0 * pause.as_secs_f64(),

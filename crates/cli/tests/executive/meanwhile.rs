@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::client::{Executive, folder};
 use super::{DOMAIN, PROBLEM};
 
-/// An executive whose planner waits for the file `go` in that folder.
+/// Starts an executive whose planner waits for the file `go` in that folder.
 fn with_a_slow_planner(place: &Path) -> Executive {
     with_a_slow_planner_for(place, PROBLEM)
 }
@@ -21,7 +21,7 @@ fn with_a_slow_planner_for(place: &Path, problem: &str) -> Executive {
         place.join("once"),
     );
     let own = env!("CARGO_BIN_EXE_elbowroom");
-    // With the file `once`, each `go` is for one plan.
+    // With the file `once`, each `go` permits one plan.
     let program = format!(
         "while ! test -e '{go}'; do sleep 0.05; done\nif test -e '{once}'; then rm '{go}'; fi\n\
          exec '{own}' plan \"$1\" \"$2\"\n",
@@ -87,7 +87,7 @@ fn with_another_chain(place: &Path) -> String {
     problem.display().to_string()
 }
 
-/// The lines of the trace so far; the last one may be in the writing.
+/// Returns the lines of the trace so far, without an incomplete last one.
 fn trace(place: &Path) -> Vec<Value> {
     let text = fs::read_to_string(place.join("trace.jsonl")).unwrap_or_default();
     let lines = text.lines().map(serde_json::from_str);
@@ -102,7 +102,7 @@ fn is_start(line: &Value) -> bool {
     is_event(line, "command") && line["command"]["type"] == "start"
 }
 
-/// The lines since the last plan was asked for, if it is still in the making.
+/// Returns the lines since the last request for a plan, if the search is still running.
 fn of_the_search(lines: &[Value]) -> Option<&[Value]> {
     let asked = lines.iter().rposition(|it| is_event(it, "planning"))?;
     let since = &lines[asked..];

@@ -44,8 +44,8 @@ fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
     let folder = folder("fills");
     let journal = folder.join("journal").display().to_string();
     let program = env!("CARGO_BIN_EXE_elbowroom");
-    // In the shell's units, so that the first record fits and not all of them do. The signal that
-    // would end the program is ignored, and writing fails.
+    // In the shell's units, so that the first record fits and the rest does not. The signal that
+    // would end the program is ignored, so that writing fails.
     let line = beginning(&folder, &journal, false)
         .iter()
         .map(|word| format!("'{word}'"))
@@ -73,10 +73,10 @@ fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
-/// A file system that cannot be written is said so before anything is started.
+/// A read-only file system is reported before anything is started.
 #[test]
 fn a_journal_on_a_disk_that_is_read_only_starts_nothing() {
-    // Nobody makes files there, not even root.
+    // No user can create files there, not even root.
     let journal = "/proc/self/journal";
     if !Path::new("/proc/self").exists() {
         skipped("there is no /proc");
@@ -96,7 +96,7 @@ fn a_journal_on_a_disk_that_is_read_only_starts_nothing() {
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
-/// A disk of a few pages fills up and grows again. As root, in name spaces of their own.
+/// A disk of a few pages fills up and is enlarged. Needs root, and uses its own name spaces.
 #[test]
 fn a_run_goes_on_from_a_small_disk_that_was_full_when_there_is_room_again() {
     let can_mount = Command::new("unshare").args(["-m", "true"]).output();
@@ -182,7 +182,7 @@ fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk()
         // The executive waits for the sync and can send nothing. The starts that the robot has
         // received by now must be on the disk.
         let told = told_to_start(&journal);
-        // All that one decision starts waits together.
+        // All starts of one decision are synced together.
         let (before, held) = told.split_at(released);
         if held.is_empty() {
             // The record is a cancel. Late actions may be cancelled.
@@ -237,7 +237,7 @@ fn compiled(folder: &Path) -> Option<PathBuf> {
     Some(shim)
 }
 
-/// A named pipe. Whoever opens it for both does not wait for others.
+/// Creates a named pipe, opened for reading and writing so that opening does not block.
 fn pipe(path: &Path) -> fs::File {
     let made = Command::new("mkfifo").arg(path).status();
     assert!(made.is_ok_and(|it| it.success()), "{}", path.display());
@@ -246,7 +246,7 @@ fn pipe(path: &Path) -> fs::File {
     options.open(path).expect("it was made")
 }
 
-/// The starts that the journal has, as the robot writes them down.
+/// Returns the starts in the journal, in the format of the robot's records.
 fn told_to_start(journal: &str) -> Vec<String> {
     let text = fs::read_to_string(journal).expect("there is a journal");
     let records = text.lines().filter_map(|line| {

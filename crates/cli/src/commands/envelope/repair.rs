@@ -26,7 +26,7 @@ use crate::stopwatch::{Stopwatch, duration};
 const DIGITS: u32 = 6;
 /// Maximum number of reasons printed; `--json` has all.
 const REASONS_SHOWN: usize = 8;
-/// The limit of the answer where other orders were not searched to the end.
+/// Limitation of the answer if not all other orders were searched.
 const OTHER_ORDERS: &str =
     "Other orders of interfering actions were not searched to the end; one may cost less.";
 
@@ -80,7 +80,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     })
 }
 
-/// The failure to read one of the specifications of an option.
+/// Returns the failure to parse one of the specifications of an option.
 fn named(option: &str, texts: &[String]) -> Failure {
     let mut failures = texts.iter().filter_map(|text| {
         let error = text
@@ -252,7 +252,7 @@ fn nothing_cheaper(cost: &Rational, bound: &Rational, orders: Orders) -> String 
     }
 }
 
-/// A list with a headline, unless there is nothing to list, or nothing it is about.
+/// Appends a list with a headline, unless `items` or `about` is empty.
 fn section<T>(text: &mut String, headline: &str, items: &[String], about: &[T], look: Look) {
     if items.is_empty() || about.is_empty() {
         return;

@@ -1,4 +1,4 @@
-//! The answer as people read it.
+//! Text output of an envelope.
 
 mod best;
 mod example;
@@ -22,7 +22,7 @@ use best::{gained, goodness};
 use elbowroom_executive::messages::counted;
 use example::{example, what};
 
-/// The answer, whatever it is.
+/// Renders the answer.
 pub(super) fn text(
     request: &EnvelopeRequest,
     outcome: &EnvelopeOutcome,
@@ -64,7 +64,7 @@ fn no_room(file: &str, fails: &str) -> String {
     format!("{}: {file} {fails}\n", styled(BAD, "no elbow room"))
 }
 
-/// The plan fails as planned, or can.
+/// Renders the answer for a plan that fails, or may fail, with nominal values.
 fn fails(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> String {
     let has_schedule = outcome
         .why_not
@@ -82,7 +82,7 @@ fn fails(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> St
     text
 }
 
-/// The time-out that an action comes to, where nothing else is wrong.
+/// Appends the time-out that an action reaches, if there is no other reason.
 fn push_timeout(text: &mut String, outcome: &EnvelopeOutcome, look: Look) {
     let (EnvelopeFinding::Outside { counterexample, .. }
     | EnvelopeFinding::Fails(Failing::AsPlanned { counterexample, .. })) = &outcome.answer.finding
@@ -198,7 +198,7 @@ fn envelope(
     text
 }
 
-/// By how much everything may deviate at once.
+/// States the uniform deviation of all quantities that the plan tolerates.
 fn headline(balance: &Balance, parameters: &[Room]) -> String {
     let is_duration = |room: &Room| room.range.quantity.kind == QuantityKind::Duration;
     let (subject, more, less) = if parameters.iter().all(is_duration) {
@@ -217,7 +217,7 @@ fn headline(balance: &Balance, parameters: &[Room]) -> String {
         let percent = number::rounded(&share, digits, Rounding::Down);
         match &deviation.limit {
             _ if deviation.share.is_zero() => format!("no {which}"),
-            // Everything is at its least value.
+            // All quantities may have their least values.
             _ if which == less && deviation.share >= Rational::ONE => format!("any {which}"),
             Some(_) => format!("up to {percent} % {which}"),
             None => format!("more than {percent} % {which}"),
@@ -260,9 +260,9 @@ fn met(conditions: &Conditions) -> Option<String> {
     (!met.is_empty()).then(|| met.join(" "))
 }
 
-/// The worth of foresight, in one sentence.
+/// States the benefit of knowing the values in advance, in one sentence.
 fn worth(foresight: &Foresight) -> String {
-    /// Of a long list only the first are named.
+    /// Maximum number of entries of a list.
     const MOST_NAMED: usize = 4;
     let more = &foresight.weak_width.0 - &foresight.width.0;
     let much = if foresight.width.0.is_zero() {
@@ -297,7 +297,7 @@ fn row(room: &Room) -> Row {
     }
 }
 
-/// A quantity in plain words; the duration of an action goes without saying.
+/// Describes a quantity; for the duration of an action, by the action alone.
 fn quantity(range: &Range) -> &str {
     let words = &range.quantity.quantity;
     match range.quantity.kind {
@@ -308,7 +308,7 @@ fn quantity(range: &Range) -> &str {
 
 /// Lists the durations that do not vary because the executor chooses them.
 fn executor_chooses(chosen: &[Chosen]) -> Option<String> {
-    /// Of a long list only the first are named.
+    /// Maximum number of entries of a list.
     const MOST_NAMED: usize = 4;
     let mut named: Vec<String> = chosen
         .iter()
@@ -323,7 +323,7 @@ fn executor_chooses(chosen: &[Chosen]) -> Option<String> {
         .then(|| format!("Chosen by the executor, so not varied (--controllable): {named}."))
 }
 
-/// The makespan of the plan, with everything started as early as possible.
+/// States the makespan of the plan with all actions started as early as possible.
 fn makespan(makespans: &Makespans) -> String {
     let mut line = format!("Done at {} as planned", number::nearest(&makespans.nominal));
     for (time, which) in [
@@ -339,7 +339,7 @@ fn makespan(makespans: &Makespans) -> String {
     line
 }
 
-/// With a full stop at its end.
+/// Adds a full stop unless there is one.
 fn sentence(text: &str) -> String {
     format!("{}.", text.trim_end_matches('.'))
 }
@@ -361,7 +361,7 @@ fn ended(
                 .flat_map(|room| [&room.lower_limit, &room.upper_limit]);
             let is_any = limits.any(|limit| limit.as_deref() == Some(elbowroom::ANY_FINITE));
             let any = if is_any { " or has none" } else { "" };
-            // Ends without a reason stay at the farthest value that the search tries.
+            // Ends without a reason are at the farthest value that the search tries.
             let (which, untold) = if parameters.iter().any(is_untold) {
                 (
                     "Each end with a reason",

@@ -23,10 +23,10 @@ use crate::stopwatch::{Stopwatch, duration};
 const TICK: Duration = Duration::from_millis(10);
 /// Grace period for an answer after the time limit; longer than most steps of the library take.
 const GRACE: Duration = Duration::from_millis(50);
-/// As much as the main thread has.
+/// Stack size of the worker, in bytes: that of the main thread.
 const STACK: usize = 64 << 20;
 
-/// Ends the work never, at a time limit, or at Ctrl-C.
+/// Watcher that ends the computation at a time limit, if there is one, or at Ctrl-C.
 pub(super) struct Watch {
     stopwatch: Stopwatch,
 }
@@ -40,7 +40,7 @@ struct Told {
 }
 
 impl Watch {
-    /// Starts to watch.
+    /// Creates a watcher whose time limit starts now.
     pub(super) fn start(arguments: &EnvelopeArgs) -> Self {
         let limit = arguments.time_limit.as_ref().map(duration);
         Self {
@@ -61,11 +61,11 @@ impl Watch {
         let (sender, receiver) = mpsc::channel();
         let theirs = Arc::clone(request);
         let worker = thread::Builder::new().stack_size(STACK).spawn(move || {
-            // Nobody listens any more when there was no time left.
+            // After the time limit, the receiver is gone.
             let _ = sender.send(envelope(&theirs, &mut listener));
         });
         if worker.is_err() {
-            // A system without threads to spare: the limit is kept between the steps.
+            // No thread is available: the limit is checked between steps only.
             return envelope(request, &mut self.stopwatch);
         }
         let mut progress = Progress::new();
@@ -73,8 +73,7 @@ impl Watch {
         loop {
             match receiver.recv_timeout(TICK) {
                 Ok(answer) => return answer,
-                // A thread that is gone without an answer has panicked, which has ended the
-                // program.
+                // The thread has ended without an answer: it panicked, which has ended the program.
                 Err(RecvTimeoutError::Disconnected) => {
                     return envelope(request, &mut self.stopwatch);
                 }

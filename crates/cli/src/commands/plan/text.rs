@@ -52,7 +52,7 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     let plans = counted(answer.plans, "plan");
     let better = match answer.stop {
         PlanStop::Exhausted => "the search found no better one",
-        // Another planner may have been about to end by itself, which is a matter of chance.
+        // Another planner may have been about to prove optimality when it was ended.
         PlanStop::FirstPlan if answer.planner != EMBEDDED => "not proved optimal",
         PlanStop::FirstPlan => "not proved optimal; --time-limit looks for better ones",
         _ => "not proved optimal",
@@ -61,7 +61,7 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     Some(styled(FAINT, &text))
 }
 
-/// The kind of the certificate that no plan exists or, if there is none, what to try.
+/// Describes the certificate that no plan exists, or advises what to try if there is none.
 pub(super) fn certified(answer: &PlanAnswer, look: Look) -> Option<String> {
     let line = match &answer.finding {
         PlanFinding::Plan { .. } => return None,
@@ -121,7 +121,7 @@ fn chosen(choice: &PlanChoice) -> String {
     text
 }
 
-/// The times are not the planner's own.
+/// Reports that the times are not the planner's own.
 pub(super) fn repaired(planner: &str, objection: &str) -> String {
     format!(
         "{}: the plan of {planner} is not valid as it stands, perhaps because its times are \
@@ -131,7 +131,7 @@ pub(super) fn repaired(planner: &str, objection: &str) -> String {
     )
 }
 
-/// The failure of a planner, with advice.
+/// Converts the failure of a planner to one with advice.
 pub(super) fn failure(failure: PlannerFailure) -> Failure {
     let in_words = failure.to_string();
     match failure.outcome {

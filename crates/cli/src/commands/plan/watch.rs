@@ -23,7 +23,7 @@ pub(super) struct Watch {
     limit: Option<Duration>,
     memory: Option<MemoryLimit>,
     best: Option<Worth>,
-    /// `true` if each better plan is reported, because there is time to search for some.
+    /// `true` if each better plan is reported, because the search continues after the first one.
     tells_plans: bool,
 }
 
@@ -31,12 +31,12 @@ pub(super) struct Watch {
 struct Worth {
     makespan: Rational,
     metric: Option<Rational>,
-    /// In words, where plans are compared by something else.
+    /// Description of another objective, if plans are compared by one.
     objective: Option<String>,
 }
 
 impl Watch {
-    /// Starts to watch: from now on, whatever is done counts.
+    /// Creates a watcher whose limits start now.
     pub(super) fn start(arguments: &PlanArgs) -> Self {
         let limit = arguments.time_limit.as_ref().map(duration);
         Self {
@@ -64,7 +64,7 @@ impl Watch {
         self.limit
     }
 
-    /// Shows how far the search has come.
+    /// Shows the progress of the search.
     fn show(&mut self, progress: &PlanProgress<'_>) {
         let elapsed = self.stopwatch.elapsed();
         let (best, limit) = (&self.best, self.limit);

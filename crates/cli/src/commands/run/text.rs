@@ -101,7 +101,7 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
         ("Why no plan reaches the goal", &report.dead_end),
         ("Why the plan was given up", &report.reasons),
     ] {
-        // What worlds and other programs say is in there. Nothing is said twice.
+        // Reasons may contain messages of worlds and other programs. Repetitions are omitted.
         let reasons = reasons
             .iter()
             .map(|reason| escape_control(&reason.to_string()));

@@ -22,7 +22,7 @@ pub(super) fn is_meant(text: &str) -> bool {
     document.is_ok_and(|document| document["format"] == "elbowroom-plan")
 }
 
-/// Checks the answer against its problem, and says what that proves.
+/// Checks the answer against its problem and prints the proved claims.
 pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) -> Answer {
     let certificate = certificate_of(source.text()).map_err(|error| {
         let advice = match error {
@@ -124,7 +124,7 @@ fn why(certificate: &NoPlan) -> String {
     }
 }
 
-/// The files of the problem: those that were given, or those that the answer names.
+/// Returns the files of the problem: the given ones, or those named in the answer.
 fn files(arguments: &VerifyArgs, certificate: &NoPlan) -> Result<ProblemArgs, Failure> {
     if let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) {
         return Ok(ProblemArgs::new(domain.clone(), problem.clone()));

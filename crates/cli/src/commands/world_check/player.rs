@@ -37,7 +37,7 @@ pub(super) struct Player {
     /// Time of the world, according to its last answer.
     pub(super) now: Rational,
     actions: BTreeMap<u64, Begun>,
-    /// Of which starts it has said that it knows nothing.
+    /// Starts that the world does not know, according to its reports.
     unknown: BTreeSet<u64>,
     /// `true` during the request for events from before the restart. Reports then refer to that
     /// time.
@@ -47,7 +47,7 @@ pub(super) struct Player {
 /// State that outlives a killed world.
 pub(super) struct Rest {
     pub(super) findings: Findings,
-    /// The time that it had last.
+    /// The last time of the killed world.
     pub(super) now: Rational,
     patience: Duration,
 }
@@ -153,12 +153,12 @@ impl Player {
         }
     }
 
-    /// When the action has started.
+    /// Returns the reported start time of the action.
     pub(super) fn started(&self, ticket: u64) -> Option<&Rational> {
         self.actions.get(&ticket)?.started.as_ref()
     }
 
-    /// The action that was, or was to be, started.
+    /// Returns the name of the action with this ticket.
     pub(super) fn name_of(&self, ticket: u64) -> &str {
         self.actions.get(&ticket).map_or("", |it| &it.name)
     }
@@ -217,7 +217,7 @@ impl Player {
         self.actions.insert(ticket, action);
     }
 
-    /// It is known that this has started.
+    /// Records that this action has started.
     pub(super) fn note_begun(&mut self, ticket: u64) {
         if let Some(action) = self.actions.get_mut(&ticket) {
             action.started = Some(Rational::ZERO);
@@ -240,7 +240,7 @@ impl Player {
         self.tell(&json!({ "type": "cancel", "ticket": ticket, "now": wire::number(&self.now) }))
     }
 
-    /// Says something that no version of the protocol has.
+    /// Sends a message of an unknown type.
     pub(super) fn mumble(&mut self) -> Result<(), Gone> {
         self.tell(&json!({ "type": "from-a-later-version", "now": wire::number(&self.now) }))
     }
@@ -263,7 +263,7 @@ impl Player {
         answered
     }
 
-    /// Lets time pass until then, or until something is observed.
+    /// Lets time pass until `until`, or until something is observed.
     pub(super) fn wait(&mut self, until: &Rational) -> Result<(), Gone> {
         let number = self.parser.next_question();
         let question = json!({ "type": "wait", "until": wire::number(until), "question": number });
@@ -370,7 +370,7 @@ impl Player {
         }
         if let Some(until) = until {
             let allowed = until.clone().max(self.now.clone());
-            // A clock that is real may be late when nothing happens; one that reports must not be.
+            // A real clock may be slightly late when nothing happens.
             let late = &now - &allowed;
             if is_silent && late > Rational::from(5) {
                 let why = format!(
@@ -449,7 +449,7 @@ impl Player {
         }
     }
 
-    /// Tells the program to stop, and sees to it that it does.
+    /// Requests the program to stop, and checks that it does.
     pub(super) fn stop(mut self) -> Findings {
         self.findings.look_at(Check::Stops);
         let told = self
@@ -468,7 +468,7 @@ impl Player {
         self.findings
     }
 
-    /// Kills it, as a crash would.
+    /// Kills the program, like a crash.
     pub(super) fn killed(mut self) -> Rest {
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -479,7 +479,7 @@ impl Player {
         }
     }
 
-    /// The conversation has ended otherwise.
+    /// Kills the program after a failed conversation.
     pub(super) fn abandon(mut self) -> Findings {
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -487,7 +487,7 @@ impl Player {
     }
 }
 
-/// Of which start a message is.
+/// Returns the ticket in a message.
 fn ticket_of(line: &str) -> Option<u64> {
     let message: Value = serde_json::from_str(line).ok()?;
     message["ticket"].as_u64()

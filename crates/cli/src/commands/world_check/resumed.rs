@@ -18,7 +18,8 @@ const OVER: u64 = 0;
 const UNDER_WAY: u64 = 4;
 const UNTOLD: u64 = 5;
 
-/// Plays that, and gives back the world that was started again. `Err` where the conversation has come to its end.
+/// Kills the world during an action and restarts it. Returns the restarted world, or `Err` if the
+/// conversation has ended.
 pub(super) fn resumed(
     mut player: Player,
     command: &str,
@@ -106,7 +107,7 @@ fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<
         );
         player.findings.wrong(Check::Resumes, why);
     }
-    // Just before it was killed, it had said when that began.
+    // The start was reported before the kill, so it cannot be later.
     let began = player.started(UNDER_WAY).cloned();
     if let Some(began) = began.filter(|began| began > killed) {
         let why = format!(

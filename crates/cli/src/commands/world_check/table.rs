@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// One thing that a world must do.
+/// A requirement on a world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Check {
     Lives,
@@ -139,7 +139,7 @@ impl Findings {
         self.wrong.len()
     }
 
-    /// The world does something wrong.
+    /// Records a violation.
     pub(super) fn wrong(&mut self, check: Check, why: impl Into<String>) {
         let why = why.into();
         let known = self.wrong.iter().filter(|(other, _)| *other == check);

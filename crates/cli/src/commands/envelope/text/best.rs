@@ -8,7 +8,7 @@ use crate::number::{self, Rounding};
 
 /// Lists the bounds whose relaxation gains most, or returns `None` if there are none.
 pub(super) fn gained(best: &Best) -> Option<String> {
-    /// Of a long list only the first are named.
+    /// Maximum number of entries of a list.
     const MOST_NAMED: usize = 3;
     let gain = |worth: &Worth| match best.objective {
         Objective::LeastSlack => {
@@ -45,7 +45,7 @@ fn spacious(best: &Best, parameters: &[Room]) -> String {
         .iter()
         .map(|own| own.range.quantity.weight.clone())
         .sum();
-    // The geometric mean says more to people than a product of many numbers.
+    // The geometric mean is easier to understand than a product of many numbers.
     let mean = |logarithm: &Rational| {
         let mean = (logarithm.to_f64() / weights.to_f64().max(f64::MIN_POSITIVE)).exp();
         let percent = Rational::from_f64_exactly(mean * 100.0).unwrap_or_default();
