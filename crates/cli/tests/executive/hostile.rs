@@ -12,8 +12,8 @@ use serde_json::Value;
 use super::client::{Executive, folder};
 use super::{DOMAIN, PROBLEM, TOKEN, ctl};
 
-/// Opens `count` connections over TCP, or over the socket in every fifth case, that send data
-/// without end or never read.
+/// Opens `count` connections over TCP, or over the socket in every fifth case, that send incomplete
+/// requests or never read the answer.
 fn crowd(own: &Executive, count: usize) -> (Vec<TcpStream>, Vec<UnixStream>) {
     let words: [&[u8]; 5] = [
         b"",
