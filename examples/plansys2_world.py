@@ -89,7 +89,8 @@ class Hub:
             deal, node = self._deals.get((name, arguments)), message.node_id
             if message.type == RESPONSE:
                 if deal is None or deal.performer not in (None, node):
-                    # Whoever has answered waits for a word, also when we have given up.
+                    # Every response needs a confirmation or a rejection, also for abandoned
+                    # actions.
                     self._send(REJECT, node, message.action, list(message.arguments))
                 elif deal.performer is None:
                     deal.performer, deal.since = node, self._clock()
@@ -160,7 +161,7 @@ class Hub:
     def _lose(self, deal, why):
         del self._deals[deal.key]
         if deal.performer is not None:
-            # In case it is there all the same.
+            # The performer may still be running.
             self._tell(CANCEL, deal, deal.performer)
         deal.action.failed(why)
 
@@ -191,12 +192,13 @@ def main():
     spinning = threading.Thread(target=executor.spin, daemon=True)
     spinning.start()
 
-    # Time begins when performers are there: what is asked for before that is lost to discovery.
+    # The world's time begins when performers are discovered, because earlier requests would be
+    # lost.
     patience = float(os.environ.get("ELBOWROOM_PERFORMERS_WITHIN", "10"))
     begun = time.monotonic()
     while not hub.performers() and time.monotonic() - begun < patience:
         time.sleep(0.1)
-    # Each says once a second that it is there: after a round, all have been heard.
+    # Each performer publishes its status once per second.
     time.sleep(1.2)
     print(f"performers: {', '.join(hub.performers()) or 'none has been heard'}", file=sys.stderr)
 
@@ -204,7 +206,7 @@ def main():
     world.starter("*")(hub.begin)
     world.canceller(hub.cancel)
     world.run()
-    # What was told to stop is to hear of it.
+    # Cancellations need time to reach the performers.
     time.sleep(0.2)
     # In this order: Python must not end while a thread of ROS still runs.
     executor.shutdown()

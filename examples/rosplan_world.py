@@ -116,7 +116,7 @@ def main():
         for word, value in vars(ActionFeedback).items()
         if word.isupper() and isinstance(value, int)
     }
-    # More than a thousand starts a second is nothing that ROSPlan's action interfaces could follow.
+    # ROSPlan's action interfaces cannot handle more than 1000 starts per second.
     dispatcher = Dispatcher(publish, names, constants, first=int(time.time()) % 1_000_000 * 1000)
     subscriber = rospy.Subscriber(TOPICS[1], ActionFeedback, dispatcher.feedback)
     wait_for_interfaces(lambda: (publisher.get_num_connections(), subscriber.get_num_connections()))

@@ -26,7 +26,7 @@ import time
 DEVIATIONS = (1, 10, 30)
 
 
-# Domains of our own: (name, domain, problem, plan or None).
+# Local domains: (name, domain, problem, plan or None).
 
 
 def within(jobs, length, job, name, one_hand=True):
@@ -314,7 +314,7 @@ def summarize(folders, executors):
             for other in others:
                 mean, error, _ = paired(trials, first, other)
                 cells.append(f"{100 * mean:+.0f} ± {100 * error:.0f}")
-                # All differences may be alike, in which case the standard error says nothing.
+                # If all differences are equal, the standard error is 0 and uninformative.
                 if mean < 0 and mean + 3 * max(error, 1 / max(1, len(trials))) < 0:
                     behind.append(f"{folder.name}, {column}: {100 * mean:+.1f} points to {other}")
             lines.append(f"| {folder.name} | {column} | {len(trials)} | {' | '.join(map(str, shares))} | {' | '.join(cells)} |")
@@ -342,7 +342,7 @@ def main():
     executors = arguments.executors.split(",")
     worlds = {**own_worlds(), **data_worlds(arguments.data)}
     names = [it for it in worlds if arguments.only in it]
-    # Where time does not suffice for all, what is tried is of every kind.
+    # Random order, so that all kinds are tested if the time does not suffice for all.
     random.Random(1).shuffle(names)
     until = time.monotonic() + arguments.seconds if arguments.seconds else math.inf
     failed = []

@@ -47,7 +47,7 @@ def world(pace, log):
     for text in sys.stdin:
         message = json.loads(text)
         if begin is None and message["type"] != "hello":
-            # Until the plan is ready, nothing is late.
+            # Nothing is late before the plan is ready.
             begin = time.monotonic()
         arrival = now() if begin else 0
         if message["type"] == "start":
@@ -131,7 +131,8 @@ class Executive:
             begin, phase = time.monotonic(), self.phase
             taken = self.ask("POST", "/v1/facts", {"fact": "(road p0 p1)", "becomes": True})
             while taken.get("taken") is False:
-                # It says so after two seconds: when it has taken the next one in, it has this one, too.
+                # This answer comes after two seconds. Once the next report is accepted, this one is
+                # as well.
                 taken = self.ask("POST", "/v1/facts", {"fact": "(road p0 p1)", "becomes": True})
             self.answers.setdefault(phase, []).append((time.monotonic() - begin) * 1000)
             time.sleep(0.03)
@@ -150,7 +151,7 @@ class Executive:
         self.phase = phases[0]
         self.ask("POST", "/v1/goals", {"goal": goal, "name": name})
         if len(phases) > 1:
-            # The plan that was made has yet to be made ready.
+            # Wait for the preparation of the new plan.
             self.until(lambda: self.ask("GET", "/v1/state")["activity"] == "planning")
             activity = lambda: self.ask("GET", "/v1/state")["activity"]  # noqa: E731
             self.until(lambda: activity() != "planning" or self.plans() > plans)
@@ -229,7 +230,7 @@ def main():
     parser.add_argument("--replan", action="store_true")
     parser.add_argument("--journal", action="store_true")
     chosen = parser.parse_intermixed_args()
-    # While a plan is made, an executive lets no world run ahead of the clock on the wall.
+    # While a plan is made, an executive does not let simulated time run ahead of real time.
     chosen.pace = chosen.pace or (1 if chosen.replan else 10)
     if chosen.program == "world":
         return world(chosen.pace, chosen.executors[0])

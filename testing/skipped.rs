@@ -1,13 +1,13 @@
-//! How a test says that it has not tested: included by the tests of all crates.
+//! Reports of skipped tests. The tests of all crates include this file.
 
 use std::fmt::Display;
 use std::io::{self, Write as _};
 use std::thread;
 
-/// Says that the test that calls this is skipped, or stops short, for want of something.
+/// Reports that the calling test is skipped, or ends early, because a requirement is missing.
 ///
-/// One line, `skipped: TEST: WHY`, which `.ci/run` counts. It goes past what the test harness
-/// captures, so that it is seen although the test passes.
+/// Prints one line, `skipped: TEST: WHY`, which `.ci/run` counts. The line bypasses the capture of
+/// the test harness, so that it is visible even if the test passes.
 pub(crate) fn skipped(why: impl Display) {
     let thread = thread::current();
     let test = thread.name().unwrap_or("a test");

@@ -83,7 +83,7 @@ class Executive:
             if "127.0.0.1:" in said:
                 break
         self.port = int(said.split("127.0.0.1:")[1].split("/")[0])
-        # What else it says must not fill the pipe.
+        # Drain standard error, so that the pipe does not fill up.
         threading.Thread(target=self.process.stderr.read, daemon=True).start()
         self.latencies = []
 
@@ -187,10 +187,10 @@ def step(own, dice, jobs, tally):
         if name in goals:
             tally["taken"].add(name)
         elif name in tally["taken"] or state["activity"] == "resting":
-            # It is closed, as it was reached: one that we cancelled is not in our list any more.
+            # The goal was reached: goals cancelled here are no longer in this list.
             del tally["open"][name]
             tally["reached"].add(name)
-    # Goals come by the dozen, and then it has time.
+    # Goals come in bursts with pauses in between.
     if not tally["open"]:
         tally["burst"] = dice.randrange(8, 24)
     busy = {*tally["open"].values(), *facts}
@@ -213,7 +213,7 @@ def step(own, dice, jobs, tally):
         del tally["open"][name]
         status, answer = own.ask("DELETE", f"/v1/goals/{name}")
         tally["cancelled"] += 1
-        # It may have been reached just now.
+        # The goal may have been reached in the meantime.
         if status not in (200, 202, 404):
             tally["wrong"].append(f"cancel {name}: {status} {answer}")
     elif what < 0.80:

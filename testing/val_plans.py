@@ -102,7 +102,7 @@ def measured(elbowroom, val, pair, seconds):
         row["check"] = {0: "valid", 1: "invalid"}.get(code, f"exit code {code}")
         row["val"], row["why"] = verdict(*call([val, "-t", "0.001", domain, problem, plan], 60))
         if row["val"] == "unreadable":
-            # VAL also finds mistakes in domain and problem with an empty plan.
+            # VAL also reports errors in domain and problem if the plan is empty.
             empty = Path(folder) / "empty"
             empty.write_text("")
             alone, _ = verdict(*call([val, "-t", "0.001", domain, problem, empty], 60))

@@ -55,7 +55,7 @@ __all__ = ["Action", "Failed", "Simulation", "Stepped", "World"]
 
 VERSION = 2
 
-# So many reports are told in one answer, however many more are coming.
+# Maximum number of reports in one answer. The others follow in the next answers.
 MOST_NEWS = 1000
 
 
@@ -120,7 +120,7 @@ class Action:
         self._tell(type="ended", outcome=outcome, **more)
 
     def _tell(self, **message: Any) -> None:
-        # What is sent is decided by the thread that speaks: it knows what was told before.
+        # The thread that writes decides which reports to send, because it knows the earlier ones.
         self._world._inbox.put(("report", dict(message, ticket=self.ticket), self._world.now()))
 
     def __repr__(self) -> str:
@@ -163,13 +163,13 @@ class World:
         self._news: list[dict[str, Any]] = []
         self._out: TextIO | None = None
         self._version = 1
-        # Whether Elbowroom is gone.
+        # Set if Elbowroom is gone.
         self._is_alone = threading.Event()
-        # Reading of the monotonic clock at the world's time 0, which is the first message after the greeting:
-        # preparations take no time.
+        # Reading of the monotonic clock at the world's time 0. That is the first message after the
+        # greeting, so that preparations take no time.
         self._zero: float | None = None
 
-    # What a program registers.
+    # Registration of functions.
 
     def action(self, *names: str, resumes: bool = False) -> Callable[[Does], Does]:
         """The function does these actions, each call in a thread of its own. ``resumes``: it can
@@ -219,7 +219,7 @@ class World:
 
         return register
 
-    # What a program reports by itself, from any thread.
+    # Reports without a request, from any thread.
 
     def fact(self, name: str, becomes: bool, *, stamp: Stamp | None = None) -> None:
         """A fact was seen to be so: ``world.fact("(open door)", False)``; now, or when the ``stamp`` says."""
@@ -250,7 +250,8 @@ class World:
         """Talks to Elbowroom until it says ``stop``, or is gone. Only the calling thread speaks."""
         source, self._out = input or sys.stdin, output or sys.stdout
         if output is None:
-            # What the program prints must not get into the conversation.
+            # Standard output carries the protocol, so the program's own output goes to standard
+            # error.
             sys.stdout = sys.stderr
         threading.Thread(target=self._listen, args=(source,), daemon=True).start()
         question: dict[str, Any] | None = None
@@ -322,7 +323,7 @@ class World:
             self._out.write(json.dumps(message) + "\n")
             self._out.flush()
         except (BrokenPipeError, ValueError):
-            # Nobody listens any more; the end of the input says so, too.
+            # Elbowroom is gone. The reading thread detects that at the end of the input.
             pass
 
     def _obey(self, what: Any, message: dict[str, Any]) -> None:
@@ -386,7 +387,8 @@ class World:
                         "why": f"this world has no action {action.name}"}, self.now())  # fmt: skip
             return
         if self._ledger is not None:
-            # Written before anything moves: what is not in the ledger was never begun.
+            # Written before the action begins: an action that is not in the ledger was never
+            # started.
             self._ledger.write(ticket=ticket, action=action.text, duration=action.duration,
                                start=self.now())  # fmt: skip
         self._launch(found, action)
@@ -396,7 +398,7 @@ class World:
         if kind == "starter":
             self._call(function, action)
         else:
-            # What takes no time has started when it is done.
+            # The start of an instantaneous action is reported when it is done.
             if not action.is_resumed and action.duration is not None:
                 self._take({"type": "started", "ticket": action.ticket}, self.now())
             threading.Thread(target=self._do, args=(function, action), daemon=True).start()
@@ -454,7 +456,8 @@ class World:
                 if self._ledger is not None:
                     self._ledger.write(report=dict(report, type="ended", outcome="succeeded"))
         if stamp is not None and self._version >= 2:
-            # Who asks after a crash is told the world's own time: nothing is known of other clocks then.
+            # Only this report has the time of the other clock. Answers after a crash use the
+            # world's time, because other clocks are not known then.
             report = dict(report, clock=stamp[0], time=float(stamp[1]))
         self._news.append(report)
 
@@ -572,7 +575,7 @@ class Simulation(World):
         if kind != "lasts":
             raise TypeError(f"a simulation has @world.lasts({action.name!r}), and no threads")
         try:
-            # Whoever multiplies the planned duration need not think of those that have none.
+            # Functions may multiply the planned duration even if there is none.
             is_instantaneous = action.duration is None
             action.duration = action.duration or 0.0
             seconds = function(action)
@@ -603,7 +606,7 @@ class Simulation(World):
         self._coming.sort(key=lambda it: it[:2])
         if self._coming and self._coming[0][0] <= until:
             self._clock = max(self._clock, self._coming[0][0])
-            # What happens at one time is told in one answer.
+            # Simultaneous reports belong to one answer.
             while self._coming and self._coming[0][0] <= self._clock:
                 _, _, report = self._coming.pop(0)
                 self._take(report, self._clock)
@@ -734,7 +737,7 @@ class _Ledger:
                         break  # cut off in the middle
         except FileNotFoundError:
             pass
-        # What was cut off is left out for good.
+        # A truncated last line is removed from the file.
         self._file = open(self._path + ".new", "w", encoding="utf-8")
         for line in lines:
             self.write(**line)

@@ -220,7 +220,7 @@ class OnTheWallClock(unittest.TestCase):
         self.assertEqual(times, [("arm", 1000.5), ("arm", 1001.0), ("arm", 1002.0)])
         self.assertNotIn("clock", fact)
         self.assertLess(fact["time"], 100)
-        # Asked again, it says its own time.
+        # A repeated report has the world's time.
         again, _ = peer.ask(type="look", facts=[], fluents=[], tickets=[0])
         self.assertEqual([it["type"] for it in again], ["ended"])
         self.assertNotIn("clock", again[0])
@@ -412,7 +412,7 @@ class AfterACrash(unittest.TestCase):
         peer.start(1, duration=500.0)
         peer.reports(1)
         self.assertTrue(peer.hang_up())
-        # As its end does.
+        # The lock is also released at the end of the process.
         peer.world._ledger.release()
         with open(self.ledger, "a", encoding="utf-8") as file:
             file.write('{"ticket": 7, "act')  # cut off

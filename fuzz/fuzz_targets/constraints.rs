@@ -1,5 +1,5 @@
-//! Any bytes as the sections of a problem about its course: constraints, preferences, the metric.
-//! A problem that is read is written and read again, and a plan is judged under it.
+//! Arbitrary bytes as constraints, preferences and metric of a problem. A valid problem is written
+//! and read again, and a plan is validated for it.
 
 #![no_main]
 

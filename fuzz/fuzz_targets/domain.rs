@@ -1,4 +1,4 @@
-//! Any bytes as a domain.
+//! Arbitrary bytes as a domain.
 
 #![no_main]
 

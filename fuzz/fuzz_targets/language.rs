@@ -1,5 +1,6 @@
-//! Any bytes, up to the first `@`, as sections of a domain with processes, events, control parameters
-//! and object fluents, and behind it as a plan. What is read is written and read again, and judged.
+//! Arbitrary bytes, before the first `@` as sections of a domain with processes, events, control
+//! parameters and object fluents, and after it as a plan. Valid input is written and read again,
+//! and the plan is validated.
 
 #![no_main]
 

@@ -1,5 +1,5 @@
-//! Any bytes as a network in any format; one that is read is written, and is the same when it is
-//! read again.
+//! Arbitrary bytes as a network in any format. A valid network is written, and must be the same
+//! when it is read again.
 
 #![no_main]
 

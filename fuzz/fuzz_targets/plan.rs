@@ -1,4 +1,4 @@
-//! Any bytes as a plan; one that is read is written and read again.
+//! Arbitrary bytes as a plan. A valid plan is written and read again.
 
 #![no_main]
 

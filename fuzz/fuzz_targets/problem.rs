@@ -1,4 +1,4 @@
-//! Any bytes as a problem.
+//! Arbitrary bytes as a problem.
 
 #![no_main]
 

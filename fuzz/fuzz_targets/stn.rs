@@ -1,4 +1,5 @@
-//! Any bytes as an STN plan file; one that is read is written, and what is written stays as it is.
+//! Arbitrary bytes as an STN plan file. A valid plan is written, and the written file is stable
+//! when it is read and written again.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-// A text with colours, and with what is wrong in it where it is wrong.
+// Text editor with syntax highlighting and error marks.
 
 import { stretches, type Stretch } from "./highlight";
 
@@ -93,7 +93,7 @@ export class Editor {
     const places = [...cuts].sort((a, b) => a - b);
     const parts: (Node | string)[] = [];
     for (const [index, from] of places.entries()) {
-      // Something is missing here.
+      // Mark of an empty range: a missing text.
       const gap = marked.find((it) => it.from === from && it.to === from);
       if (gap) parts.push(this.part("", `mark gap ${gap.kind}`));
       const to = places[index + 1];

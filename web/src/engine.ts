@@ -1,4 +1,4 @@
-// The library, behind a worker that can be stopped.
+// The library in a worker that can be stopped.
 
 import type { Reply } from "./module";
 import source from "given:worker";
@@ -58,7 +58,7 @@ export class Engine {
       this.waiting.delete(data.id);
       if (data.trouble === undefined) waiting?.resolve(data);
       else {
-        // After a panic an instance is of no more use.
+        // A panic makes the instance unusable.
         waiting?.reject(new Trouble(data.trouble));
         this.stop(new Trouble(data.trouble));
       }

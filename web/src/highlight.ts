@@ -1,4 +1,4 @@
-// Which parts of a text are what: for colours only; what a text means, the library decides.
+// Syntax highlighting only; the library determines the meaning of a text.
 
 /** A stretch of a line, in units of UTF-16. */
 export interface Stretch {

@@ -1,4 +1,4 @@
-// The playground: texts on one side, answers on the other.
+// The playground: input texts on one side, answers on the other.
 
 import examples from "given:examples";
 import { Editor, type Finding } from "./editor";
@@ -114,7 +114,7 @@ function mark(answer: Answer): void {
 
 function showPage(page: string | undefined): void {
   made = page ?? "";
-  // Each page has a frame of its own: a frame that went on to another page would be a step in the history.
+  // Each page gets a new frame, because navigation within a frame adds an entry to the history.
   const next = frame.cloneNode() as HTMLIFrameElement;
   next.hidden = save.hidden = !page;
   if (page) next.srcdoc = page;
@@ -177,7 +177,7 @@ async function act(what: string): Promise<void> {
   showPage(undefined);
   const options: Record<string, Record<string, unknown>> = {
     plan: { ...texts(), first: true },
-    // The region is that of one guarantee, and says more with its boxes.
+    // The region has only one kind of guarantee, and its answer includes boxes.
     envelope: { ...withPlan(), ...(more.method === "exact" ? { volume: true } : { guarantee: choices.guarantee.value }) },
     run: {
       ...withPlan(), guarantee: choices.guarantee.value, executor: choices.executor.value, seed: Math.max(0, Math.trunc(Number(choices.seed.value) || 0)),
@@ -221,7 +221,7 @@ function fill(texts: (typeof examples)[number]): void {
 async function attempt(trial: Trial): Promise<void> {
   const chosen = examples.find((it) => it.name === trial.example);
   if (chosen) fill({ ...chosen, world: trial.world, likelihoods: trial.likelihoods });
-  // What has a choice of its own is chosen there.
+  // Options with their own controls are set there.
   let line = trial.options;
   for (const name of ["guarantee", "executor", "seed"] as const) {
     line = line.replace(new RegExp(`--${name} (\\S+)`), (_, value: string) => { choices[name].value = value; return ""; });

@@ -26,7 +26,7 @@ export async function instance(module: WebAssembly.Module): Promise<(question: u
     new Uint8Array(library.memory.buffer, room, bytes.length).set(bytes);
     const start = library.elbowroom_ask(room, bytes.length);
     library.elbowroom_release(room, bytes.length);
-    // Memory may have grown and moved: it is looked at afresh.
+    // The memory may have grown and moved, so a new view is needed.
     const length = new DataView(library.memory.buffer).getUint32(start, true);
     const text = new TextDecoder().decode(new Uint8Array(library.memory.buffer, start + 4, length));
     library.elbowroom_release(start, length + 4);

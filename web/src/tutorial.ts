@@ -18,7 +18,7 @@ export function tutorial(select: HTMLSelectElement, article: HTMLElement, onTry:
   select.append(...chapters.map(({ title }, index) => new Option(`${index + 1}. ${title}`, String(index))));
   const show = (): void => {
     const chapter = chapters[Number(select.value)];
-    // Made from our own files when the page was built.
+    // Built from the project's own files.
     article.innerHTML = chapter?.html ?? "";
     for (const button of article.querySelectorAll<HTMLButtonElement>("button[data-try]")) {
       const trial = chapter?.trials[Number(button.dataset.try)];

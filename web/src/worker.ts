@@ -1,4 +1,4 @@
-// Asks the library apart from the page, which stays alive meanwhile.
+// Runs the library outside the page's thread, so that the page stays responsive.
 
 import { instance, type Reply } from "./module";
 

@@ -1,4 +1,4 @@
-//! What can be said on the command line.
+//! Command line of `elbowroom`, as clap structures.
 
 mod calendar;
 mod compare;
@@ -155,7 +155,7 @@ pub(crate) enum Command {
 }
 
 impl Command {
-    /// Whether the answer is to be one JSON document.
+    /// Returns `true` if the command prints its answer as one JSON document.
     pub(crate) fn is_json(&self) -> bool {
         match self {
             Self::Check(arguments) => arguments.json,
@@ -314,7 +314,7 @@ pub(crate) struct CheckArgs {
     pub(crate) diagnostics: DiagnosticsForm,
 }
 
-/// How mistakes in a text are printed.
+/// Output format of errors in input texts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DiagnosticsForm {
     /// With an excerpt, on standard error

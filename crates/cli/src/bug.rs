@@ -1,11 +1,11 @@
-//! What happens when this program is wrong.
+//! Panic hook: prints a request for a bug report and exits with code 70.
 
 use std::panic::{self, PanicHookInfo};
 
 use crate::exit::Exit;
 use crate::output;
 
-/// From now on a panic ends the program with exit code 70 and asks for a report.
+/// Installs a panic hook that asks for a bug report and exits with code 70.
 pub(crate) fn install_hook() {
     panic::set_hook(Box::new(|panic| {
         output::tell(&message(panic));
@@ -37,7 +37,7 @@ mod tests {
     use std::env;
     use std::process::Command;
 
-    /// Set in the child process, which is this test once more.
+    /// Set in the child process, which runs the same test.
     const CHILD: &str = "ELBOWROOM_TEST_PANICS";
 
     #[test]

@@ -19,7 +19,7 @@ pub(crate) struct TimedProblem {
     pub(crate) calendar: Calendar,
     /// Warnings about the calendar file.
     pub(crate) warnings: Vec<Diagnostic>,
-    /// Runs from the moment of time 0, if that is the current time.
+    /// Clock that started at time 0, if time 0 is the current time.
     pub(crate) since: Option<Clock>,
 }
 
@@ -38,7 +38,7 @@ pub(crate) fn timed_problem(
         return Ok(None);
     };
     let file = file::source(path, "calendar")?;
-    // Whatever is wrong with domain or problem is reported at its place in the original text.
+    // Errors in domain or problem are reported at their positions in the original text.
     let (read, _) = pddl::read_problem(domain, problem)?;
     let origin = Origin {
         begin: arguments.begin.as_deref(),
@@ -73,8 +73,8 @@ pub(crate) fn dated(
 }
 
 impl TimedProblem {
-    /// Reports the date of time 0 on standard error. `pace` is the number of the problem's time units
-    /// that pass in a second, if they pass on a wall clock.
+    /// Reports the date of time 0 on standard error. `pace` is the number of the problem's time
+    /// units per second, if time is that of a wall clock.
     fn announce(&self, pace: Option<&Rational>) {
         let note = styled(HINT, "note");
         output::tell(&format!("{note}: {}", self.calendar.origin()));

@@ -1,4 +1,4 @@
-//! One module for each command.
+//! Commands, with one module each.
 
 pub(crate) mod check;
 pub(crate) mod compare;

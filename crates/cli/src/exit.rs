@@ -1,4 +1,4 @@
-//! How the command ends: `docs/exit-codes.md`.
+//! Exit codes and failures of the command: `docs/exit-codes.md`.
 
 use std::fmt::{self, Write as _};
 
@@ -10,35 +10,35 @@ use elbowroom_executive::messages::counted;
 /// The meaning of an exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Exit {
-    /// The answer is yes, or what was asked for is done.
+    /// The answer is yes, or the command has succeeded.
     Yes = 0,
     /// The answer is no.
     No = 1,
     /// The input or the command line is wrong.
     BadInput = 2,
-    /// A limit was reached with nothing to show.
+    /// A limit was reached without a result.
     Limit = 3,
-    /// A mistake in this program.
+    /// A bug of this program.
     Bug = 70,
-    /// Somebody asked the run to end before it was over.
+    /// The run was stopped on request before it was over.
     Interrupted = 130,
 }
 
-/// Why there is no answer: the input cannot be understood, or the outside world failed.
+/// Reason why there is no answer: the input is wrong, or the environment failed.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Failure {
     /// The error message, in lower case.
     message: String,
     /// Advice: what the user can do about it.
     advice: Option<String>,
-    /// Where it is wrong, if it is a text.
+    /// Errors in input texts, with their positions.
     diagnostics: Vec<Record>,
     /// The message as a terminal shows it.
     #[serde(skip)]
     text: String,
 }
 
-/// The answer to a command, already printed; or why there is none.
+/// Result of a command whose answer is already printed, or its failure.
 pub(crate) type Answer = Result<Exit, Failure>;
 
 /// A failure as a document: `docs/formats/diagnostics.md`.
@@ -51,7 +51,7 @@ pub(crate) struct FailureDocument<'a> {
 }
 
 impl Failure {
-    /// A failure with what to do about it.
+    /// Creates a failure with advice.
     pub(crate) fn new(message: impl fmt::Display, advice: impl fmt::Display) -> Self {
         let (message, advice) = (message.to_string(), advice.to_string());
         let label = crate::look::styled(crate::look::BAD, "error");
@@ -68,12 +68,12 @@ impl Failure {
         }
     }
 
-    /// What is wrong, in lower case.
+    /// Returns the error message, in lower case.
     pub(crate) fn message(&self) -> &str {
         &self.message
     }
 
-    /// What is wrong, in a sentence: of a text, the first mistake in it.
+    /// Returns the first error of a text with its position, or else the message.
     pub(crate) fn sentence(&self) -> String {
         match self.diagnostics.first() {
             Some(first) => {
@@ -84,19 +84,19 @@ impl Failure {
         }
     }
 
-    /// What the user can do about it.
+    /// Returns the advice for the first error of a text, or else the general advice.
     pub(crate) fn advice(&self) -> Option<&str> {
         let first = self.diagnostics.first();
         let own = first.and_then(|first| first.advice.as_deref());
         own.or(self.advice.as_deref())
     }
 
-    /// Where texts are wrong.
+    /// Returns the errors in input texts.
     pub(crate) fn diagnostics(&self) -> &[Record] {
         &self.diagnostics
     }
 
-    /// The same with advice, if it has none of its own.
+    /// Adds advice if the failure has none.
     pub(crate) fn advised(mut self, advice: &str) -> Self {
         if self.advice.is_none() {
             let label = crate::look::styled(crate::look::HINT, "help");
@@ -106,7 +106,7 @@ impl Failure {
         self
     }
 
-    /// The document that `--json` prints.
+    /// Returns the document that `--json` prints.
     pub(crate) fn document(&self) -> FailureDocument<'_> {
         FailureDocument {
             format: "elbowroom-failure",
@@ -122,7 +122,7 @@ impl From<elbowroom_executive::Error> for Failure {
     }
 }
 
-/// A text cannot be used.
+/// Converts errors in a text to a failure.
 impl From<Diagnostics> for Failure {
     fn from(diagnostics: Diagnostics) -> Self {
         let count = counted(diagnostics.errors().count(), "error");

@@ -10,7 +10,7 @@ use crate::exit::Failure;
 use crate::output;
 use elbowroom_executive::messages::plain;
 
-/// Larger than any plan or problem, smaller than memory.
+/// Maximum size of a file, in bytes: larger than any plan or problem, smaller than memory.
 const LARGEST_FILE: u64 = 256 << 20;
 
 /// Reads a text file, or standard input for `-`.
@@ -56,7 +56,7 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
     Ok(Source::from_bytes(path.display().to_string(), &bytes))
 }
 
-/// Advice on a file that cannot be read.
+/// Returns advice on a file that cannot be read.
 fn advice(path: &Path, what: &str, error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => {
@@ -84,7 +84,7 @@ fn advice(path: &Path, what: &str, error: &io::Error) -> String {
     }
 }
 
-/// A file in the same folder with the same name but another ending or case.
+/// Returns a file in the same folder whose name differs only in extension or case.
 fn similar_file(path: &Path) -> Option<String> {
     let stem = path.file_stem()?.to_str()?.to_ascii_lowercase();
     let folder = match path.parent() {

@@ -1,4 +1,4 @@
-//! An answer from the library, or what is known when there is no more time for one.
+//! Computations of the library with a time limit and Ctrl-C.
 
 use std::ops::ControlFlow;
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -9,16 +9,16 @@ use elbowroom::answers::{Halt, Watcher};
 
 use crate::stopwatch::Stopwatch;
 
-/// How often the clock is looked at.
+/// Interval between checks of the time limit and Ctrl-C.
 const TICK: Duration = Duration::from_millis(10);
-/// How long the library has for an answer when its time is up: more than most of its steps take.
+/// Grace period for an answer after the time limit; longer than most steps of the library take.
 const GRACE: Duration = Duration::from_millis(50);
-/// As much as the main thread has.
+/// Stack size of the worker, in bytes: that of the main thread.
 const STACK: usize = 64 << 20;
 
-/// What `work` answers, or `so_far` soon after its time is up or somebody pressed Ctrl-C. The library
-/// looks at the clock between its steps, and a single step can take long; so it works on a thread of
-/// its own.
+/// Returns the result of `work`, or that of `so_far` shortly after the time limit or Ctrl-C. The
+/// library checks the time only between its steps, and a single step can take long, so `work` runs
+/// on its own thread.
 pub(crate) fn in_time<T: Send + 'static>(
     mut stopwatch: Stopwatch,
     work: impl FnOnce() -> T + Clone + Send + 'static,
@@ -27,17 +27,17 @@ pub(crate) fn in_time<T: Send + 'static>(
     let (sender, receiver) = mpsc::channel();
     let theirs = work.clone();
     let worker = thread::Builder::new().stack_size(STACK).spawn(move || {
-        // Nobody listens any more when there was no time left.
+        // After the time limit, the receiver is gone.
         let _ = sender.send(theirs());
     });
     if worker.is_err() {
-        // A system without threads to spare: the limit is kept between the steps.
+        // No thread is available: the limit is checked between steps only.
         return work();
     }
     loop {
         match receiver.recv_timeout(TICK) {
             Ok(answer) => return answer,
-            // A thread that is gone without an answer has panicked, which has ended the program.
+            // The thread has ended without an answer: it panicked, which has ended the program.
             Err(RecvTimeoutError::Disconnected) => return work(),
             Err(RecvTimeoutError::Timeout) => {}
         }

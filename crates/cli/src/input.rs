@@ -1,4 +1,4 @@
-//! Domains, problems, plans and worlds in files.
+//! Reading of domains, problems, plans and worlds.
 
 use std::path::Path;
 
@@ -31,7 +31,7 @@ pub(crate) fn task(
     Ok(read.task)
 }
 
-/// Domain and problem as they were read.
+/// A parsed domain and problem.
 pub(crate) struct ReadProblem {
     pub(crate) task: Task,
     pub(crate) domain: Source,
@@ -65,7 +65,7 @@ pub(crate) fn read(
     Ok((read, warnings))
 }
 
-/// Reads a plan of either kind, which its content or the ending `.stn` of its name decides. `rule`
+/// Reads a plan of either kind. The content, or the extension `.stn`, determines the kind. `rule`
 /// applies to rounded numbers.
 pub(crate) fn any_plan(
     task: &Task,
@@ -84,10 +84,10 @@ pub(crate) fn any_plan(
     Ok(AnyPlan::TimeTriggered(plan))
 }
 
-/// The advice for who gives a network where a plan with fixed times is needed.
+/// Advice if a plan with fixed times is needed and an STN plan is given.
 pub(crate) const FIXED_TIMES: &str = "give a plan with fixed times; its network is made from it";
 
-/// Reads a plan with fixed times; the advice is for who gives a network.
+/// Reads a plan with fixed times. `advice` is shown if the file is an STN plan.
 pub(crate) fn time_triggered(
     task: &Task,
     path: &Path,
@@ -107,7 +107,7 @@ pub(crate) fn time_triggered(
     }
 }
 
-/// Says on standard error what to do about a plan that is not valid.
+/// Prints advice on an invalid plan to standard error.
 pub(crate) fn tell_about_repairs() {
     output::tell(&format!(
         "{}: `elbowroom envelope DOMAIN PROBLEM PLAN --repair` prints the cheapest repair",
@@ -115,7 +115,7 @@ pub(crate) fn tell_about_repairs() {
     ));
 }
 
-/// Reads a trace, or another record of `what`. Of a journal, its lines without their checksums.
+/// Reads a trace, or another record of `what`. The checksums of a journal's lines are removed.
 pub(crate) fn record(path: &Path, what: &str) -> Result<Source, Failure> {
     let text = source(path, what)?;
     if !elbowroom_executive::journal::is_journal(text.text()) {
@@ -136,7 +136,7 @@ pub(crate) fn world(path: &Path, task: &Task) -> Result<WorldModel, Failure> {
     })
 }
 
-/// The value read; its warnings go to standard error, errors become a failure.
+/// Returns the value. Warnings go to standard error; errors become a failure.
 pub(crate) fn with_warnings<T>(
     outcome: Result<(T, Vec<Diagnostic>), Diagnostics>,
     output: &mut Output,

@@ -1,5 +1,4 @@
-//! Ctrl-C, or a request to terminate, ends a search with the best result so far, and a run in
-//! order.
+//! Ctrl-C and requests to terminate: a search ends with its best result, and a run ends in order.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,14 +9,14 @@ use elbowroom::num::work::Stop;
 use crate::exit::Exit;
 use elbowroom_executive::clock::Clock;
 
-/// A second signal within this time of the first is the same request: `timeout` sends two, to the program and to its
-/// group.
+/// A second signal within this time counts as the same request: `timeout` sends two, to the program
+/// and to its group.
 const SAME_REQUEST: Duration = Duration::from_millis(300);
 
-/// While actions are cancelled and the world is stopped, a second signal is ignored for this time.
+/// A second signal is ignored for this time, while actions are cancelled and the world is stopped.
 const IN_ORDER: Duration = Duration::from_secs(5);
 
-/// `true` if actions are to be cancelled, and a world is to be stopped, before the program ends.
+/// `true` if the program must cancel actions and stop a world before it ends.
 static HAS_WORLD: AtomicBool = AtomicBool::new(false);
 
 /// A request of the user to stop.
@@ -25,15 +24,15 @@ static HAS_WORLD: AtomicBool = AtomicBool::new(false);
 pub(crate) struct Interrupt(Stop);
 
 impl Interrupt {
-    /// From now on, the first Ctrl-C (SIGINT, SIGTERM or SIGHUP) asks to stop, and a later one ends
-    /// the program: see [`is_to_end`]. A process has one handler of signals, so this is the same flag whenever it is
-    /// asked for. Computations of this thread end early as well.
+    /// Installs the handler: the first Ctrl-C (SIGINT, SIGTERM or SIGHUP) requests a stop, and a
+    /// later one ends the program, see [`is_to_end`]. A process has only one handler, so all calls
+    /// return the same flag. Computations of this thread also end early.
     pub(crate) fn listen() -> Self {
         static LISTENED: OnceLock<Interrupt> = OnceLock::new();
         let listened = LISTENED.get_or_init(|| {
             let interrupt = Self::default();
             let flag = interrupt.clone();
-            // Where no handler can be installed, Ctrl-C ends the program, as it does anyway.
+            // If no handler can be installed, Ctrl-C ends the program as usual.
             let (mut count, mut first) = (0, None);
             let _ = ctrlc::set_handler(move || {
                 count += 1;
@@ -49,7 +48,7 @@ impl Interrupt {
         listened.clone()
     }
 
-    /// The same, for a command that has to cancel actions and to stop a world before it ends.
+    /// The same, for a command that must cancel actions and stop a world before it ends.
     pub(crate) fn listen_with_world() -> Self {
         HAS_WORLD.store(true, Ordering::SeqCst);
         Self::listen()
@@ -60,19 +59,20 @@ impl Interrupt {
         &self.0
     }
 
-    /// Asks to stop, as the first Ctrl-C does.
+    /// Requests a stop, like the first Ctrl-C.
     pub(crate) fn request(&self) {
         self.0.request();
     }
 
-    /// Whether Ctrl-C was pressed, or a stop was asked for in another way.
+    /// Returns `true` if Ctrl-C was pressed or a stop was requested in another way.
     pub(crate) fn is_requested(&self) -> bool {
         self.0.is_requested()
     }
 }
 
-/// Returns `true` if a signal ends the program at once. `number` counts signals, `since_first` is the time since the first
-/// one. The third always ends it, the second unless it is the same request or a world is being stopped.
+/// Returns `true` if a signal ends the program at once. `number` counts signals, `since_first` is
+/// the time since the first one. The third signal always ends it. The second one does unless it is
+/// the same request or a world is being stopped.
 fn is_to_end(number: u32, since_first: Duration, has_world: bool) -> bool {
     let patience = if has_world { IN_ORDER } else { SAME_REQUEST };
     match number {

@@ -1,8 +1,7 @@
-//! The command `elbowroom`: how much elbow room a temporal plan has.
+//! The command `elbowroom`: robustness envelopes, execution and validation of temporal plans.
 //!
-//! What it prints to which stream, and with which exit code it ends, is a contract:
-//! `docs/exit-codes.md`. All input and output of the workspace happens here; what there is to
-//! compute is computed in the library.
+//! The output streams and exit codes are a stable interface, see `docs/exit-codes.md`. This crate
+//! does all input and output of the workspace; the library does the computations.
 
 mod args;
 mod bug;
@@ -30,8 +29,8 @@ use output::Output;
 
 /// Runs the command with a command line, the program's name first, and returns the exit code.
 ///
-/// This is for programs that are nothing but the command: a command line that is wrong, `--help`, a
-/// panic and a second Ctrl-C end the process, and what is asked for is printed.
+/// Intended for programs that do nothing else: a wrong command line, `--help`, a panic and a second
+/// Ctrl-C end the process, and the answer is printed.
 pub fn run(line: Vec<OsString>) -> u8 {
     bug::install_hook();
     let CommandLine { color, command } = args::read(line);

@@ -1,4 +1,4 @@
-//! What limits each end of each interval, with the ends that share a reason together.
+//! Limiting reasons of the ends of intervals, grouped by reason.
 //!
 //! ```text
 //! What limits the ends
@@ -11,7 +11,7 @@ use unicode_width::UnicodeWidthStr;
 
 use crate::look::{FAINT, Look, STRONG, styled};
 
-/// The limits, one reason after the other; empty without limits.
+/// Renders the limits, one reason after the other; empty without limits.
 pub(crate) fn render(limits: &[LimitGroup], look: Look) -> String {
     if limits.is_empty() {
         return String::new();

@@ -1,32 +1,32 @@
-//! What the output is shown on: how wide it is, and which characters and colours it has.
+//! Properties of the output device: width, character set and colours.
 
 use std::env;
 use std::io::{self, IsTerminal};
 
 use anstyle::{AnsiColor, Style};
 
-/// Width assumed where there is no terminal to ask.
+/// Width assumed without a terminal.
 const DEFAULT_WIDTH: usize = 80;
-/// Wider lines are hard to read.
+/// Maximum width; longer lines are hard to read.
 const MAX_WIDTH: usize = 110;
 
 /// Layout of text: width and character set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Look {
-    /// Columns to stay within.
+    /// Maximum number of columns.
     pub(crate) width: usize,
-    /// Whether there are more characters than ASCII.
+    /// `true` if characters beyond ASCII may be used.
     pub(crate) unicode: bool,
 }
 
 impl Look {
-    /// The look of plain text: what pipes and files get.
+    /// Layout of plain text, for pipes and files.
     pub(crate) const PLAIN: Self = Self {
         width: DEFAULT_WIDTH,
         unicode: false,
     };
 
-    /// The look of standard output.
+    /// Returns the layout for standard output.
     pub(crate) fn of_stdout() -> Self {
         if !io::stdout().is_terminal() {
             return Self::PLAIN;
@@ -39,13 +39,14 @@ impl Look {
     }
 }
 
-/// How wide the terminal is that standard output is shown on, if it is one and says so.
+/// Returns the width of the terminal on standard output, or `None` if it is not a terminal or does
+/// not report its width.
 pub(crate) fn columns() -> Option<usize> {
     if !io::stdout().is_terminal() {
         return None;
     }
     let known = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
-    // A terminal without a height, as behind a serial line or `script`, can have a width all the same.
+    // A terminal without a height (serial line, `script`) can still have a width.
     #[cfg(unix)]
     let known = known.or_else(|| {
         let size = rustix::termios::tcgetwinsize(io::stdout()).ok()?;
@@ -54,7 +55,8 @@ pub(crate) fn columns() -> Option<usize> {
     known
 }
 
-/// Whether the locale's character encoding is UTF-8, by the variables in POSIX order.
+/// Returns `true` if the locale's character encoding is UTF-8. The variables are read in POSIX
+/// order.
 fn locale_is_utf8() -> bool {
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"]
         .iter()
@@ -69,20 +71,21 @@ fn locale_is_utf8() -> bool {
     }
 }
 
-/// For what the eye should find first.
+/// Style of headings and results.
 pub(crate) const STRONG: Style = Style::new().bold();
-/// For what may be overlooked.
+/// Style of secondary information.
 pub(crate) const FAINT: Style = Style::new().dimmed();
-/// For good news.
+/// Style of success.
 pub(crate) const GOOD: Style = AnsiColor::Green.on_default().bold();
-/// For bad news.
+/// Style of errors.
 pub(crate) const BAD: Style = AnsiColor::Red.on_default().bold();
-/// The style of what needs attention.
+/// Style of warnings.
 pub(crate) const WARNING: Style = AnsiColor::Yellow.on_default().bold();
-/// For advice.
+/// Style of advice.
 pub(crate) const HINT: Style = AnsiColor::Cyan.on_default().bold();
 
-/// The text in a style. Escape sequences are removed again where the output takes no colours.
+/// Returns the text with escape sequences for a style. They are removed if the output does not
+/// support colours.
 pub(crate) fn styled(style: Style, text: &str) -> String {
     if text.is_empty() {
         return String::new();

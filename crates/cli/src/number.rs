@@ -1,3 +1,3 @@
-//! Exact numbers for people.
+//! Formatting of exact numbers.
 
 pub(crate) use elbowroom::report::short::{Rounding, between, nearest, rounded};

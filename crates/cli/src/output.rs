@@ -11,9 +11,9 @@ use crate::exit::Failure;
 use elbowroom_executive::WarningSink;
 use elbowroom_executive::messages::plain;
 
-/// Writes text to standard output. Escape sequences are dropped where colours are not wanted.
+/// Writes text to standard output. Escape sequences are removed if colours are not supported.
 ///
-/// When the reader has gone (`| head`) the rest is dropped silently, as it asked for.
+/// If the reader has closed the pipe (`| head`), the rest is discarded silently.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = anstream::stdout().lock();
     let written = stdout
@@ -22,16 +22,16 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
     survive(written, "standard output")
 }
 
-/// The output of a command so far, for the document that `--json` asks for.
+/// State of a command's output, for the document that `--json` requests.
 #[derive(Debug, Default)]
 pub(crate) struct Output {
     /// The warnings that were printed.
     warnings: Vec<Record>,
-    /// Whether standard output has its document.
+    /// `true` if a document was written to standard output.
     has_document: bool,
 }
 
-/// The member of documents that lists warnings, and what is wrong in a text.
+/// Member of documents that lists warnings and errors in input texts.
 const DIAGNOSTICS: &str = "diagnostics";
 
 impl Output {
@@ -58,17 +58,17 @@ impl Output {
         self.json(&document)
     }
 
-    /// Writes why there is no answer to standard error and, if a program is to read it and there
-    /// is no document yet, as one to standard output.
+    /// Writes a failure to standard error. With `as_json`, also writes it to standard output as a
+    /// document, unless there is already one.
     pub(crate) fn fail(&mut self, failure: &Failure, as_json: bool) {
         tell(&failure.to_string());
         if as_json && !self.has_document {
-            // That standard output cannot be written to is told by the exit code.
+            // If standard output cannot be written to, the exit code reports it.
             let _ = self.document(&failure.document());
         }
     }
 
-    /// The warnings that were printed and are in no document yet.
+    /// Returns the printed warnings that are not part of a document yet.
     pub(crate) fn warnings(&self) -> &[Record] {
         &self.warnings
     }
@@ -102,7 +102,7 @@ pub(crate) fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     write_bytes(path, text.as_bytes())
 }
 
-/// Writes a file that is no text; `-` is standard output.
+/// Writes a binary file; `-` is standard output.
 pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     if path.as_os_str() == "-" {
         let mut stdout = io::stdout().lock();

@@ -1,5 +1,5 @@
-//! Shows the progress of a search or a run on standard error: a line that is overwritten on a terminal, a new line every
-//! few seconds elsewhere.
+//! Progress of a search or a run on standard error: one overwritten line on a terminal, or a new
+//! line every few seconds elsewhere.
 
 use std::io::{self, IsTerminal};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
@@ -12,16 +12,16 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::output;
 use elbowroom_executive::clock::Clock;
 
-/// Searches that end sooner than this show no line at all.
+/// Minimum duration of a search with a progress line.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// How often the line turns.
+/// Interval between frames of the spinner.
 const TURN: Duration = Duration::from_millis(250);
 
-/// The time between two lines where standard error is not a terminal.
+/// Interval between lines if standard error is not a terminal.
 const INTERVAL: Duration = Duration::from_secs(5);
 
-/// Shows the last message, also while no new one comes.
+/// Display of the last message, refreshed even without new ones.
 pub(crate) struct Progress {
     is_terminal: bool,
     shown: Option<Shown>,
@@ -32,14 +32,14 @@ enum Shown {
     Appended(Appended),
 }
 
-/// A thread that writes the last message now and then, until this is dropped.
+/// A thread that writes the last message regularly, until this is dropped.
 struct Appended {
     message: Arc<Mutex<String>>,
     _until: Sender<()>,
 }
 
 impl Progress {
-    /// No line yet.
+    /// Creates a display without a line.
     pub(crate) fn new() -> Self {
         Self {
             is_terminal: io::stderr().is_terminal(),
@@ -47,7 +47,7 @@ impl Progress {
         }
     }
 
-    /// Shows the progress after this time.
+    /// Shows a message if `elapsed` is long enough.
     pub(crate) fn show(&mut self, elapsed: Duration, message: impl FnOnce() -> String) {
         if self.is_terminal && elapsed < PATIENCE {
             return;
@@ -69,7 +69,7 @@ impl Progress {
         }
     }
 
-    /// Writes a line that stays, above the one that is overwritten.
+    /// Writes a permanent line above the progress line.
     pub(crate) fn tell(&self, text: &str) {
         match &self.shown {
             Some(Shown::Overwritten(line)) => line.println(text),
@@ -101,7 +101,7 @@ impl Appended {
         let (until, ended) = mpsc::channel();
         let last = Arc::clone(&message);
         let clock = Clock::start();
-        // Without a thread to spare there is no progress to see.
+        // If no thread is available, no progress is shown.
         let _ = thread::Builder::new().spawn(move || {
             while ended.recv_timeout(INTERVAL) == Err(RecvTimeoutError::Timeout) {
                 let last = last.lock().unwrap_or_else(PoisonError::into_inner).clone();

@@ -1,4 +1,5 @@
-//! Ends a computation when its time is up, or when the user asks to, and reports invalid executions at once.
+//! Watcher that ends a computation at a time limit or on request, and reports invalid executions
+//! immediately.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -20,7 +21,7 @@ pub(crate) struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// Starts to measure; Ctrl-C alone ends the computation.
+    /// Starts the clock. Only Ctrl-C ends the computation.
     pub(crate) fn start(interrupt: &Interrupt) -> Self {
         Self {
             clock: Clock::start(),
@@ -29,7 +30,7 @@ impl Stopwatch {
         }
     }
 
-    /// The same, but a time limit ends it as well, if there is one.
+    /// Adds a time limit, if one is given.
     #[must_use]
     pub(crate) fn until(self, limit: Option<Duration>) -> Self {
         Self { limit, ..self }
@@ -53,14 +54,14 @@ impl Watcher for Stopwatch {
     }
 
     fn notice(&mut self, event: &Event<'_>) {
-        // An executive may run for days after this.
+        // Reported at once, because an executive may continue for days.
         if let Event::Invalid(invalid) = event {
             output::tell(&format!("{}: {invalid}", styled(BAD, "bug")));
         }
     }
 }
 
-/// Seconds as the clock understands them.
+/// Converts seconds to a duration.
 pub(crate) fn duration(seconds: &Rational) -> Duration {
     Duration::try_from_secs_f64(seconds.to_f64()).unwrap_or(Duration::MAX)
 }

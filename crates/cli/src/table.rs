@@ -1,4 +1,4 @@
-//! The tolerance table: one row for each parameter.
+//! Tolerance table with one row for each parameter.
 //!
 //! ```text
 //!                                 nominal   lower   upper       slack     +-100%
@@ -6,11 +6,10 @@
 //! !d1  (unlock office)                  6       6       9     0%  +50%       o-|
 //! ```
 //!
-//! All bars have one scale, that of their heading: deviations in relation to the nominal value,
-//! which stands in the middle. An arrow goes on beyond it. What has little room is marked (`!`).
+//! All bars have the scale in the heading: deviations relative to the nominal value, which is in
+//! the centre. An arrow marks an end beyond the scale. `!` marks parameters with little slack.
 //!
-//! What is shown never promises more than what is known: lower ends are rounded up, upper ends
-//! down, and slack towards zero.
+//! Numbers are rounded to the safe side: lower ends up, upper ends down, and slack towards zero.
 
 use std::fmt::Write as _;
 
@@ -34,43 +33,44 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// The smaller one of the two deviations that there is room for, in relation to the nominal
-    /// value where that is not 0.
+    /// Returns the smaller one of the two tolerated deviations, relative to the nominal value
+    /// unless that is 0.
     pub(crate) fn room(&self) -> Rational {
         let (lower, upper) = (&self.interval.lower, &self.interval.upper);
         let distance = |end: &End| Some((end.value()? - &self.nominal).abs());
         let room = [distance(lower), distance(upper)];
         let room = room.into_iter().flatten().min();
         let share = |room: Rational| room.checked_div(&self.nominal.abs()).unwrap_or(room);
-        // Without any end there is more room than anywhere.
+        // An interval without ends has the most slack.
         room.map_or_else(|| Rational::from(i64::MAX), share)
     }
 
-    /// Whether it may hardly deviate in one direction.
+    /// Returns `true` if the slack in one direction is below [`CRITICAL`] percent.
     pub(crate) fn is_critical(&self) -> bool {
         let room = self.room();
         room.is_zero() || (!self.nominal.is_zero() && room < Rational::new(CRITICAL, 100))
     }
 
-    /// How far an end lies from the nominal value, as a share of it; `None` without limit.
+    /// Returns the distance of an end from the nominal value, as a fraction of it. Returns `None`
+    /// for an infinite end or a nominal value of 0.
     fn deviation(&self, end: &End) -> Option<Rational> {
         let distance = (end.value()? - &self.nominal).abs();
         distance.checked_div(&self.nominal.abs())
     }
 }
 
-/// With less room than so many percent of its nominal value, a quantity is critical.
+/// Slack below which a parameter is critical, in percent of the nominal value.
 pub(crate) const CRITICAL: i64 = 10;
-/// Deviations that the ends of a bar can stand for, in percent.
+/// Possible scales of the bars: the deviation at their ends, in percent.
 const SCALES: [i64; 7] = [1, 2, 5, 10, 20, 50, 100];
-/// Columns of the bar: the first of these that fits.
+/// Possible widths of the bar in columns; the first one that fits is used.
 const BARS: [usize; 3] = [11, 9, 7];
-/// Names up to this width have a column of their own even where the numbers stand below.
+/// Maximum width of a separate column of names if the numbers are on their own lines.
 const SHORT_NAME: usize = 12;
 /// Left margin, and gap between columns.
 const GAP: usize = 2;
 
-/// The rows as a table, each line ended; empty without rows.
+/// Renders the rows as a table; empty without rows.
 pub(crate) fn render(rows: &[Row], look: Look) -> String {
     if rows.is_empty() {
         return String::new();
@@ -119,11 +119,11 @@ pub(crate) fn render(rows: &[Row], look: Look) -> String {
 struct Layout {
     /// Width of the names.
     names: usize,
-    /// Where the numbers begin, less the gap.
+    /// Start column of the numbers, without the gap.
     text: usize,
-    /// Columns of the bar; 0 if there is no room for one.
+    /// Columns of the bar; 0 if it does not fit.
     bar: usize,
-    /// Whether the numbers stand below name and quantity rather than beside them.
+    /// `true` if the numbers are on a line of their own below name and quantity.
     stacked: bool,
 }
 
@@ -157,7 +157,7 @@ impl Layout {
     }
 }
 
-/// The texts of one row's numbers.
+/// Formatted numbers of one row.
 struct Cells {
     nominal: String,
     lower: String,
@@ -183,7 +183,7 @@ impl Cells {
     }
 }
 
-/// How far the end lies from the nominal value, in percent of it, rounded towards zero.
+/// Formats the distance of the end from the nominal value in percent, rounded towards zero.
 fn slack(nominal: &Rational, end: &End, sign: char) -> String {
     let Some(value) = end.value() else {
         return format!("{sign}inf");
@@ -203,7 +203,7 @@ fn slack(nominal: &Rational, end: &End, sign: char) -> String {
     )
 }
 
-/// The widths of the number columns. Decimal points stand below each other.
+/// Widths of the number columns, with aligned decimal points.
 struct Numbers {
     nominal: Split,
     lower: Split,
@@ -294,8 +294,7 @@ impl Numbers {
     }
 }
 
-/// How many percent of the nominal values the ends of the bars stand for: as few as can be with all
-/// ends in the picture, and at most 100.
+/// Returns the smallest scale, in percent, at which all ends fit into the bars, and at most 100.
 fn scale(rows: &[Row]) -> i64 {
     let ends = rows.iter().flat_map(|row| {
         let ends = [&row.interval.lower, &row.interval.upper];
@@ -306,8 +305,8 @@ fn scale(rows: &[Row]) -> i64 {
     SCALES.into_iter().find(fits).unwrap_or(100)
 }
 
-/// The interval around the nominal value, which stands in the middle: `|--o---|`, `|--o---->` where
-/// it goes on beyond the scale. Empty where the nominal value is 0, of which there are no shares.
+/// Renders the interval around the nominal value as a bar: `|--o---|`, or `|--o---->` if an end is
+/// beyond the scale. Empty if the nominal value is 0.
 fn bar(row: &Row, scale: i64, width: usize, unicode: bool) -> String {
     if width == 0 || row.nominal.is_zero() {
         return String::new();
@@ -336,10 +335,10 @@ fn bar(row: &Row, scale: i64, width: usize, unicode: bool) -> String {
     format!("{blank}{below}{dot}{above}")
 }
 
-/// The number of columns that a share of the nominal value takes, the nearest one; `None` if it is
-/// more than the scale has.
+/// Returns the number of columns for a fraction of the nominal value, rounded to the nearest;
+/// `None` if it exceeds the scale.
 fn columns(share: &Rational, scale: i64, middle: usize) -> Option<usize> {
-    // Few columns, so a linear search says it best.
+    // There are few columns, so a linear search is the simplest solution.
     let steps = i64::try_from(middle).expect("a narrow bar");
     let part = (share * &Rational::from(100)).checked_div(&Rational::from(scale))?;
     if part > Rational::ONE {
@@ -360,7 +359,7 @@ fn pad_right(text: &str, width: usize) -> String {
     format!("{text}{:missing$}", "")
 }
 
-/// The text, with its middle left out where it is wider than `width`.
+/// Shortens the text to `width` columns by omitting its middle.
 fn shorten(text: &str, width: usize, unicode: bool) -> String {
     if UnicodeWidthStr::width(text) <= width {
         return text.to_owned();

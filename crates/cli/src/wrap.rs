@@ -1,9 +1,9 @@
-//! Long lines, broken between words.
+//! Wrapping of long lines between words.
 
 use unicode_width::UnicodeWidthStr;
 
-/// The text in lines of at most `width` columns, where words allow it. The first line is indented
-/// by `indent`, the others by two more.
+/// Breaks the text into lines of at most `width` columns, if the words allow it. The first line is
+/// indented by `indent`, the others by two more.
 pub(crate) fn wrapped(text: &str, width: usize, indent: usize) -> String {
     let mut lines = Vec::new();
     let mut line = " ".repeat(indent);

@@ -1,4 +1,4 @@
-//! Inputs written after public bug reports, questions and domains of the field: each gets the right
+//! Regression tests based on public bug reports, questions and domains: each input gets the right
 //! answer (`bug_reports/expected.txt`).
 
 #[path = "../../../testing/skipped.rs"]
@@ -12,18 +12,18 @@ use skipped::skipped;
 
 const EXPECTED: &str = include_str!("bug_reports/expected.txt");
 
-/// The most digits behind the point that a printed plan has.
+/// Maximum number of decimal digits in a printed plan.
 const MOST_DIGITS: usize = 9;
 
 /// Expected answer of one command.
 struct Expectation {
     arguments: Vec<String>,
     exits: Vec<i32>,
-    /// Words that the answer has, or has not.
+    /// Words that the answer must contain, or must not contain (`false`).
     words: Option<(String, bool)>,
 }
 
-/// The folder of the inputs; `None` where it is not installed.
+/// Returns the folder of the inputs; `None` if it is not installed.
 fn folder() -> Option<PathBuf> {
     let shared = std::env::var_os("ELBOWROOM_SHARED").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
@@ -36,7 +36,7 @@ fn folder() -> Option<PathBuf> {
     folder
 }
 
-/// The expectations by folder; `None` for folders that are tested elsewhere.
+/// Returns the expectations by folder; `None` for folders that are tested elsewhere.
 fn expectations() -> BTreeMap<String, Option<Vec<Expectation>>> {
     let mut folders = BTreeMap::new();
     let mut current = String::new();
@@ -88,7 +88,7 @@ fn expectation(line: &str) -> Vec<Expectation> {
     vec![expect(codes, arguments, words)]
 }
 
-/// Runs the command in a folder, with `{out}` for a file to be written.
+/// Runs the command in a folder. `{out}` in its arguments is an output file.
 fn run(folder: &Path, arguments: &[String], written: &Path) -> (i32, String) {
     let written = written.display().to_string();
     let output = Command::new(env!("CARGO_BIN_EXE_elbowroom"))

@@ -1,4 +1,4 @@
-//! Calendars that begin now, in runs on a wall clock.
+//! Runs on a wall clock with calendars that begin now.
 
 mod command;
 
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use command::{elbowroom, root};
 
-/// A folder with a calendar in this unit, with the bakery of the case always open.
+/// Creates a folder with a calendar in this time unit. The bakery of the case is always open.
 fn calendar(name: &str, unit: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calendars");
     fs::create_dir_all(&folder).expect("a folder");
@@ -21,7 +21,7 @@ fn calendar(name: &str, unit: &str) -> PathBuf {
     file
 }
 
-/// Standard error of a run of the case with a calendar, and its exit code.
+/// Runs the case with a calendar. Returns standard error and the exit code.
 fn run(calendar: &Path, others: &[&str]) -> (String, Option<i32>) {
     let case = root().join("examples/market");
     let file = |name: &str| case.join(name).display().to_string();
@@ -61,7 +61,7 @@ fn run_without_a_clock_needs_a_begin() {
     assert!(!text.contains("warning"), "{text}");
 }
 
-/// The trace has the timed problem.
+/// The trace contains the problem with the timed initials.
 #[test]
 fn replay_needs_no_calendar() {
     let file = calendar("replayed.toml", "minutes");

@@ -1,4 +1,4 @@
-//! Experiments that are split over processes.
+//! Experiments split over processes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ fn temporary(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("elbowroom-{}-{name}", std::process::id()))
 }
 
-/// `whole` are the options that a merge does not take.
+/// Checks that merged parts equal the whole experiment. `whole` are options that a merge rejects.
 fn parts_add_up(experiment: &str, whole: &[&str]) {
     let make = |arguments: &[&str]| compare(&[experiment], &[whole, arguments].concat());
     let all = make(&["--jobs", "2"]);
@@ -92,7 +92,7 @@ fn an_experiment_in_perturbed_worlds_leaves_tables_and_plots() {
     fs::remove_dir_all(folder).expect("it is there");
 }
 
-/// The lines of trials.csv of an experiment, and the names of the files beside it.
+/// Returns the lines of an experiment's trials.csv, and the names of the other files.
 fn each_trial(experiment: &str, arguments: &[&str], name: &str) -> (Vec<String>, Vec<String>) {
     let folder = temporary(name);
     let path = folder.display().to_string();
@@ -149,7 +149,7 @@ fn the_first_trial_of_each_kind_of_failure_can_be_played_again_and_looked_at() {
     let folder = temporary("failures");
     let path = folder.display().to_string();
     let output = ["--each-trial", "--trials", "12", "--output", &path];
-    // The optimum takes most of the time, and is in no trial.
+    // The optimum takes most of the time, and does not affect the trials.
     let text = fs::read_to_string(root().join("experiments/clumsy.toml")).expect("the experiment");
     let text = text.replace("optimum = true\n", "");
     let text = text.replace("\"../", &format!("\"{}/", root().display()));
@@ -222,7 +222,7 @@ fn the_first_trial_of_each_kind_of_failure_can_be_played_again_and_looked_at() {
         .output()
         .expect("the command can be started");
     let page = String::from_utf8(page.stdout).expect("text");
-    // Each trace has its page inside.
+    // The page contains a subpage for each trace.
     assert_eq!(page.matches("\"title\":\"Run of ").count(), traces);
     fs::remove_dir_all(folder).expect("it is there");
 }
@@ -240,7 +240,8 @@ fn so_has_each_trial_without_time() {
     );
 }
 
-/// The experiment "detour" with `guarded` alone, and a second column that goes by the world of this file.
+/// The experiment "detour" with `guarded` only, and a second column with `world` as its believed
+/// world.
 fn with_believed(world: &str) -> PathBuf {
     let text = fs::read_to_string(root().join("experiments/detour.toml")).expect("the experiment");
     let (head, column) = text.split_once("[[column]]").expect("a column");

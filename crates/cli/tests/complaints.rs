@@ -1,5 +1,5 @@
-//! What users of plan executors complain about, one test for each row of `docs/complaints.md`: a small
-//! scenario like that of the thread, and what happens here.
+//! Typical complaints about plan executors: one test for each row of `docs/complaints.md`, with a
+//! small scenario like that of the thread and the behaviour of this executor.
 
 mod command;
 #[path = "complaints/toy.rs"]
@@ -65,7 +65,7 @@ fn parallel_actions_are_executed_in_parallel_and_as_the_plan_needs_it() {
         assert!(burns.iter().any(|burn| is_lit(&burn)), "{spans:?}");
     }
 
-    // What takes no time comes when it is due, and not all at once.
+    // Instantaneous actions start at their planned times, and not all at once.
     let domain = ERRANDS.replacen(
         "(:durative-action",
         "(:action label :parameters (?x - item) :precondition (have ?x) :effect (labelled ?x))
@@ -121,7 +121,8 @@ fn who_never_answers_is_given_up_and_the_run_ends_with_that_reason() {
             .any(|it| it.to_string().contains("(fetch "))
     );
     assert!(world.open.is_empty(), "nothing is left running");
-    // Where the plan has a limit, that is the end of waiting, and what else there is is done in time.
+    // If the plan imposes a limit, waiting ends there, and the alternative action is executed in
+    // time.
     let domain = "(define (domain ways) (:requirements :durative-actions :timed-initial-literals)
         (:predicates (path) (open) (there))
         (:durative-action walk :parameters () :duration (= ?duration 2)
@@ -158,7 +159,7 @@ fn what_is_late_is_waited_for_as_long_as_the_plan_can_bear_and_then_given_up() {
     let problem = "(define (problem p) (:domain late) (:init (open) (at 20 (not (open))))
         (:goal (there)))";
     let task = task(domain, problem);
-    // Within the guarantee lateness is no reason for anything.
+    // Lateness within the guarantee does not cause a new plan.
     let mut world = Toy {
         fault: Some(|ticket| {
             if ticket == 0 {
@@ -174,7 +175,7 @@ fn what_is_late_is_waited_for_as_long_as_the_plan_can_bear_and_then_given_up() {
         (&report.verdict, report.replans),
         (&Verdict::GoalReached, 0)
     );
-    // Nor is a start that is late, as on any clock it is. Before a new plan is needed there is a warning.
+    // Neither does a slightly late start. A warning precedes the need for a new plan.
     let mut world = Toy {
         fault: Some(|_| Fault::StartsLate(1, 19)),
         ..Toy::default()
@@ -201,7 +202,7 @@ fn what_is_late_is_waited_for_as_long_as_the_plan_can_bear_and_then_given_up() {
         *until > Rational::from(19) && *until <= Rational::from(20),
         "{until}"
     );
-    // No end at all: it is noticed in time, and not after minutes.
+    // An action that never ends is detected in time, not after minutes.
     let mut world = Toy {
         fault: Some(|ticket| {
             if ticket == 0 {
@@ -236,7 +237,7 @@ fn after_a_failure_there_is_a_new_plan_without_anybody_asking() {
         }),
         ..Toy::default()
     };
-    // A robot whose errand has failed is free again: the world says so.
+    // The world reports that the robot with the failed errand is free again.
     let free = |name: &str| {
         let fact = task.fact_named(name).expect("a correct test");
         Event::Fact { fact, truth: true }
@@ -280,7 +281,7 @@ fn a_run_that_cannot_go_on_stops_early_and_says_since_when_and_why() {
 
 #[test]
 fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
-    // One robot, so that it fetches one thing after the other.
+    // With one robot, the errands are sequential.
     let problem = "(define (problem day) (:domain errands) (:objects r - robot book cup key - item)
         (:init (free r) (here book) (here cup) (here key))
         (:goal (and (have book) (have cup) (have key))))";
@@ -323,7 +324,8 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
             "{done:?}"
         );
     }
-    // What runs goes on in a pause; what runs at the end is told to stop, and has stopped.
+    // Running actions continue during a pause. Actions that run at the end are cancelled and have
+    // stopped.
     let (last, others) = report.executed.split_last().expect("something was done");
     assert_eq!(last.ending, Some(Ending::Cancelled), "{report:?}");
     let has_succeeded = |done: &ExecutedStep| done.ending == Some(Ending::Succeeded);
@@ -334,8 +336,8 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
     };
     assert!(others.iter().any(runs_on), "{report:?}");
     assert!(world.open.is_empty());
-    // Whether the time is up, no plan is left, or somebody asks for the end: it is waited for until a robot
-    // that slides on has stopped.
+    // The run waits until a robot that stops slowly has stopped, whether it ends by the time limit,
+    // for lack of a plan, or on request.
     let ends: [(Rational, Option<Faults>); 2] = [
         (Rational::from(5), None),
         (
@@ -369,7 +371,7 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
         let is_over = |done: &ExecutedStep| done.ending.is_some();
         assert!(report.executed.iter().all(is_over), "{report:?}");
     }
-    // Who never confirms that he has stopped is waited for, but for five seconds only.
+    // The run waits for a robot that never confirms its stop, but only for 5 s.
     let settings = RunSettings {
         time_limit: Rational::from(5),
         ..RunSettings::default()
@@ -391,7 +393,7 @@ fn what_an_action_should_have_done_is_compared_with_what_is_seen() {
     let task = errands("(have book)");
     let have = task.fact_named("(have book)").expect("a correct test");
     let mut world = Toy {
-        // It says that it has succeeded, and it has not.
+        // The action reports success, but its effect is missing.
         seen: vec![Event::Fact {
             fact: have,
             truth: false,
@@ -406,7 +408,7 @@ fn what_an_action_should_have_done_is_compared_with_what_is_seen() {
         "{:?}",
         report.reasons
     );
-    // What has to hold throughout is heeded throughout: the other way is taken once the path is gone.
+    // Over-all conditions are monitored: the other way is used once the path is gone.
     let domain = "(define (domain ways) (:requirements :durative-actions)
         (:predicates (path) (there))
         (:durative-action walk :parameters () :duration (= ?duration 10)
@@ -448,7 +450,7 @@ fn a_plan_and_its_progress_can_be_seen_in_time() {
         assert!(text.contains(words), "{words}");
     }
     let _ = (fs::remove_file(trace), fs::remove_file(page));
-    // While it goes on, the same page is served, and each line of the trace as it comes.
+    // A running run serves the same page, and each line of the trace as it is recorded.
     let arguments = [&["run"], &DELIVERY[..], &["--realtime", "20", "--serve=0"]].concat();
     let mut run = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .args(arguments)
@@ -567,7 +569,7 @@ fn a_planner_that_dies_is_not_taken_for_one_that_says_there_is_no_plan() {
         said.contains("false") && !said.contains("unsolvable"),
         "{said}"
     );
-    // In a run, the same; and that it has no planner is no failure of one.
+    // In a run, the answer is the same. A missing planner is not reported as a failed one.
     let in_a_run = |planner: &str| {
         let line = ["--planner", planner, "--json"];
         let done = elbowroom(&[&["run"], &DELIVERY[..], &line].concat());
@@ -589,7 +591,7 @@ fn a_planner_that_dies_is_not_taken_for_one_that_says_there_is_no_plan() {
     }
     let (code, verdict, said) = in_a_run("none");
     assert_eq!((code, verdict), (Some(1), "no-plan".into()), "{said}");
-    // A goal that is true already is no mistake.
+    // A goal that already holds is not an error.
     let task = errands("(here book)");
     let report = run(&task, &mut Toy::default());
     assert_eq!((report.verdict, report.starts), (Verdict::GoalReached, 0));
@@ -606,7 +608,7 @@ fn the_judge_goes_by_the_epsilon_of_the_plan() {
     assert_eq!(check(&["--epsilon", "0.01"]), Some(1));
     assert_eq!(check(&["--tolerance", "0.001"]), Some(0));
     assert_eq!(check(&["--tolerance", "0.01"]), Some(0));
-    // A plan that is not valid is not begun.
+    // An invalid plan is not executed.
     let plan = temporary("wrong.plan");
     fs::write(&plan, "0: (drive rover depot shelf) [10]\n").expect("a plan");
     let line = [
@@ -657,7 +659,7 @@ fn two_robots_do_two_things_at_once_and_goals_come_while_they_do() {
     assert!(spans[1].0 < spans[0].1, "at the same time: {spans:?}");
 }
 
-/// Each row of the page names a test of this file, and each test has its row.
+/// Each row of the page names a test in this file, and each test has a row.
 #[test]
 fn the_page_has_a_row_for_each_test() {
     let page = fs::read_to_string(root().join("docs/complaints.md")).expect("the page");

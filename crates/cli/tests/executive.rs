@@ -44,7 +44,7 @@ use skipped::skipped;
 const DOMAIN: &str = "crates/cli/tests/files/errands/domain.pddl";
 const PROBLEM: &str = "crates/cli/tests/files/errands/problem.pddl";
 
-/// A simulation that is ten times as fast as the wall clock: an errand takes a fifth of a second.
+/// Starts an executive in a simulation at ten times real time. An errand takes 0.2 s.
 fn simulated(name: &str) -> Executive {
     Executive::start(&folder(name), &[DOMAIN, PROBLEM, "--realtime", "10"])
 }
@@ -53,7 +53,8 @@ fn ctl(line: &[&str]) -> Output {
     command::elbowroom(&[&["ctl"], line].concat())
 }
 
-/// Whether robots can be made; if not, that is said.
+/// Returns `true` if Python is available for simulated robots; otherwise reports the test as
+/// skipped.
 fn python_is_there() -> bool {
     let is_there = Command::new("python3").arg("--version").output().is_ok();
     if !is_there {
@@ -132,7 +133,7 @@ fn what_is_changed_while_it_runs_is_followed() {
     let own = Executive::start(&folder("changed"), &[DOMAIN, PROBLEM, "--realtime", "2"]);
     let two = |state: &Value| state["running"].as_array().is_some_and(|it| it.len() == 2);
     own.await_state(two);
-    // Somebody else has done one chain, and the goal of the other is another one.
+    // One chain was done by others, and the other one gets another goal.
     let told = |line: &[&str]| {
         let done = ctl(&[&["--token", &own.token(), "--to", &own.address()], line].concat());
         assert!(done.status.success(), "{line:?}: {done:?}");
@@ -147,12 +148,12 @@ fn what_is_changed_while_it_runs_is_followed() {
     assert!(!facts.contains(&json!("(done b2)")), "{state}");
 }
 
-/// Who is told that something was taken in sees it in every later answer.
+/// An accepted request is visible in every later answer.
 #[test]
 fn what_was_taken_in_counts_for_the_next_request() {
     let own = simulated("at-once");
     own.await_state(|state| state["activity"] != "beginning");
-    // So that no goal is reached meanwhile.
+    // Paused, so that no goal is reached in the meantime.
     assert_eq!(own.post("/v1/pause", &Value::Null).0, 200);
     for _ in 0..20 {
         let (status, answer) = own.post("/v1/goals", &json!({"name": "x", "goal": "(done a3)"}));
@@ -165,7 +166,7 @@ fn what_was_taken_in_counts_for_the_next_request() {
 #[test]
 fn in_a_pause_nothing_is_started() {
     let own = Executive::start(&folder("pause"), &[DOMAIN, PROBLEM, "--realtime", "10"]);
-    // An action that was ordered before the pause starts in it.
+    // An action commanded before the pause starts during it.
     own.await_state(|state| state["running"].as_array().is_some_and(|it| it.len() == 2));
     let (status, answer) = own.post("/v1/pause", &Value::Null);
     assert_eq!(status, 200, "{answer}");
@@ -220,7 +221,7 @@ fn without_a_problem_it_waits_for_one_and_takes_others_afterwards() {
     let text = fs::read_to_string(command::root().join(PROBLEM)).expect("a problem");
     assert_eq!(own.put("/v1/problem", &json!({"problem": text})).0, 200);
     own.await_state(|state| state["why"] == "reached: problem");
-    // The same day once more: everything is to be done again.
+    // The same problem again: all errands are open again.
     assert_eq!(own.put("/v1/problem", &json!({"problem": text})).0, 200);
     let again = |state: &Value| {
         let plans = state["plans"].as_u64().expect("a number");
@@ -263,7 +264,7 @@ fn events_are_the_lines_of_the_trace() {
     assert!(text.trim_end().ends_with("event: over\ndata: {}"), "{text}");
 }
 
-/// Verb, path, token, body; status and words of the refusal.
+/// Verb, path, token, body; status and message of the refusal.
 type Refused<'a> = (&'a str, &'a str, Option<&'a str>, String, u16, &'a str);
 
 #[test]
@@ -470,7 +471,7 @@ fn an_executive_without_a_token_can_be_looked_at_only() {
     assert!(page.contains("<html") && page.contains("the run"), "{page}");
 }
 
-/// Clients that hang, babble and do not read, while actions start: these start when they are due.
+/// Clients that hang, send garbage or do not read do not delay starts.
 #[test]
 fn bad_clients_delay_nothing() {
     let own = Executive::start(&folder("bad"), &[DOMAIN, PROBLEM, "--realtime", "1"]);
@@ -504,7 +505,7 @@ fn bad_clients_delay_nothing() {
     assert!(starts >= 4, "{starts}");
 }
 
-/// Sends a signal to a process that is there.
+/// Sends a signal to a process, which must exist.
 fn signal(process: &str, name: &str) {
     let told = Command::new("kill").args(["-s", name, process]).status();
     assert!(told.expect("every Unix has `kill`").success());
@@ -535,8 +536,8 @@ fn with_robot(folder: &Path, journal: &str) -> Vec<String> {
     line.map(str::to_owned).to_vec()
 }
 
-/// Executive, or executive and world, die by `kill -9`, after a goal was given and one was taken
-/// back: the goals stand, the pause stands, and nothing is started twice.
+/// The executive, alone or with the world, is killed after a goal was submitted and one was
+/// cancelled. Goals and pause are kept, and nothing is started twice.
 #[test]
 fn what_was_asked_survives_kill_9() {
     if !python_is_there() {
@@ -577,7 +578,7 @@ fn what_was_asked_survives_kill_9() {
             "{begun:?}"
         );
         assert!(!begun.iter().any(|it| it.contains("a2 a3)")), "{begun:?}");
-        // A journal of an executive leads to the same decisions.
+        // The replay of an executive's journal makes the same decisions.
         let replayed = command::elbowroom(&["run", "--replay", &journal]);
         assert_eq!(replayed.status.code(), Some(0), "{replayed:?}");
         let refused = command::elbowroom(&["run", "--resume", &journal]);

@@ -1,4 +1,4 @@
-//! Ends of intervals whose limits lie beyond the farthest value that IRR tries.
+//! Interval ends whose limits lie beyond the farthest value that IRR tries.
 
 mod command;
 
@@ -13,7 +13,7 @@ const DOMAIN: &str = "
   (:durative-action work :parameters () :duration (= ?duration 5)
     :condition (over all (rented)) :effect (at end (done))))";
 
-/// Returns the answer of `envelope --sharpen` for an action of 5 before a deadline.
+/// Returns the answer of `envelope --sharpen` for an action of 5 s before a deadline.
 fn sharpened(deadline: &str, guarantee: &str) -> String {
     let name = format!(
         "elbowroom-{}-far-{deadline}-{guarantee}",

@@ -1,4 +1,4 @@
-//! The help is laid out for a terminal of 80 columns.
+//! Layout of the help on a terminal with 80 columns.
 
 #[cfg(target_os = "linux")]
 #[path = "../../../testing/skipped.rs"]
@@ -6,7 +6,8 @@ mod skipped;
 
 use std::process::Command;
 
-/// The help of a subcommand, or of the whole command, on a terminal of so many columns.
+/// Returns the help of a subcommand, or of the whole command, for a terminal with `columns`
+/// columns.
 fn help(subcommand: Option<&str>, columns: u32) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .args(subcommand)
@@ -18,7 +19,7 @@ fn help(subcommand: Option<&str>, columns: u32) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// All subcommands, as the help lists them.
+/// Returns all subcommands listed in the help.
 fn subcommands() -> Vec<String> {
     let help = help(None, 100);
     let listed = help
@@ -34,7 +35,7 @@ fn subcommands() -> Vec<String> {
     names
 }
 
-/// What follows the options, which the argument parser lays out.
+/// Returns the lines after the options. clap lays out the lines before.
 fn after_the_options(help: &str) -> Vec<&str> {
     let lines: Vec<&str> = help.lines().collect();
     let last = lines.iter().rposition(|line| line.contains("--version"));
@@ -56,7 +57,7 @@ fn every_line_of_the_help_fits_into_80_columns() {
     }
 }
 
-/// A table with columns would come apart if a row had to be wrapped.
+/// Tables in the help must not be wrapped.
 #[test]
 fn tables_in_the_help_look_the_same_in_80_columns() {
     let mut rows = 0;
@@ -74,7 +75,7 @@ fn tables_in_the_help_look_the_same_in_80_columns() {
     assert!(rows > 20, "{rows} rows");
 }
 
-/// A terminal says how wide it is, also one that does not say how high.
+/// A terminal can report a width without a height.
 #[cfg(target_os = "linux")]
 #[test]
 fn the_help_fits_into_a_terminal_of_unknown_height() {

@@ -1,4 +1,4 @@
-//! Ctrl-C, and the line that shows how a search is getting on.
+//! Ctrl-C, and the progress line of a search.
 #![cfg(target_os = "linux")]
 #![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
@@ -16,7 +16,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// A search that goes on for long: many ends, each halved more than a thousand times.
+/// Files of a long search: many interval ends, each bisected more than a thousand times.
 struct Long {
     folder: PathBuf,
 }
@@ -80,7 +80,7 @@ fn ctrl_c_ends_the_search_with_the_best_box_so_far() {
     ends_the_search_with_the_best_box_so_far("interrupt", 2);
 }
 
-/// As services and batch systems do it.
+/// Service managers and batch systems send SIGTERM.
 #[test]
 fn a_request_to_terminate_does_so_too() {
     ends_the_search_with_the_best_box_so_far("terminate", 15);
@@ -95,7 +95,7 @@ fn ends_the_search_with_the_best_box_so_far(name: &str, signal: u32) {
         .spawn()
         .expect("the command");
     wait_until_it_listens(&child, signal);
-    // Time for a box; however much it is, the answer is one of the two that there can be.
+    // Time for a box. Both possible answers are accepted, however much time this is.
     sleep(Duration::from_secs(1));
     send(&child, signal);
     let output = child.wait_with_output().expect("its output");
@@ -113,7 +113,7 @@ fn ends_the_search_with_the_best_box_so_far(name: &str, signal: u32) {
     assert!(progress.lines().all(is_progress), "{progress}");
 }
 
-/// Twenty robots that work at the same time: too many states for a table of moves.
+/// Twenty robots that work concurrently: too many states for a table of moves.
 #[test]
 fn ctrl_c_ends_the_table_of_policy() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("table");
@@ -175,7 +175,7 @@ const ROBOTS: &str = "(define (domain robots) (:requirements :durative-actions)
     :condition (and (at start (idle ?r)) (over all (open)))
     :effect (and (at start (not (idle ?r))) (at end (idle ?r)) (at end (done ?r)))))";
 
-/// In a terminal made by `script`, of util-linux; skipped where there is none.
+/// Uses a terminal made by `script` of util-linux; skipped if that is not installed.
 #[test]
 fn a_terminal_shows_how_the_search_is_getting_on() {
     let version = Command::new("script").arg("--version").output();
@@ -202,8 +202,8 @@ fn a_terminal_shows_how_the_search_is_getting_on() {
     assert!(output.status.success(), "{shown}");
 }
 
-/// The steps of the library that are over when time is up take minutes here: nothing but the end of the
-/// program ends them.
+/// The library's current step takes minutes when the time is up. Only the end of the program ends
+/// it.
 #[test]
 fn the_region_of_a_long_plan_ends_at_its_time_limit() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("region");

@@ -1,5 +1,5 @@
-//! Parts of the language that only the judge heeds: every other command refuses them by name, but
-//! for envelopes, which heed processes and events.
+//! Language features that only the validator supports. Every other command refuses them by name;
+//! `envelope` also supports processes and events.
 
 mod command;
 
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use command::elbowroom;
 
-/// What stands in the domain, a step of a plan for it, and the name under which it is refused.
+/// Part of the domain, step of a plan for it, and the name in the refusal.
 const FEATURES: [(&str, &str, &str); 3] = [
     (
         "(:process fills :parameters () :precondition (open) :effect (increase (level) (* #t 1)))
@@ -55,7 +55,7 @@ const REFUSING: [&str; 19] = [
     "compare EXPERIMENT",
 ];
 
-/// Those among them that heed processes and events, or want no network at all.
+/// Commands that support processes and events, or that do not accept a network at all.
 const HEEDING_NATURE: [&str; 4] = [
     "envelope D P PLAN",
     "envelope D P NETWORK",
@@ -63,7 +63,7 @@ const HEEDING_NATURE: [&str; 4] = [
     "run D P --plan NETWORK",
 ];
 
-/// A folder with files for a domain with this in it.
+/// Creates a folder with the files of a domain that contains `content`.
 fn folder(number: usize, (content, step, _): (&str, &str, &str)) -> PathBuf {
     let name = format!("elbowroom-{}-judged-{number}", std::process::id());
     let folder = std::env::temp_dir().join(name);
@@ -140,7 +140,7 @@ fn what_only_the_judge_heeds_is_judged_and_refused_by_name_by_all_others() {
             let output = run("envelope D P PLAN");
             assert_eq!(output.status.code(), Some(0), "{output:?}");
         }
-        // A repair finds that nothing has to change, but gives no guarantee, and says why.
+        // The repair finds that no change is needed, but gives no guarantee, and states the reason.
         let repaired = run("envelope D P PLAN --repair");
         let said = String::from_utf8(repaired.stdout).expect("text");
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -1,4 +1,5 @@
-//! Runs that are killed at any moment, executive, world and planner, and go on with `--resume`.
+//! Runs whose executive, world or planner is killed at random moments, and which are continued with
+//! `--resume`.
 //!
 //! `ELBOWROOM_KILLS=1000 cargo test --workspace --test kills -- --nocapture` makes a thousand of
 //! them. The number of a run is the seed of the moments at which it is killed.
@@ -37,7 +38,7 @@ fn python_is_there() -> bool {
     is_there
 }
 
-/// How many runs there are at a time.
+/// Number of concurrent runs.
 const WORKERS: u8 = 4;
 
 /// A folder that no other test uses.
@@ -49,7 +50,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// The command that begins a run in this folder; with a planner of its own, it has no plan yet.
+/// Returns the command that begins a run in this folder. With a planner, it has no first plan.
 fn beginning(folder: &Path, journal: &str, has_planner: bool) -> Vec<String> {
     let world = format!(
         "python3 crates/cli/tests/files/robot.py {}",
@@ -82,7 +83,7 @@ fn started(line: &[String]) -> Child {
         .expect("the command can be started")
 }
 
-/// Numbers that look random: the upper bits of a linear congruential generator.
+/// Pseudo-random numbers: the upper bits of a linear congruential generator.
 struct Dice(u64);
 
 impl Dice {
@@ -95,7 +96,7 @@ impl Dice {
     }
 }
 
-/// The output of a program that must end by itself.
+/// Returns the output of a program that must end by itself.
 fn awaited(mut child: Child, what: &str) -> Output {
     for _ in 0..1200 {
         if child.try_wait().expect("it can be asked").is_some() {
@@ -107,8 +108,8 @@ fn awaited(mut child: Child, what: &str) -> Output {
     panic!("{what}: the run is stuck");
 }
 
-/// Kills the process whose number is in this file, if it is still one that was told this folder.
-/// Returns whether it was.
+/// Kills the process whose number is in `file`, if its command line still contains `folder`.
+/// Returns `true` if a process was killed.
 fn kill_by(folder: &Path, file: &str) -> bool {
     let Ok(pid) = fs::read_to_string(folder.join(file)) else {
         return false;
@@ -123,14 +124,14 @@ fn kill_by(folder: &Path, file: &str) -> bool {
     }
 }
 
-/// Who is killed.
+/// Process to kill.
 #[derive(Clone, Copy, PartialEq)]
 enum Victim {
     Executive,
     ExecutiveAndWorld,
-    /// The executive says so, and ends.
+    /// The executive reports it and ends.
     World,
-    /// As soon as it runs, for at most two seconds.
+    /// Killed as soon as it runs, within at most two seconds.
     Planner,
 }
 
@@ -146,7 +147,7 @@ impl Victim {
         }
     }
 
-    /// Kills it, unless it is the executive, whose process is at hand elsewhere.
+    /// Kills the process, unless it is the executive, which the caller kills.
     fn kill(self, folder: &Path, dice: &mut Dice) {
         match self {
             Self::Executive => {}
@@ -173,7 +174,7 @@ fn lines(folder: &Path, file: &str) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// Nothing was begun twice, and what counts as done was done.
+/// Checks that nothing was started twice, and that everything reported as done was done.
 fn judge(folder: &Path, output: &Output, what: &str) {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -182,7 +183,7 @@ fn judge(folder: &Path, output: &Output, what: &str) {
     judge_what_was_done(folder, what, &text);
 }
 
-/// What the robot itself has written down.
+/// Checks the robot's own records: each errand was done.
 fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
     judge_what_was_begun(folder, what);
     let done = lines(folder, "done").join("\n");
@@ -194,7 +195,8 @@ fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
     }
 }
 
-/// Nothing was begun twice: neither under the number of its start, nor under another one what was done already.
+/// Checks that nothing was started twice: no ticket was started twice, and no finished errand was
+/// done again under another ticket.
 fn judge_what_was_begun(folder: &Path, what: &str) {
     let mut done = BTreeMap::new();
     for line in lines(folder, "done") {
@@ -214,8 +216,8 @@ fn judge_what_was_begun(folder: &Path, what: &str) {
     );
 }
 
-/// Kills a run up to three times, and has it go on each time. Every third run has a planner that can be
-/// killed, too.
+/// Kills a run up to three times and resumes it each time. Every third run has a planner, which may
+/// also be killed.
 fn killed(number: u64) -> u64 {
     let (folder, mut dice) = (folder(&format!("kill-{number}")), Dice(number));
     dice.below(2);
@@ -224,7 +226,7 @@ fn killed(number: u64) -> u64 {
     let resume = ["run".to_owned(), "--resume".to_owned(), journal.clone()];
     let (mut kills, most) = (0, 1 + dice.below(3));
     let output = loop {
-        // A journal without a first record is that of a run that never began.
+        // Without a first record, the run never began.
         let has_begun = fs::read_to_string(&journal).is_ok_and(|text| text.contains('\n'));
         let line = if has_begun {
             resume.to_vec()
@@ -245,7 +247,8 @@ fn killed(number: u64) -> u64 {
         kills += 1;
         if child.try_wait().expect("it can be asked").is_none() {
             if victim == Victim::Planner {
-                // It is asked once more, and nobody misses a planner that has planned.
+                // The planner is called once more, or is no longer needed because it has returned a
+                // plan.
                 break awaited(child, &what);
             }
             let _ = child.kill();
@@ -271,7 +274,7 @@ fn killed(number: u64) -> u64 {
     kills
 }
 
-/// A run ends with its goal.
+/// Checks that a run ended with its goal.
 fn judge_the_end(folder: &Path, output: &Output, what: &str) {
     if String::from_utf8_lossy(&output.stdout).contains("has reached its goal before") {
         judge_what_was_done(folder, what, "it was over when it was killed");
@@ -280,8 +283,8 @@ fn judge_the_end(folder: &Path, output: &Output, what: &str) {
     }
 }
 
-/// A planner that dies is asked once more; if it dies again, the run ends in order and says why, and
-/// goes on when there is a planner.
+/// A planner that dies is called once more. If it dies again, the run ends in order with the
+/// reason, and can be resumed when there is a planner.
 #[cfg(unix)]
 #[test]
 fn a_run_whose_planner_dies_again_and_again_ends_and_goes_on_when_there_is_one() {
@@ -328,7 +331,7 @@ fn whenever_a_run_is_killed_it_goes_on_and_nothing_is_started_twice() {
         .ok()
         .and_then(|runs| runs.parse().ok());
     let runs: u64 = runs.unwrap_or(20);
-    // They mostly sleep.
+    // More workers than processors, because they mostly sleep.
     let workers: Vec<_> = (0..u64::from(WORKERS))
         .map(|worker| {
             let numbers = (worker..runs).step_by(usize::from(WORKERS));
@@ -342,7 +345,7 @@ fn whenever_a_run_is_killed_it_goes_on_and_nothing_is_started_twice() {
     println!("{runs} runs, killed {kills} times");
 }
 
-/// Two that write one journal would start everything twice.
+/// Two programs with one journal would start everything twice.
 #[cfg(unix)]
 #[test]
 fn a_run_that_is_under_way_is_not_gone_on_with_beside_it() {
@@ -360,7 +363,7 @@ fn a_run_that_is_under_way_is_not_gone_on_with_beside_it() {
         std::thread::sleep(Duration::from_millis(50));
     }
     let resume = ["run", "--resume", &journal].map(str::to_owned);
-    // Both wait a little for the journal, and the first run does not last long.
+    // Both wait for the journal for a short time, which is less than the first run takes.
     for second in [started(&resume), started(&line)] {
         let second = awaited(second, "the second");
         let text = String::from_utf8_lossy(&second.stderr).into_owned();
@@ -391,10 +394,10 @@ fn a_journal_is_neither_overwritten_nor_gone_on_with_after_its_end() {
     let text = String::from_utf8_lossy(&resumed.stdout).into_owned();
     assert_eq!(resumed.status.code(), Some(0), "{resumed:?}");
     assert!(text.contains("has reached its goal before"), "{text}");
-    // It is a trace for whoever reads one.
+    // The journal is also a valid trace.
     let report = elbowroom(&["report", &journal]);
     assert!(report.status.success(), "{report:?}");
-    // Damage is not taken for a torn end.
+    // Damage is distinguished from a truncated end.
     let text = fs::read_to_string(&journal).expect("the journal");
     let header = format!("{}\n", text.lines().next().expect("a record"));
     fs::write(
@@ -406,7 +409,7 @@ fn a_journal_is_neither_overwritten_nor_gone_on_with_after_its_end() {
     let text = String::from_utf8_lossy(&damaged.stderr).into_owned();
     assert!(text.contains("damaged in the middle"), "{text}");
     assert!(text.contains("help: what comes behind"), "{text}");
-    // Only where not even one record is whole can nobody have been told anything.
+    // Only if no record is complete, no command can have been sent yet.
     for (kept, expected) in [
         (header.replace('\n', "\r\n"), "its first record is damaged"),
         (

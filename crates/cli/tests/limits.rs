@@ -1,4 +1,4 @@
-//! The limits of `elbowroom plan` hold whatever takes its time and memory.
+//! Time and memory limits of `elbowroom plan` hold for all its phases.
 
 #![cfg(target_os = "linux")]
 
@@ -11,7 +11,7 @@ use std::process::Command;
 use command::elbowroom;
 use serde_json::Value;
 
-/// A folder that no other test uses, removed in the end.
+/// A folder that no other test uses, removed on drop.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -38,7 +38,7 @@ impl Drop for Folder {
     }
 }
 
-/// The answer of a search that ends at a limit with nothing to show.
+/// Returns the answer of a search that ends at a limit without a plan.
 fn limited(arguments: &[&str]) -> Value {
     let output = elbowroom(&[&["plan", "--json"], arguments].concat());
     assert_eq!(output.status.code(), Some(3), "{output:?}");
@@ -49,7 +49,7 @@ fn limited(arguments: &[&str]) -> Value {
 fn a_domain_that_never_comes_to_its_end_does_not_outlast_the_time_limit() {
     let folder = Folder::new("endless");
     let domain = folder.file("domain.pddl");
-    // Whoever reads it waits for somebody to write.
+    // A reader of the named pipe blocks until another process writes to it.
     let made = Command::new("mkfifo").arg(&domain).status();
     assert!(made.expect("mkfifo can be started").success());
     for planner in ["embedded", "sh -c 'true' {domain} {problem}"] {
@@ -71,7 +71,7 @@ fn a_domain_that_never_comes_to_its_end_does_not_outlast_the_time_limit() {
     }
 }
 
-/// Nothing that is searched, and twice 30^3 actions.
+/// No search is needed, but there are 2 · 30³ ground actions.
 #[test]
 fn what_grounding_takes_counts_for_the_memory_limit() {
     let folder = Folder::new("many");

@@ -1,4 +1,4 @@
-//! What README.md shows of the command is what the command prints.
+//! Checks that the command prints the output shown in README.md.
 
 mod command;
 
@@ -6,7 +6,7 @@ use std::fs;
 
 use command::{elbowroom, root};
 
-/// The first answer that a document shows, in the characters of a terminal without Unicode.
+/// Returns the first answer in a document, in the characters of a terminal without Unicode.
 fn first_answer(document: &str) -> String {
     let text = fs::read_to_string(root().join(document)).expect("the document is there");
     let begin = text.find("Elbow room of").expect("it shows an answer");
@@ -18,7 +18,7 @@ fn first_answer(document: &str) -> String {
         .replace('●', "o")
 }
 
-/// Without the time that the search took.
+/// Removes the duration of the search.
 fn without_time(answer: &str) -> String {
     let (all, last) = answer
         .trim_end()

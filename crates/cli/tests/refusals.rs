@@ -1,4 +1,4 @@
-//! What the command does not understand, or could not honour, it refuses; nothing is ignored.
+//! Inputs that the command does not understand or cannot satisfy are refused, never ignored.
 
 mod command;
 
@@ -14,7 +14,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// What the command says when it refuses something: exit code 2, nothing on standard output.
+/// Returns the message of a refusal: exit code 2, nothing on standard output.
 fn refusal(arguments: &[&str]) -> String {
     let output = elbowroom(arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {output:?}");
@@ -49,7 +49,8 @@ fn options_of_run_that_could_do_nothing_are_refused() {
             "cannot be used with",
         ),
         (&["--answer-within", "3"], "--world-process"),
-        // Only a world that is a program outlives the run; a simulated one had no journal, silently.
+        // A simulated world does not outlive the run, so it cannot have a journal. The option was
+        // once ignored silently.
         (
             &["--journal", "j", "--world", "cases/delivery/world.toml"],
             "cannot be used with",
@@ -218,7 +219,7 @@ fn a_trace_is_played_back_as_it_is() {
     }
 }
 
-/// The shipped experiment, with changes.
+/// Writes the shipped experiment with changes.
 fn experiment(folder: &Path, changes: &[(&str, &str)]) -> String {
     let text = fs::read_to_string(root().join("crates/cli/tests/files/late-drives.toml"));
     let mut text = text.expect("the experiment");
@@ -297,13 +298,13 @@ fn experiments_that_would_make_an_empty_or_wrong_table_are_refused() {
     }
     let file = experiment(&folder, &[]);
     assert!(refusal(&["compare", &file, "--trials", "0"]).contains("0 is not in 1.."));
-    // So are those in perturbed worlds.
+    // Executors in perturbed worlds are checked as well.
     let text = fs::read_to_string(root().join("experiments/olisipo_sf3.toml")).expect("there");
     let is_list = |line: &&str| line.starts_with("executors =");
     let executors = text.lines().find(is_list).expect("executors");
     fs::write(&file, text.replace(executors, "executors = []")).expect("written");
     assert!(refusal(&["compare", &file]).contains("nothing to make"));
-    // A problem without blanks is named as such.
+    // A problem without placeholders is reported as such.
     let file = experiment(
         &folder,
         &[("executors", "planner = \"{domain} {problem}\"\nexecutors")],
@@ -332,7 +333,7 @@ fn only_results_of_the_experiment_are_merged_and_missing_parts_are_named() {
     let words = "incomplete: 4 of 6 trials of each problem; parts made: 0/3, 2/3";
     assert!(table.contains(words), "{table}");
 
-    // Another column, another title: another experiment, whose results once made a panic.
+    // Results of another experiment, with another column and title, once caused a panic.
     let more = "[[column]]\nname = \"more\"\nworld = \"world.toml\"\n[[column]]";
     let other = experiment(&folder, &[("[[column]]", more), ("Late drives", "Others")]);
     let said = refusal(&["compare", &other, "--merge", &first, &last]);
@@ -354,7 +355,7 @@ fn a_folder_that_cannot_be_written_is_told_before_the_trials() {
     let bad = folder.join("experiment.toml/results").display().to_string();
     let said = refusal(&["compare", &file, "-o", &bad]);
     assert!(said.contains("cannot make the folder"), "{said}");
-    // What cannot be written is printed all the same.
+    // The results are printed although they cannot be written.
     let file = experiment(&folder, &[("trials = 6", "trials = 1")]);
     let taken = folder.join("out");
     fs::create_dir_all(taken.join("results.json")).expect("made");
@@ -430,7 +431,7 @@ fn a_misspelt_key_of_a_world_is_shown_with_the_one_that_was_meant() {
     fs::remove_dir_all(folder).expect("it was there");
 }
 
-/// With `--json`, a program is told what a person is told.
+/// With `--json`, the failure document contains the message shown to users.
 #[test]
 fn a_failure_is_a_document_where_one_is_asked_for() {
     let output = elbowroom(&[

@@ -1,4 +1,4 @@
-//! Stored runs are played back to the same decisions, whoever decided.
+//! Replays of stored runs make the same decisions, for all executors.
 
 mod command;
 
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use command::{elbowroom, root};
 
-/// A file that is removed when nobody needs it any more.
+/// A file that is removed on drop.
 struct Temporary(PathBuf);
 
 impl Temporary {
@@ -31,7 +31,7 @@ impl Drop for Temporary {
     }
 }
 
-/// Makes a run, plays it back, and returns the trace.
+/// Executes a run, replays it, and returns the trace.
 fn played_back(name: &str, arguments: &[&str]) -> String {
     let trace = Temporary::new(&format!("{name}.jsonl"), "");
     let made = elbowroom(&[&["run", "--trace", &trace.name()], arguments].concat());
@@ -45,12 +45,12 @@ fn played_back(name: &str, arguments: &[&str]) -> String {
     let document: Value = serde_json::from_slice(&replay.stdout).expect("a document");
     assert_eq!(document["agrees"], true, "{name}");
     assert_eq!(document["complete"], true, "{name}");
-    // All lines but the header are entries.
+    // All lines except the header are entries.
     assert_eq!(document["entries"], text.lines().count() - 1, "{name}");
     text
 }
 
-/// Whether a replay of this trace differs, and where.
+/// Returns the line of the first difference between a trace and its replay, if any.
 fn difference(trace: &str, name: &str) -> Option<u64> {
     let file = Temporary::new(name, trace);
     let replay = elbowroom(&["run", "--json", "--replay", &file.name()]);
@@ -62,7 +62,7 @@ fn difference(trace: &str, name: &str) -> Option<u64> {
     document["difference"]["line"].as_u64()
 }
 
-/// The first plan that was made in a run.
+/// Returns the first plan made in a run.
 fn first_plan(trace: &str) -> String {
     let lines = trace.lines().map(serde_json::from_str::<Value>);
     let mut entries = lines.map(|entry| entry.expect("JSON"));
@@ -86,7 +86,7 @@ fn causes(trace: &str) -> Vec<String> {
 
 const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
 
-/// Two orders, the nearer of which has next to no time to spare: `live:5` drops it.
+/// Two orders. The nearer one has almost no slack, so `live:5` abandons it.
 #[test]
 fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
     let text = fs::read_to_string(root().join("experiments/table1/problem.pddl")).expect("read");
@@ -119,7 +119,7 @@ fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
         "--planning-time",
         "0",
     ];
-    // The planner's own plan; without being asked for it, a run begins with the likeliest.
+    // The planner's own plan. By default, a run begins with the likeliest one.
     let shortest = ["--executor", "live", "--first-plan", "shortest"];
     let hasty = played_back("hasty", &[&common[..], &shortest].concat());
     let plan = Temporary::new("hasty.plan", &first_plan(&hasty));
@@ -132,14 +132,14 @@ fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
         .concat(),
     );
     assert!(causes(&trace).iter().any(|cause| cause == "likelier"));
-    // The probabilities are calculated again, not read: in another world they are others.
+    // The replay recomputes probabilities, which differ in another world.
     let steady = trace.replacen("deviation = 70", "deviation = 1", 10);
     assert_ne!(steady, trace);
     assert!(difference(&steady, "steady.jsonl").is_some());
 }
 
-/// A deadline that is met more often if the order of the actions changes. `policy` makes that plan itself, so the
-/// planner does not make the first of the plans in the trace.
+/// The deadline is met more often with another order of the actions. `policy` makes that plan
+/// itself, so the planner does not make the first plan in the trace.
 #[test]
 fn run_in_which_policy_has_the_likelier_plan_and_the_planner_makes_the_next_one() {
     let domain = Temporary::new(
@@ -225,12 +225,12 @@ fn runs_by_likelihoods_in_which_starts_fail_and_the_door_locks() {
             replans += trace.matches("\"event\":\"planning\"").count();
         }
         assert!(failed > 5, "{executor}: {failed}");
-        // `esterel` comes to a locked door in some of them.
+        // `esterel` reaches a locked door in some of them.
         assert_eq!(replans > 0, executor == "esterel", "{executor}: {replans}");
     }
 }
 
-/// Likelihoods are part of the record: with others the same observations lead to other decisions.
+/// Likelihoods are part of the record, because they affect decisions.
 #[test]
 fn likelihoods_are_kept_in_the_trace() {
     let trace = played_back(
@@ -284,8 +284,8 @@ fn trace_of_a_run_whose_plan_was_refused_says_that_it_cannot_be_replayed() {
     assert!(said.contains("was refused"), "{said}");
 }
 
-/// Runs whose traces are recorded, by name. With `ELBOWROOM_UPDATE_RECORDED=1` the test writes them again, after an
-/// intended change.
+/// Runs with recorded traces, by name. `ELBOWROOM_UPDATE_RECORDED=1` writes the traces again, after
+/// an intended change.
 const RECORDED: [(&str, &str); 8] = [
     (
         "guarded",

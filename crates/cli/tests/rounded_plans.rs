@@ -1,4 +1,4 @@
-//! Rounded plans get one verdict from every command, and written plans can be read by VAL.
+//! All commands give the same verdict on rounded plans, and VAL can read written plans.
 
 mod command;
 #[path = "../../../testing/skipped.rs"]
@@ -11,7 +11,7 @@ use std::process::{Command, Output, Stdio};
 use command::elbowroom;
 use skipped::skipped;
 
-/// A patrol: a move of `(/ distance speed)`, then a watch of 2 to 9.
+/// Writes a problem with a patrol: a move of `(/ distance speed)`, then a watch of 2 to 9.
 fn patrol(name: &str, distance: &str, speed: &str) -> [String; 2] {
     let domain = "
         (define (domain patrol)
@@ -57,7 +57,7 @@ fn text(output: &Output) -> String {
     format!("{out}{err}")
 }
 
-/// The exit codes and the output of `check`, `envelope`, `stn` and `run`.
+/// Returns the exit codes and the output of `check`, `envelope`, `stn` and `run`.
 fn verdicts(files: [&str; 3], options: &[&str]) -> Vec<(Option<i32>, String)> {
     let commands = ["check", "envelope", "stn", "run"];
     let verdicts = commands.map(|name| {
@@ -143,7 +143,7 @@ fn known_plans_with_wrong_numbers_get_one_verdict() {
     }
 }
 
-/// VAL's output about a plan.
+/// The repair states if the plan needs other times.
 #[test]
 fn repair_says_whether_the_plan_needs_other_times() {
     let [domain, problem] = patrol("repaired", "5", "1");

@@ -1,4 +1,4 @@
-//! Runs that are ended from outside, in worlds that are processes: nothing is left running.
+//! Runs in worlds that are processes, ended from outside: no process remains.
 #![cfg(target_os = "linux")]
 #![allow(
     clippy::disallowed_methods,
@@ -18,8 +18,8 @@ use serde_json::Value;
 
 const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
 
-/// A robot that writes down what it is told. Each wait takes a fifth of a second. What it starts
-/// never ends, but for the action with the number `$2`, which fails; it stops what is cancelled.
+/// A robot that logs its messages. Each wait takes 0.2 s. Started actions never end, except the one
+/// with the number `$2`, which fails. Cancelled actions stop.
 const ROBOT: &str = r#"
 log=$1; fails=$2; now=0; news=
 number() { n=${line#*\"ticket\":}; n=${n%%[!0-9]*}; }
@@ -41,7 +41,7 @@ while read -r line; do
 done
 "#;
 
-/// A robot that has answered once, and is then busy for a minute.
+/// A robot that answers once, and then does not respond for a minute.
 const STUBBORN: &str = r#"
 log=$1
 trap '' TERM INT HUP
@@ -73,7 +73,7 @@ impl Place {
         fs::read_to_string(self.0.join(name)).unwrap_or_default()
     }
 
-    /// What the world was told, message by message.
+    /// Returns the messages sent to the world.
     fn told(&self) -> Vec<Value> {
         let text = self.read("log");
         let lines = text.lines().map(serde_json::from_str);
@@ -94,7 +94,7 @@ impl Place {
             .env("NO_COLOR", "1")
             .args(run)
             .stdout(Stdio::piped())
-            // What the world leaves running would hold it open.
+            // Remaining processes of the world would keep the pipe open.
             .stderr(Stdio::null())
             .spawn()
             .expect("the command can be started")
@@ -121,7 +121,7 @@ fn send(child: &Child, signal: u32) {
     assert!(killed.success());
 }
 
-/// How often the world was told this.
+/// Returns the number of messages of this type.
 fn count(told: &[Value], kind: &str) -> usize {
     told.iter()
         .filter(|message| message["type"] == kind)
@@ -142,7 +142,7 @@ fn ctrl_c_and_requests_to_terminate_end_a_run_in_order() {
             "",
             &["--executor", "esterel", "--planner-states", "400"],
         );
-        // It has begun, and waits for something to end.
+        // The run has begun and waits for the end of an action.
         place.wait_until_told("\"wait\"", 4);
         send(&child, signal);
         let output = child.wait_with_output().expect("it ends");
@@ -199,7 +199,7 @@ fn a_world_that_does_not_obey_is_not_waited_for_for_long() {
     assert_eq!(last_entry(&place)["verdict"], "interrupted");
 }
 
-/// The world is given its time to stop, unless the user insists.
+/// The world has time to stop, unless the user insists.
 #[test]
 fn third_ctrl_c_ends_the_run_at_once_and_the_second_does_not() {
     let place = Place::new("thrice");
@@ -218,7 +218,7 @@ fn third_ctrl_c_ends_the_run_at_once_and_the_second_does_not() {
     assert!(output.stdout.is_empty(), "{output:?}");
 }
 
-/// One action fails while another one runs, and nobody makes another plan.
+/// One action fails while another one runs, and the planner finds no plan or fails.
 #[test]
 fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop() {
     let planners = [
@@ -251,7 +251,7 @@ fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop()
         assert!(text.contains(words), "{planner}: {text}");
         assert!(!text.contains("still running"), "{planner}: {text}");
         let told = place.told();
-        // The one that failed has ended by itself.
+        // The failed action has ended by itself.
         assert_eq!(count(&told, "start"), 2, "{planner}: {told:?}");
         assert_eq!(count(&told, "cancel"), 1, "{planner}: {told:?}");
         assert_eq!(told.last().expect("a message")["type"], "stop", "{planner}");
@@ -259,7 +259,7 @@ fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop()
     }
 }
 
-/// In a simulated world on a wall clock, it ends where it has come to.
+/// A run in a simulated world on a wall clock ends at the present time.
 #[test]
 fn a_run_on_a_wall_clock_ends_when_it_is_asked_to() {
     let place = Place::new("clock");
@@ -301,7 +301,7 @@ fn a_full_disk_does_not_hide_the_verdict() {
     );
 }
 
-/// What was finished is kept, and says that it is not all.
+/// Finished trials are kept, and the results are marked as incomplete.
 #[test]
 fn a_comparison_that_is_interrupted_keeps_what_is_finished() {
     for (name, experiment) in [

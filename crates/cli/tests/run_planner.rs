@@ -1,4 +1,4 @@
-//! Runs and comparisons whose plans other programs make.
+//! Runs and comparisons with third-party planners.
 #![cfg(unix)]
 
 mod command;
@@ -25,7 +25,7 @@ fn temporary(name: &str, content: &str) -> PathBuf {
     path
 }
 
-/// A planner that knows one plan, whatever it is asked; its command line.
+/// Writes a planner that always returns the same plan. Returns its file and its command line.
 fn one_plan(name: &str) -> (PathBuf, String) {
     let plan = fs::read_to_string(root().join("cases/delivery/plan.plan")).expect("a plan");
     let script = temporary(name, &format!("cat <<'END'\n{plan}\nEND\n"));
@@ -43,8 +43,8 @@ fn another_program_makes_the_first_plan() {
     fs::remove_file(script).expect("it is there");
 }
 
-/// A new plan is needed in the middle, and that planner's is none from there: the judge says so,
-/// and nothing is executed that it did not accept.
+/// A new plan is needed in mid-execution, but the planner returns one for the initial state. The
+/// validator rejects it, and nothing of it is executed.
 #[test]
 fn a_plan_that_does_not_fit_the_situation_is_refused() {
     let (script, line) = one_plan("refused.sh");
@@ -100,7 +100,7 @@ fn an_experiment_can_have_another_planner() {
     }
 }
 
-/// `ELBOWROOM_LPG` names the program of LPG-td.
+/// `ELBOWROOM_LPG` is the path of LPG-td.
 #[test]
 fn lpg_makes_a_new_plan_in_the_middle() {
     if std::env::var_os("ELBOWROOM_LPG").is_none() {

@@ -1,4 +1,4 @@
-//! Worlds that are processes, and runs that are killed.
+//! Worlds that are processes, and killed runs.
 
 mod command;
 #[path = "../../../testing/skipped.rs"]
@@ -62,7 +62,7 @@ fn the_example_world_reports_a_cancel_at_once() {
     assert!(time < 60.0, "{report:#}");
 }
 
-/// A run in a world whose program ends in its first `lives` lives, and may be started again three times.
+/// Runs in a world whose program dies in its first `lives` lives, and may be restarted three times.
 fn in_dying_world(name: &str, lives: &str, more: &[&str]) -> Output {
     let counter = temporary(name);
     let script = "crates/cli/tests/files/dying_world.py";
@@ -109,7 +109,7 @@ fn a_world_that_ends_again_and_again_ends_the_run() {
     assert!(warnings.contains("restart 3 of 3"), "{warnings}");
 }
 
-/// A run in a world that is this shell script, which has `seconds` for each answer.
+/// Runs in a world that is a shell script with `seconds` for each answer.
 fn in_shell(name: &str, script: &str, seconds: &str) -> Output {
     let file = temporary(name);
     fs::write(&file, script).expect("a temporary file can be written");
@@ -122,7 +122,7 @@ fn in_shell(name: &str, script: &str, seconds: &str) -> Output {
     output
 }
 
-/// Answers every question with the lines of `$1`.
+/// Returns a script that answers every question with these lines.
 fn answering(lines: &str) -> String {
     format!(
         "while read -r line; do case \"$line\" in *\\\"wait\\\"*|*\\\"look\\\"*) echo '{lines}';; esac; \
@@ -142,7 +142,7 @@ fn every_way_to_be_no_world_ends_the_run_and_is_named() {
             "30",
             "its clock stands still",
         ),
-        // Valid lines, and no end of them.
+        // Valid lines without end.
         (
             "babbler",
             format!("exec yes '{fact}'\n"),
@@ -155,7 +155,7 @@ fn every_way_to_be_no_world_ends_the_run_and_is_named() {
             "30",
             "without a line feed",
         ),
-        // Says something all the time, but never what time it is.
+        // Lines all the time, but never a `time`.
         (
             "slow",
             format!("while echo '{fact}'; do sleep 0.2; done\n"),
@@ -197,7 +197,8 @@ fn every_way_to_be_no_world_ends_the_run_and_is_named() {
     }
 }
 
-/// A world like `examples/world.py`, but for what it says first in its first answer.
+/// Runs with a world like `examples/world.py` that sends the line `first` at the start of its first
+/// answer.
 fn example_that_says(name: &str, first: &str, options: &[&str]) -> Option<(Output, String)> {
     if Command::new("python3").arg("--version").output().is_err() {
         return None;
@@ -205,7 +206,7 @@ fn example_that_says(name: &str, first: &str, options: &[&str]) -> Option<(Outpu
     let example = fs::read_to_string(root().join("examples/world.py")).expect("the example");
     let begins = "now, ends, news = 0.0, {}, []";
     assert!(example.contains(begins), "{example}");
-    // JSON's way to write a text is also Python's.
+    // A JSON string is also a valid string in Python.
     let first = serde_json::to_string(first).expect("a text");
     let said = format!("print({first}, flush=True)\n");
     let says = example.find("for message in").expect("the loop");
@@ -219,7 +220,8 @@ fn example_that_says(name: &str, first: &str, options: &[&str]) -> Option<(Outpu
     Some((output, trace))
 }
 
-/// A robot cannot know which facts actions mention: `(lies parcel depot)` is one that none does.
+/// Facts that no action mentions may be reported, such as `(lies parcel depot)`: a robot cannot
+/// know which facts actions mention.
 #[test]
 fn every_fact_of_the_problem_may_be_reported() {
     for (name, fact, truth) in [
@@ -243,7 +245,7 @@ fn every_fact_of_the_problem_may_be_reported() {
     }
 }
 
-/// A robot's slip of the tongue is no reason to end its mission, unless somebody wants it so.
+/// By default, an invalid message of the robot does not end the run.
 #[test]
 fn what_cannot_be_understood_is_a_remark_in_the_trace() {
     let fact = |fact: &str| format!(r#"{{"type":"fact","fact":"{fact}","becomes":true,"time":0}}"#);
@@ -279,7 +281,8 @@ fn what_cannot_be_understood_is_a_remark_in_the_trace() {
     }
 }
 
-/// What other programs say cannot move the cursor, and lines stay within eighty columns.
+/// Control characters in messages of other programs are escaped, and lines are wrapped at 80
+/// columns.
 #[test]
 fn what_a_world_says_is_shown_tame_and_wrapped() {
     let why = format!(r"line\n\u001b[2J {}", "word ".repeat(60));
@@ -296,11 +299,11 @@ fn what_a_world_says_is_shown_tame_and_wrapped() {
     fs::remove_file(trace).expect("the trace is there");
 }
 
-/// A run that had begun has done something: its document says what, also when the world failed.
+/// The document of a run contains the executed actions, also if the world failed.
 #[test]
 fn a_run_whose_world_fails_leaves_its_document() {
     let file = temporary("dies");
-    // It answers the first question, so that it has been started beyond doubt.
+    // The world answers the first question, so it has certainly started.
     let script = "while read -r line; do case \"$line\" in *wait*) exit 3;; esac; done\n";
     fs::write(&file, script).expect("written");
     let command = format!("sh {file}");
@@ -314,8 +317,8 @@ fn a_run_whose_world_fails_leaves_its_document() {
     fs::remove_file(file).expect("the script is there");
 }
 
-/// On a wall clock, planning takes as long as it takes, times the factor; a number of seconds is
-/// taken at its word. The clock starts when there is a first plan.
+/// On a wall clock, planning takes its measured time multiplied by the factor, or the given number
+/// of seconds. The clock starts when there is a first plan.
 #[test]
 fn planning_takes_time_on_a_wall_clock() {
     let (script, world) = (temporary("planner"), temporary("slow.toml"));
@@ -343,7 +346,8 @@ fn planning_takes_time_on_a_wall_clock() {
         fs::remove_file(trace).expect("the trace is there");
         took
     };
-    // There is no time for so much planning; whether the parcel is delivered is not the question.
+    // There is not enough time for that much planning. The test does not depend on the delivery of
+    // the parcel.
     let measured = took(&["--realtime", "1000"]);
     assert!(measured[0].abs() < 1e-9, "{measured:?}");
     assert!(measured[1..].iter().all(|it| *it >= 200.0), "{measured:?}");
@@ -365,7 +369,7 @@ fn a_world_that_cannot_be_started_ends_the_run_with_a_message() {
         ("no-such-program", "cannot start the world"),
         ("./crates", "`./crates` is a folder, not a program"),
         ("./README.md", "you may not execute `./README.md`"),
-        // Whether it is noticed when telling or when listening is a matter of chance.
+        // The exit may be detected during a write or during a read.
         ("true", "has ended (exit status: 0)"),
         ("echo hello", ""),
         ("yes hello", "it said `hello`"),
@@ -397,7 +401,7 @@ fn a_world_that_does_not_answer_is_not_waited_for_for_ever() {
     );
 }
 
-/// `kill -9` in the middle of a run leaves a trace that can be played back as far as it goes.
+/// `kill -9` during a run leaves a trace that can be replayed up to its end.
 #[test]
 fn a_run_that_is_killed_leaves_its_trace() {
     let trace = temporary("killed.jsonl");
@@ -414,7 +418,7 @@ fn a_run_that_is_killed_leaves_its_trace() {
         ])
         .spawn()
         .expect("the command can be started");
-    // At a real second for each second of the plan, it has begun and is far from done.
+    // In real time, the run has begun by then and is far from its end.
     let mut lines = 0;
     for _ in 0..200 {
         lines = fs::read_to_string(&trace).map_or(0, |text| text.lines().count());
@@ -433,7 +437,7 @@ fn a_run_that_is_killed_leaves_its_trace() {
     fs::remove_file(trace).expect("the trace is there");
 }
 
-/// A run in which walking takes so long; the plan reckons with 15 seconds at most.
+/// Runs with a walking time of `seconds`. The plan assumes at most 15 s.
 fn walking(seconds: &str) -> (String, Option<i32>) {
     let world = format!("python3 crates/cli/tests/files/late/world.py {seconds}");
     let files = ["domain.pddl", "problem.pddl", "plan.plan"];
@@ -446,7 +450,7 @@ fn walking(seconds: &str) -> (String, Option<i32>) {
     (text, output.status.code())
 }
 
-/// The guess that walking takes a quarter longer made the run unsolvable at 15 seconds.
+/// With the estimate of a walk that takes 25 % longer, there was no plan at 15 s.
 #[test]
 fn what_is_late_and_may_still_end_in_time_is_waited_for() {
     if Command::new("python3").arg("--version").output().is_err() {
@@ -460,8 +464,8 @@ fn what_is_late_and_may_still_end_in_time_is_waited_for() {
     assert!(!text.contains("slide"), "{text}");
 }
 
-/// With more than 16 seconds no plan is left, but climbing may still take less than planned. After 21 seconds it would
-/// have to take less than half, and walking is cancelled.
+/// After more than 16 s there is no plan, but climbing may still take less time than planned. After
+/// 21 s it would have to take less than half, and walking is cancelled.
 #[test]
 fn overdue_action_is_cancelled_if_the_rest_would_have_to_take_less_than_half() {
     if Command::new("python3").arg("--version").output().is_err() {

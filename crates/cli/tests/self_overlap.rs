@@ -1,4 +1,4 @@
-//! Self-overlap: plans that are made, plans that are given, and answers without a plan.
+//! Self-overlap in found plans, given plans, and answers without a plan.
 
 mod command;
 
@@ -34,7 +34,7 @@ fn problem(name: &str, goal: &str) -> String {
     file(name, &text)
 }
 
-/// The exit code, and all that is printed.
+/// Returns the exit code and all output.
 fn said(arguments: &[&str]) -> (Option<i32>, String) {
     let output = elbowroom(arguments);
     let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));

@@ -1,4 +1,4 @@
-//! What belongs to a command at home in a shell: completions, manual pages, colours.
+//! Shell integration: completions, manual pages, colours.
 
 mod command;
 
@@ -54,7 +54,7 @@ fn colours_can_be_had_in_a_pipe_and_refused() {
     }
 }
 
-/// What the metric says of a plan is part of the judgement.
+/// The answer of `check` contains the plan's metric.
 #[test]
 fn the_metric_is_told() {
     let folder = std::env::temp_dir().join(format!("elbowroom-metric-{}", std::process::id()));
@@ -82,7 +82,7 @@ fn the_metric_is_told() {
     let (json, _) = said(&["check", &domain, &problem, &plan, "--json"]);
     let document: serde_json::Value = serde_json::from_str(&json).expect("JSON");
     assert_eq!(document["metric"]["exact"], "11", "{document}");
-    // A warning is in the document, too.
+    // The document also contains warnings.
     let lenient = file("lenient.plan", "1: (work) [4 min]\n");
     let (json, said) = said(&["check", &domain, &problem, &lenient, "--json"]);
     let document: serde_json::Value = serde_json::from_str(&json).expect("JSON");

@@ -1,5 +1,5 @@
-//! Runs that are shown elsewhere, too: for other viewers, and in browsers while they go on. What
-//! browsers see is tested in `crates/page/tests/browser/live.cjs`.
+//! Runs shown elsewhere: exports for other viewers, and live pages. The live page itself is tested
+//! in `crates/page/tests/browser/live.cjs`.
 
 mod command;
 
@@ -39,7 +39,7 @@ fn what_cannot_be_shown_is_told_before_anything_is_done() {
             &["--realtime", "1", "--serve", "--token", nowhere],
             "cannot read the token",
         ),
-        // The old name of the option.
+        // The former name of the option.
         (
             &["--realtime", "1", "--serve", "--control", nowhere],
             "cannot read the token",

@@ -1,11 +1,10 @@
-//! The transcripts in `tests/cmd` and in `docs/calendars.md` are the manual of the command, and are run as they
-//! stand.
+//! Runs the transcripts in `tests/cmd` and `docs/calendars.md`, which document the command.
 
 use std::path::Path;
 
 #[test]
 fn the_transcripts_are_true() {
-    // They name files as one does at the root of the repository.
+    // File names in transcripts are relative to the root of the repository.
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     std::env::set_current_dir(root).expect("the repository");
     trycmd::TestCases::new()

@@ -1,4 +1,4 @@
-//! `elbowroom val` against the recorded verdicts of VAL, and under VAL's name.
+//! `elbowroom val` under VAL's name, compared with recorded verdicts of VAL.
 
 mod command;
 #[path = "../../../testing/skipped.rs"]
@@ -10,10 +10,10 @@ use std::process::Command;
 use command::elbowroom;
 use skipped::skipped;
 
-/// Plans whose domains have processes or events, which we do not read.
+/// Plans whose domains have processes or events, which are not supported here.
 const NOT_READ: [&str; 3] = ["coffee", "sleeping-beauty", "vendingmachine"];
 
-/// The benchmark set; `None` where it is not installed.
+/// Returns the folder of the benchmark set; `None` if it is not installed.
 fn benchmarks() -> Option<PathBuf> {
     let shared = std::env::var_os("ELBOWROOM_SHARED")
         .map_or_else(|| command::root().join("../shared"), PathBuf::from);
@@ -21,7 +21,7 @@ fn benchmarks() -> Option<PathBuf> {
     root.join("plans.csv").is_file().then_some(root)
 }
 
-/// The tolerance at which the judge and VAL agree on all plans (`docs/val-agreement.md`).
+/// Uses the tolerance at which the validator and VAL agree on all plans (`docs/val-agreement.md`).
 #[test]
 fn scripts_that_look_for_vals_words_come_to_vals_recorded_verdicts() {
     let Some(root) = benchmarks() else {
@@ -68,7 +68,7 @@ fn scripts_that_look_for_vals_words_come_to_vals_recorded_verdicts() {
     assert!(judged > 150, "{judged} plans");
 }
 
-/// Plans of planners and of this program keep interfering happenings 0.001 apart.
+/// These plans keep interfering happenings 0.001 apart.
 #[test]
 fn valid_plans_of_all_cases_are_accepted_by_default() {
     let files = |folder: PathBuf| {

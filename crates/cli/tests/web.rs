@@ -1,4 +1,4 @@
-//! The module for browsers gives the answers that the command gives, byte for byte.
+//! The module for browsers gives the same answers as the command, byte for byte.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,13 +13,13 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// A file, by the name that the command is given.
+/// Reads a file by the name given to the command.
 fn file(name: &str) -> Value {
     let text = std::fs::read_to_string(root().join(name)).expect("a file of the project");
     json!({ "name": name, "text": text })
 }
 
-/// The cases, and which of their files there are.
+/// Returns the cases with their files.
 fn cases() -> Vec<(String, Vec<&'static str>)> {
     let mut cases: Vec<(String, Vec<&'static str>)> = std::fs::read_dir(root().join("cases"))
         .expect("the folder of cases")
@@ -37,7 +37,7 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
     cases
 }
 
-/// What the command prints, and its exit code.
+/// Returns the output and exit code of the command with `--json`.
 fn said(arguments: &[&str]) -> (String, i32) {
     let output = Command::new(COMMAND)
         .args(arguments)
@@ -56,10 +56,10 @@ fn asked(question: &Value) -> Reply {
     reply(&question.to_string(), &mut || Duration::ZERO)
 }
 
-/// Without what depends on the clock.
+/// Removes the parts of a document that depend on the clock.
 fn timeless(document: &str) -> String {
     let lines = document.lines().map(|line| {
-        // What the command advises is about its own options.
+        // The command's advice refers to its own options.
         let own = ["\"seconds\":", "\"first_plan_seconds\":", "\"advice\":"];
         let is_own = own.iter().any(|key| line.trim_start().starts_with(key));
         let key = line.split(':').next().unwrap_or_default();

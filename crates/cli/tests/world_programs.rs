@@ -1,5 +1,5 @@
-//! Programs that are worlds: what is wrong with them is named, and the library for Python makes
-//! right ones.
+//! `world-check` names the faults of programs that are worlds, and the Python library makes correct
+//! ones.
 
 mod command;
 #[path = "../../../testing/skipped.rs"]
@@ -27,7 +27,7 @@ fn python_is_there() -> bool {
     is_there
 }
 
-/// The document about this world, and the exit code.
+/// Returns the document about this world, and the exit code.
 fn checked(command: &str, options: &[&str]) -> (Value, Option<i32>) {
     let line = [&["world-check", command, "--json"][..], options].concat();
     let output = elbowroom(&line);
@@ -36,14 +36,15 @@ fn checked(command: &str, options: &[&str]) -> (Value, Option<i32>) {
     (document, output.status.code())
 }
 
-/// The checks with that outcome.
+/// Returns the checks with that outcome.
 fn with_outcome<'a>(document: &'a Value, outcome: &str) -> Vec<&'a str> {
     let checks = document["checks"].as_array().expect("checks");
     let checks = checks.iter().filter(|check| check["outcome"] == outcome);
     checks.filter_map(|check| check["check"].as_str()).collect()
 }
 
-/// A program of `tests/files/worlds.py`, whose fault has no spaces on a command line.
+/// Writes a program of `tests/files/worlds.py` with this fault. Returns its command line and its
+/// file.
 fn world(fault: &str) -> (String, String) {
     let script = fs::read_to_string(root().join("crates/cli/tests/files/worlds.py"));
     let script = script.expect("the worlds");
@@ -119,8 +120,8 @@ fn nothing_is_wrong_with_a_world_that_keeps_to_the_protocol() {
     }
     let (right, file) = world("right");
     let (remembers, script) = with_a_ledger();
-    // Those of which nothing is kept have no occasion to resume, or to hear of beliefs. The last one speaks the first
-    // version of the protocol.
+    // Worlds without a ledger skip the checks of resuming and of beliefs. The last one speaks
+    // version 1 of the protocol.
     for (command, speaks, skips) in [
         (right.as_str(), 2, &[][..]),
         (&remembers, 2, &[]),
@@ -157,7 +158,7 @@ fn nothing_is_wrong_with_a_world_that_keeps_to_the_protocol() {
     }
 }
 
-/// A world of the library for Python that writes down what it begins, and hears of what is believed.
+/// A world of the Python library that keeps a ledger of its starts and receives beliefs.
 fn with_a_ledger() -> (String, String) {
     let script = "import os, sys
 sys.path.insert(0, os.path.join(os.getcwd(), 'clients', 'python'))
@@ -189,8 +190,8 @@ fn a_world_that_cannot_be_started_is_no_answer() {
     assert!(text.contains("cannot start the world"), "{text}");
 }
 
-/// A robot's arm has a clock of its own, which is ahead and twice as fast. What it reports of has happened when
-/// that clock says, and not when it is heard.
+/// The clock of a robot's arm is ahead and runs twice as fast. Reported events have the time of
+/// that clock, converted to the world's time, and not the time of their arrival.
 #[test]
 fn what_another_clock_has_seen_has_happened_when_it_says() {
     if !python_is_there() {
@@ -246,7 +247,7 @@ world.run()
         if seen["type"] == "ended" {
             let ticket = seen["ticket"].as_u64().expect("a ticket");
             let time = seen["time"]["decimal"].as_f64().expect("a time");
-            // The reading took a moment.
+            // Reading the clock takes a moment.
             assert!(
                 (time - happened[&ticket]).abs() < 0.2,
                 "{line}: {happened:?}"
@@ -260,7 +261,7 @@ world.run()
     }
 }
 
-/// How far a running action has come is in the trace, and changes no decision.
+/// The progress of running actions is recorded in the trace and changes no decision.
 #[test]
 fn feedback_is_recorded_and_replayed() {
     if !python_is_there() {
@@ -303,7 +304,8 @@ fn the_library_for_python_and_the_bridges_pass_their_own_tests() {
     }
 }
 
-/// The beginning is told whole, and then each change once; in the end the program knows what the judge says.
+/// The initial state is sent completely, and then each change once. At the end the program has the
+/// same state as the validator.
 #[test]
 fn a_program_that_wants_to_hear_what_is_believed_is_told_all_of_it_once() {
     if !python_is_there() {
@@ -357,7 +359,7 @@ fn a_program_that_wants_to_hear_what_is_believed_is_told_all_of_it_once() {
         let name = it["fluent"].as_str().expect("a name");
         let (told, judged) = (values[name].as_f64(), it["value"]["decimal"].as_f64());
         let off = told.zip(judged).map(|(told, judged)| (told - judged).abs());
-        // The simulation's clock counts in floats.
+        // The simulation's clock uses floats.
         assert!(
             off.is_some_and(|it| it < 1e-9),
             "{name}: {told:?}, {judged:?}"

@@ -1,4 +1,4 @@
-//! Mistakes that new users made, each with what the command has to say to it.
+//! Errors of new users, with the messages of the command.
 
 mod command;
 
@@ -25,7 +25,7 @@ const TANK: [&str; 3] = [
     "cases/tank/plan.plan",
 ];
 
-/// A file that no other test uses, removed in the end.
+/// A file that no other test uses, removed on drop.
 struct Temporary(PathBuf);
 
 impl Temporary {
@@ -47,7 +47,7 @@ impl Drop for Temporary {
     }
 }
 
-/// What the command says on standard error when it ends with this exit code.
+/// Runs the command, checks its exit code, and returns standard error.
 fn said(code: i32, arguments: &[&str]) -> String {
     let output = elbowroom(arguments);
     assert_eq!(
@@ -76,7 +76,7 @@ fn a_parameter_that_does_not_exist_is_told_with_those_that_do() {
     }
 }
 
-/// The schedule that is shown, the sentence above it and the document speak of one number.
+/// The schedule, the sentence above it and the document contain the same number.
 #[test]
 fn the_shortfall_of_a_box_is_the_same_everywhere() {
     let outside = envelope(&DELIVERY, &["--contains", "dur_0=[5,30] dur_3=[10,30]"]);
@@ -87,7 +87,7 @@ fn the_shortfall_of_a_box_is_the_same_everywhere() {
     let document: Value = serde_json::from_slice(&document.stdout).expect("a document");
     let shortfall = &document["counterexample"]["shortfall"];
     let decimal = shortfall["decimal"].as_f64().expect("a number");
-    // 30 + 2 + 30 + 3 and four separations of 0.001 are late for a deadline at 60.
+    // 30 + 2 + 30 + 3 s and four separations of 0.001 s exceed the deadline at 60.
     assert!((decimal - 5.004).abs() < 1e-9, "{document:#}");
     assert!(text.contains("too late by 5.004"), "{text}");
     assert_eq!(text.matches(" by ").count(), 1, "{text}");
@@ -213,8 +213,7 @@ fn a_text_where_a_number_belongs_is_told_in_words() {
     assert!(!said.contains("u64"), "{said}");
 }
 
-/// The sliding-tile puzzle with two tiles exchanged: no plan exists, and finding that out takes
-/// more than a megabyte.
+/// The sliding-tile puzzle with two tiles exchanged has no plan. The proof needs more than 1 MB.
 #[test]
 fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
     let domain = Temporary::new(
@@ -263,7 +262,7 @@ fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
     assert!(said.contains("no proof"), "{said}");
 }
 
-/// A world that answers with a ticket that it never got lets no time pass, and is told so.
+/// A world that answers with an unknown ticket without advancing its time is reported.
 #[test]
 fn a_ticket_that_was_never_given_is_named() {
     let world = Temporary::new(
@@ -279,7 +278,7 @@ fn a_ticket_that_was_never_given_is_named() {
     let told = String::from_utf8(output.stderr).expect("text");
     assert!(told.contains("its clock stands still"), "{told}");
     assert!(told.contains("ticket 77 was never given"), "{told}");
-    // The report says that the world failed; why is said once.
+    // The report states that the world failed, without repeating the reason.
     let report = String::from_utf8(output.stdout).expect("text");
     assert!(report.contains("the world failed at 0"), "{report}");
     assert!(!report.contains("stands still"), "{report}");
@@ -287,7 +286,7 @@ fn a_ticket_that_was_never_given_is_named() {
     assert!(strict.contains("ticket 77 was never given"), "{strict}");
 }
 
-/// Names that occur once and a number in each cell, as programs want it.
+/// Column names are unique, and each cell contains one number, for use by programs.
 #[test]
 fn the_table_of_an_experiment_is_one_for_programs() {
     let folder = std::env::temp_dir().join(format!("elbowroom-{}-tidy", std::process::id()));

@@ -1,8 +1,8 @@
-//! The one place of this module that looks at a clock.
+//! Clock of this crate. No other module reads the time.
 
 use std::time::{Duration, Instant};
 
-/// Measures the time since it was started.
+/// Stopwatch that starts on creation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock(Instant);
 

@@ -1,10 +1,10 @@
-//! Command lines with places for the files.
+//! Command lines with placeholders for files.
 
 use std::env;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// A program and its arguments, with `{…}` where files and limits go.
+/// A program and its arguments, with placeholders for files and limits.
 ///
 /// | placeholder | stands for |
 /// |---|---|
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// | `{memory}` | the memory limit in MB; a million if there is none |
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Command {
-    /// The program: a path, or a name that is looked for in `PATH`.
+    /// The program: a path, or a name to search in `PATH`.
     pub program: PathBuf,
     /// Its arguments, with placeholders.
     pub arguments: Vec<String>,
@@ -23,7 +23,7 @@ pub struct Command {
 /// An error in a planner's command line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CommandError {
-    /// There is nothing in it.
+    /// It is empty.
     #[error(
         "an empty command line: write a program and its arguments, with {{domain}} and {{problem}}"
     )]
@@ -31,7 +31,7 @@ pub enum CommandError {
     /// A quotation mark is not closed.
     #[error("this command line has a {0} without its partner")]
     Unclosed(char),
-    /// It does not say where a file goes.
+    /// It lacks the placeholder of a file.
     #[error(
         "this command line does not say where the {what} file goes: \
          write {{{what}}} there, as in `myplanner {{domain}} {{problem}}`"
@@ -40,7 +40,7 @@ pub enum CommandError {
         /// `domain` or `problem`.
         what: &'static str,
     },
-    /// Braces with something else in them.
+    /// It contains an unknown placeholder.
     #[error(
         "unknown placeholder `{{{0}}}`: there are {{domain}}, {{problem}}, {{plan}}, {{time}} and \
          {{memory}}"
@@ -54,18 +54,18 @@ pub(super) struct Filling {
     pub(super) domain: PathBuf,
     pub(super) problem: PathBuf,
     pub(super) plan: PathBuf,
-    /// In seconds.
+    /// Time limit in seconds.
     pub(super) time: u64,
-    /// In MB.
+    /// Memory limit in MB.
     pub(super) memory: u64,
 }
 
 impl Command {
-    /// Takes a command line apart as a shell would: spaces separate, quotation marks keep
-    /// together, a backslash takes the next character as it is. No shell runs it.
+    /// Splits a command line like a shell: at spaces, with quotation marks, and with backslashes
+    /// that escape the next character. It is not run by a shell.
     ///
     /// # Errors
-    /// When a quotation mark is not closed, or it does not say where domain and problem go.
+    /// If a quotation mark is not closed, or a placeholder is unknown or missing.
     pub fn parse(line: &str) -> Result<Self, CommandError> {
         let mut words = words(line)?.into_iter();
         let program = words.next().ok_or(CommandError::Empty)?;
@@ -84,8 +84,8 @@ impl Command {
         })
     }
 
-    /// The arguments with everything filled in. Other arguments that name a file by a relative
-    /// path get its absolute one, because the planner runs in a folder of its own.
+    /// Returns the arguments with all placeholders replaced. Other arguments that are relative
+    /// paths of existing files become absolute, because the planner runs in its own folder.
     pub(super) fn filled(&self, filling: &Filling) -> Vec<OsString> {
         let fill = |argument: &String| {
             if !argument.contains('{') {
@@ -108,7 +108,7 @@ impl Command {
     }
 }
 
-/// The file that would be started: the path itself, or the first of that name in `PATH`.
+/// Returns the file to start: the path itself, or the first file with that name in `PATH`.
 pub(super) fn find_program(program: &Path) -> Option<PathBuf> {
     let has_folder = program.components().count() > 1;
     if has_folder {
@@ -144,7 +144,7 @@ fn check_placeholders(argument: &str) -> Result<(), CommandError> {
         };
         let name = &rest[..close];
         let is_word = name.chars().all(|c| c.is_ascii_alphabetic());
-        // Other braces (`{1,2}`, JSON) are the planner's business.
+        // Other braces (`{1,2}`, JSON) are passed to the planner.
         if is_word && !name.is_empty() && !KNOWN.contains(&name) {
             return Err(CommandError::Unknown(name.to_owned()));
         }
@@ -153,7 +153,7 @@ fn check_placeholders(argument: &str) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// The words of a line.
+/// Splits a line into words.
 fn words(line: &str) -> Result<Vec<String>, CommandError> {
     let mut words = Vec::new();
     let mut word: Option<String> = None;

@@ -1,4 +1,4 @@
-//! No plan is shown that the judge has not seen.
+//! Validation of the planner's output. Only valid plans are reported.
 
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Task, TimeTriggeredPlan, validate_from};
@@ -7,18 +7,18 @@ use elbowroom_pddl::{Source, read_plan};
 use super::outcome::Found;
 use super::request::{Question, Request};
 
-/// Gives a plan like the one given, with times that may be valid; `None` if there is none.
+/// Returns a plan like the given one, with times that may be valid; `None` if there is none.
 ///
-/// Planners round their times, and the judge forgives nothing. Who has plan networks at hand
-/// (this crate has not) can keep a plan's order and choose its times again. What comes back is
-/// judged like any plan. Both plans are for the task given, which begins at time 0.
+/// Planners round their times, and the validator tolerates no errors. A caller with plan networks
+/// (this crate has none) can keep the order of a plan and compute new times. The result is
+/// validated like any plan. Both plans are for the given task, which begins at time 0.
 pub type Repair<'a> = dyn FnMut(&Task, &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> + 'a;
 
 /// The validator's verdict on a planner's output.
 pub(super) enum Judgement {
     Accepted(Found),
     Refused(String),
-    /// It is no plan: an action is unknown, or lacks its duration.
+    /// The output is not a plan: an action is unknown, or lacks its duration.
     Unreadable(String),
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Judge<'a, 'r> {
 }
 
 impl Judge<'_, '_> {
-    /// Judges a plan as it was printed.
+    /// Validates a plan as printed.
     pub(super) fn judge(&mut self, text: &str) -> Judgement {
         let source = Source::new("plan", text);
         match read_plan(&source, &self.question.task) {
@@ -41,8 +41,8 @@ impl Judge<'_, '_> {
         }
     }
 
-    /// Judges doing nothing, which is a plan where the goal holds already, or will once what is
-    /// running has ended.
+    /// Validates the empty plan. It is valid if the goal holds already, or will hold once the
+    /// running actions have ended.
     pub(super) fn judge_nothing(&mut self) -> Option<Found> {
         match self.judge_plan(&TimeTriggeredPlan::default()) {
             Judgement::Accepted(found) => Some(found),
@@ -65,7 +65,7 @@ impl Judge<'_, '_> {
         }
     }
 
-    /// The plan in our terms, if it is valid; else the objection.
+    /// Returns the plan in terms of the request's task if it is valid, or else the objection.
     fn accept(
         &mut self,
         plan: &TimeTriggeredPlan,

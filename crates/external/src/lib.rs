@@ -1,27 +1,28 @@
-//! Other people's planners, as supervised processes.
+//! Third-party planners, as supervised processes.
 //!
-//! In: a task and a situation, the texts that it was read from, and a [`Planner`]: one of the
-//! [`REGISTRY`], an engine of unified-planning (`up:NAME`), or any command line that says where
-//! the files go. Out: a [`Report`] with one of the [`Outcome`]s, and meanwhile an [`Event`]
-//! for each plan.
+//! The input is a task and a situation, their texts, and a [`Planner`]: one of the [`REGISTRY`], an
+//! engine of unified-planning (`up:NAME`), or any command line with placeholders for the files. The
+//! output is a [`Report`] with one of the [`Outcome`]s, and an [`Event`] for each plan during the
+//! run.
 //!
-//! The way through the module:
+//! The parts of the crate:
 //!
-//! 1. `registry`, `command`: which program to start with which arguments.
-//! 2. `request`, `start`: the files that it gets. At the beginning of a task these are the user's
-//!    own texts, to the letter; in mid-execution the problem is written anew
+//! 1. `registry`, `command`: the program to start and its arguments.
+//! 2. `request`, `start`: its input files. At the beginning of a task these are the user's own
+//!    texts, unchanged; in mid-execution a new problem is written
 //!    ([`elbowroom_pddl::write_problem`]).
-//! 3. `supervise`: the process. It has a process group, a folder and limits of its own, its output
-//!    is read as it comes, and at the end nothing of it is left.
-//! 4. `reader`, `log`: plans and telling phrases in what it prints. Memory stays bounded whatever
-//!    that is.
-//! 5. `run`, `judge`: each plan is judged before anyone sees it, and repaired where only its times
+//! 3. `supervise`: the process. It has its own process group, folder and limits, its output is read
+//!    as it is printed, and nothing of it remains at the end.
+//! 4. `reader`, `log`: extraction of plans and known phrases from the output. Memory use is bounded
+//!    for any output.
+//! 5. `run`, `judge`: each plan is validated before it is reported, and repaired if only its times
 //!    are rounded.
 //!
-//! This is the one crate below the command line that looks at a clock, starts threads and processes
-//! and writes files; hence it is a crate of its own. Processes are supervised on Unix systems; on
-//! others, WebAssembly among them, the answer is [`Outcome::NotStarted`] before any of these is
-//! touched. Memory limits, and finding children that left the process group, need Linux's `/proc`.
+//! This is the only crate below the command line that reads a clock, starts threads and processes
+//! and writes files, and is therefore separate. Processes are supervised on Unix systems. On
+//! others, including WebAssembly, the outcome is [`Outcome::NotStarted`] before any of these is
+//! used. Memory limits, and the search for children that left the process group, need Linux's
+//! `/proc`.
 //!
 //! ```
 //! use elbowroom_external::{Planner, REGISTRY};

@@ -1,7 +1,7 @@
-//! What a planner prints, read as it comes.
+//! Incremental parser of a planner's output.
 //!
-//! Nothing is known about the program at the other end: it may print without end, without line
-//! breaks, or bytes that are no text. All that is kept is bounded.
+//! Nothing is assumed about the program: it may print without end, without line breaks, or bytes
+//! that are not text. All memory is bounded.
 
 use std::collections::VecDeque;
 
@@ -9,35 +9,35 @@ use elbowroom_pddl::LineKind;
 
 use super::registry::Habits;
 
-/// Longer lines are cut.
+/// Maximum length of a line; the rest is cut.
 const LONGEST_LINE: usize = 64 << 10;
-/// Longer plans are cut, and then refused by the judge.
+/// Maximum length of a plan. Longer plans are cut, and then rejected by the validator.
 const LONGEST_PLAN: usize = 16 << 20;
-/// How much of the end of the output is kept to be shown.
+/// Maximum length of the excerpt from the end of the output.
 const EXCERPT: usize = 2000;
 
-/// Takes one stream of output apart.
+/// Parser of one output stream.
 #[derive(Debug)]
 pub(super) struct Log {
     habits: Habits,
     line: Vec<u8>,
-    /// The plan being read: timed actions so far, and lines that begin like one.
+    /// The current plan: its timed actions so far, and lines that begin like one.
     plan: String,
-    /// Whether there is an action among them.
+    /// `true` if it contains an action.
     is_plan: bool,
-    /// How much of it has been handed out.
+    /// Length of the part of the plan that was already reported.
     handed: usize,
-    /// Actions without times: a plan, if no better one comes.
+    /// Actions without times. They are the plan if there is none with times.
     untimed: String,
     has_timed: bool,
     tail: VecDeque<u8>,
-    /// The telling lines of the output.
+    /// Known phrases found in the output.
     pub(super) sayings: Sayings,
-    /// The number of bytes that came.
+    /// Number of bytes read.
     pub(super) bytes: u64,
 }
 
-/// The first line that says each thing.
+/// The first line with a phrase of each kind.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sayings {
     pub(super) unsolvable: Option<String>,
@@ -47,7 +47,7 @@ pub(super) struct Sayings {
     pub(super) out_of_memory: Option<String>,
 }
 
-/// Messages of programs that get no more memory.
+/// Messages of programs that run out of memory.
 const OUT_OF_MEMORY: &[&str] = &[
     "bad_alloc",
     "out of memory",
@@ -74,7 +74,7 @@ impl Log {
         }
     }
 
-    /// Reads on; `found` gets each plan when it is complete as far as can be told.
+    /// Parses more output. `found` receives each plan that seems complete.
     pub(super) fn feed(&mut self, bytes: &[u8], found: &mut impl FnMut(String)) {
         self.bytes += bytes.len() as u64;
         let kept = &bytes[bytes.len().saturating_sub(EXCERPT)..];
@@ -91,7 +91,8 @@ impl Log {
         }
     }
 
-    /// No more comes. Only who ended `by_itself` can have meant actions without times as a plan.
+    /// Ends the output. Actions without times count as a plan only if the planner ended
+    /// `by_itself`.
     pub(super) fn end(&mut self, by_itself: bool, found: &mut impl FnMut(String)) {
         let line = std::mem::take(&mut self.line);
         self.line(&String::from_utf8_lossy(&line), found);
@@ -101,7 +102,7 @@ impl Log {
         }
     }
 
-    /// The end of the output, as text that can be shown.
+    /// Returns the end of the output as printable text.
     pub(super) fn excerpt(&self) -> String {
         let bytes: Vec<u8> = self.tail.iter().copied().collect();
         let text = String::from_utf8_lossy(&bytes);
@@ -113,7 +114,7 @@ impl Log {
         text.trim().chars().map(shown).collect()
     }
 
-    /// Reads a line. A carriage return inside it ends a line of its own.
+    /// Parses a line. A carriage return inside it also ends a line.
     fn line(&mut self, line: &str, found: &mut impl FnMut(String)) {
         for part in line.trim_end().split('\r') {
             self.part(part, found);
@@ -130,7 +131,8 @@ impl Log {
                     self.plan.push('\n');
                 }
             }
-            // It may go on after a blank line; then it is handed out again, longer.
+            // The plan may continue after a blank line. It is then reported again, with more
+            // actions.
             LineKind::Blank => self.hand_out(found),
             LineKind::Separator | LineKind::Noise => {
                 self.hand_out(found);
@@ -146,7 +148,7 @@ impl Log {
                 }
             }
         }
-        // What comments say is noise to a plan reader, but not to us.
+        // Comments may contain known phrases.
         if line.trim_start().starts_with(';') {
             self.listen(line);
         }
@@ -177,7 +179,7 @@ impl Log {
     }
 }
 
-/// The line, or its beginning if it is long.
+/// Returns the line, shortened if it is long.
 fn shortened(line: &str) -> String {
     const LONGEST: usize = 300;
     match line.char_indices().nth(LONGEST) {
@@ -197,7 +199,7 @@ mod tests {
         missing: &[],
     };
 
-    /// The plans in a text that comes in pieces of `size` bytes.
+    /// Returns the plans in a text that arrives in pieces of `size` bytes.
     fn plans(text: &[u8], size: usize) -> (Vec<String>, Log) {
         let mut log = Log::new(HABITS);
         let mut plans = Vec::new();

@@ -1,15 +1,15 @@
-//! Plan texts on their way from the thread that reads to the one that judges.
+//! Queue of plan texts from the reading thread to the validating thread.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// More plans do not wait to be judged; the oldest give way.
+/// Maximum number of queued plans. The oldest ones are dropped.
 const MOST_WAITING: usize = 64;
-/// More text neither.
+/// Maximum total length of the queued plans, in bytes.
 const MOST_BYTES: usize = 64 << 20;
 
-/// A queue that never blocks who writes, because that thread also keeps the time.
+/// Queue that never blocks the writer, because the writing thread also enforces the time limit.
 #[derive(Debug, Default)]
 pub(super) struct Mailbox {
     inner: Mutex<Inner>,
@@ -23,13 +23,13 @@ struct Inner {
     is_closed: bool,
 }
 
-/// The result of reading the mailbox.
+/// Result of [`Mailbox::take`].
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Mail {
     Text(String),
-    /// Nothing came in time.
+    /// Nothing arrived in time.
     Nothing,
-    /// Nothing will come any more.
+    /// The queue is closed and empty.
     Closed,
 }
 
@@ -52,7 +52,7 @@ impl Mailbox {
         self.changed.notify_one();
     }
 
-    /// The next text, waiting for it as long as `patience` at most.
+    /// Removes the next text, and waits for it for at most `patience`.
     pub(super) fn take(&self, patience: Duration) -> Mail {
         let inner = self.lock();
         let (mut inner, _) = self

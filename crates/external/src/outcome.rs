@@ -1,4 +1,4 @@
-//! What came of a run.
+//! Outcome of a planner's run.
 
 use std::fmt;
 use std::time::Duration;
@@ -8,17 +8,17 @@ use elbowroom_num::Rational;
 
 use super::supervise::Ending;
 
-/// A plan that the judge has accepted.
+/// A plan that the validator has accepted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// The plan, in the terms of the task that was given. In mid-execution its first steps
-    /// continue what is running.
+    /// The plan, in terms of the given task. In mid-execution its first steps continue the running
+    /// actions.
     pub plan: TimeTriggeredPlan,
     /// The end time of its last action.
     pub makespan: Rational,
     /// The value of the problem's metric, if it has one that can be evaluated.
     pub metric: Option<Rational>,
-    /// The judge's objection to the planner's own times, if they had to be repaired.
+    /// The validator's objection to the planner's own times, if they had to be repaired.
     pub repaired: Option<String>,
 }
 
@@ -29,17 +29,17 @@ pub enum Event<'a> {
     Running {
         /// The time since its start.
         elapsed: Duration,
-        /// How much memory it uses, in bytes; 0 where that cannot be measured.
+        /// Memory in use, in bytes; 0 if it cannot be measured.
         memory: u64,
     },
-    /// It found a plan that the judge accepts.
+    /// It printed a plan that the validator accepts.
     Plan {
         /// The plan.
         found: &'a Found,
         /// The time.
         elapsed: Duration,
     },
-    /// It printed a plan that the judge refuses, or that is none.
+    /// It printed a plan that the validator rejects, or an unreadable one.
     Refused {
         /// The reason.
         reason: &'a str,
@@ -51,56 +51,57 @@ pub enum Event<'a> {
 /// The outcome of a planner's run. Only the first kind is a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// The last plan that the judge accepted.
+    /// The last plan that the validator accepted.
     Plan(Found),
-    /// The planner says that there is no plan. That is its claim, not a proof of ours.
+    /// The planner claims that there is no plan. The claim is not verified.
     Unsolvable {
-        /// Its words.
+        /// Its message.
         says: String,
     },
     /// No plan before the time limit.
     NoneInTime,
-    /// No plan before it was asked to stop.
+    /// No plan before the run was stopped on request.
     Stopped,
-    /// The planner ended without a plan, and says so.
+    /// The planner ended without a plan, with a message about it.
     GaveUp {
-        /// Its words.
+        /// Its message.
         says: String,
     },
-    /// The planner says that the problem is beyond it.
+    /// The planner reports that it does not support the problem.
     Unsupported {
-        /// Its words.
+        /// Its message.
         says: String,
     },
-    /// The planner was ended by a signal, or says that its child was.
+    /// A signal ended the planner, or a child of it according to its exit code.
     Crashed {
         /// The signal's number.
         signal: i32,
-        /// The end of what it printed.
+        /// The end of its output.
         excerpt: String,
     },
-    /// The planner needed more memory than it may have.
+    /// The planner exceeded its memory limit.
     OutOfMemory {
-        /// The most memory that it was seen to use, in bytes.
+        /// The largest measured memory use, in bytes.
         peak: u64,
     },
-    /// The planner ended without a plan, and what it printed does not tell why.
+    /// The planner ended without a plan, for an unknown reason.
     NotUnderstood {
         /// Its exit code.
         code: i32,
-        /// The end of what it printed.
+        /// The end of its output.
         excerpt: String,
     },
-    /// There is no such program, or it cannot be started, or this situation cannot be told to it.
+    /// There is no such program, it cannot be started, or the situation cannot be expressed in its
+    /// input.
     NotStarted {
         /// The reason.
         reason: String,
         /// Advice.
         help: String,
     },
-    /// All plans that it printed were refused; this is about the last of them.
+    /// All printed plans were rejected. This is the last of them.
     Refused {
-        /// The judge's objection, or the reason why it is no plan.
+        /// The validator's objection, or the reason why the plan is unreadable.
         reason: String,
         /// The plan as printed.
         plan: String,
@@ -108,7 +109,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// A word for tables and programs.
+    /// Returns a keyword for tables and programs.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Plan(_) => "plan",
@@ -125,7 +126,7 @@ impl Outcome {
         }
     }
 
-    /// The plan, if there is one.
+    /// Returns the plan, if there is one.
     pub fn found(&self) -> Option<&Found> {
         match self {
             Self::Plan(found) => Some(found),
@@ -134,7 +135,7 @@ impl Outcome {
     }
 }
 
-/// One sentence; excerpts and plans are left to who has room for them.
+/// Formats the outcome as one sentence, without excerpts and plans.
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -159,7 +160,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// The name of a signal.
+/// Returns the name of a signal.
 pub(super) fn signal_name(signal: i32) -> String {
     #[cfg(unix)]
     {
@@ -196,14 +197,14 @@ pub(super) fn signal_name(signal: i32) -> String {
 pub struct Report {
     /// The outcome.
     pub outcome: Outcome,
-    /// How it went.
+    /// The statistics.
     pub statistics: Statistics,
 }
 
 /// Statistics of a planner's run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
-    /// From the start of the process to its end.
+    /// Time from the start of the process to its end.
     pub elapsed: Duration,
     /// The time at which the first plan was accepted.
     pub first_plan: Option<Duration>,
@@ -211,12 +212,12 @@ pub struct Statistics {
     pub plans: usize,
     /// The number of plans that were refused or could not be read.
     pub refused: usize,
-    /// The processor time that its processes were seen to use together; Linux only.
+    /// The measured processor time of all its processes together; Linux only.
     pub work: Duration,
-    /// The most memory that its processes were seen to use together, in bytes.
+    /// The largest measured memory use of all its processes together, in bytes.
     pub peak_memory: u64,
-    /// How many bytes it printed.
+    /// The number of bytes printed.
     pub printed: u64,
-    /// How the process ended; `None` if it was not started.
+    /// The end of the process; `None` if it was not started.
     pub ending: Option<Ending>,
 }

@@ -1,9 +1,9 @@
-//! All processes that belong to a run, found in `/proc`.
+//! All processes of a run, found in `/proc`.
 //!
-//! A process belongs to a run if it is in the run's process group, descends from its first
-//! process, or carries the run's mark in its environment. The mark finds those that started a
-//! session of their own and whose parents have ended. Only who also wipes the environment gets
-//! away.
+//! A process belongs to a run if it is in the run's process group, descends from its first process,
+//! or has the run's mark in its environment. The mark finds processes that started their own
+//! session and whose parents have ended. Only processes that also clear their environment are
+//! missed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -14,19 +14,19 @@ use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 /// Resource usage of a group of processes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Usage {
-    /// Memory, in bytes. Pages that they share count for each.
+    /// Memory, in bytes. Shared pages count for each process.
     pub(super) memory: u64,
-    /// Processor time, that of ended children included where their parents have waited for them.
+    /// Processor time, including that of ended children whose parents have waited for them.
     pub(super) work: Duration,
 }
 
-/// The variable that carries the mark.
+/// Environment variable with the mark.
 pub(super) const MARK: &str = "ELBOWROOM_RUN";
 
-/// A process, told apart from later ones with its number by when it started.
+/// A process: its number, and its start time, because numbers are reused.
 type Identity = (i32, u64);
 
-/// The fields of `/proc/PID/stat` that are used.
+/// Used fields of `/proc/PID/stat`.
 #[derive(Clone, Copy, Debug)]
 struct Status {
     parent: i32,
@@ -43,7 +43,7 @@ struct Status {
 #[derive(Debug)]
 pub(super) struct Processes {
     leader: i32,
-    /// The time at which the leader started; older processes are none of ours.
+    /// Start time of the leader; older processes do not belong to the run.
     since: Option<u64>,
     mark: String,
     page: u64,
@@ -53,7 +53,8 @@ pub(super) struct Processes {
 }
 
 impl Processes {
-    /// Those of the run whose first process is `leader`, and whose environment has `mark`.
+    /// Creates the set for the run whose first process is `leader`, and whose environment has
+    /// `mark`.
     pub(super) fn of(leader: Pid, mark: &str) -> Self {
         Self {
             leader: leader.as_raw_nonzero().get(),
@@ -66,7 +67,7 @@ impl Processes {
         }
     }
 
-    /// The resources in use.
+    /// Measures the resources in use.
     pub(super) fn usage(&mut self) -> Usage {
         let (mut pages, mut ticks) = (0_u64, 0_u64);
         for (_, status) in self.find() {
@@ -79,7 +80,7 @@ impl Processes {
         }
     }
 
-    /// Kills all that are left, and says how many were found.
+    /// Kills all living members and returns their number.
     pub(super) fn kill(&mut self) -> usize {
         let found = self.find();
         for ((pid, start), _) in &found {
@@ -88,15 +89,15 @@ impl Processes {
         found.len()
     }
 
-    /// The living members.
+    /// Returns the living members.
     fn find(&mut self) -> Vec<(Identity, Status)> {
         let processes = all();
         let since = *self
             .since
             .get_or_insert_with(|| processes.get(&self.leader).map_or(0, |leader| leader.start));
         let mut found = Vec::new();
-        // Children have higher numbers than their parents, save when numbers wrap around; then
-        // the mark finds them.
+        // Children have higher numbers than their parents, unless numbers wrap around. The mark
+        // finds those.
         for (&pid, &status) in &processes {
             let identity = (pid, status.start);
             if status.start < since || status.is_dead {
@@ -128,12 +129,12 @@ impl Processes {
     }
 }
 
-/// Kills the process if it is still the one that started then.
+/// Kills the process if it still has this start time.
 fn kill_exactly(pid: i32, start: u64) {
     let Some(pid) = Pid::from_raw(pid) else {
         return;
     };
-    // The descriptor keeps meaning the same process, whatever becomes of the number.
+    // The descriptor refers to the same process even if its number is reused.
     let Ok(handle) = pidfd_open(pid, PidfdFlags::empty()) else {
         return;
     };
@@ -160,7 +161,7 @@ fn status(pid: i32) -> Option<Status> {
     parse(&text)
 }
 
-/// Takes `/proc/PID/stat` apart: `pid (name) state parent group …`; the name may contain anything.
+/// Parses `/proc/PID/stat`: `pid (name) state parent group …`; the name may contain anything.
 fn parse(text: &str) -> Option<Status> {
     let (_, rest) = text.rsplit_once(')')?;
     let fields: Vec<&str> = rest.split_ascii_whitespace().collect();

@@ -1,4 +1,4 @@
-//! The side of a run that reads: output and plan files, while the time is kept.
+//! Reading thread of a run: reads output and plan files, and enforces the limits.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -12,13 +12,13 @@ use super::workspace::Workspace;
 #[derive(Default)]
 pub(super) struct Shared {
     pub(super) mailbox: Mailbox,
-    /// Set by the side that judges, to end the run.
+    /// Set by the validating thread, to end the run.
     pub(super) stop: AtomicBool,
-    /// In bytes, as last measured.
+    /// The last measured memory use, in bytes.
     pub(super) memory: AtomicU64,
 }
 
-/// The side that reads.
+/// State of the reading thread.
 pub(super) struct Reader<'s> {
     output: Log,
     error: Log,
@@ -38,12 +38,12 @@ impl<'s> Reader<'s> {
         }
     }
 
-    /// The number of bytes that came.
+    /// Returns the number of bytes read.
     pub(super) fn printed_bytes(&self) -> u64 {
         self.output.bytes + self.error.bytes
     }
 
-    /// Reads the rest; nothing comes any more.
+    /// Reads the rest after the end of the process.
     pub(super) fn end(&mut self, ending: Option<Ending>) {
         let by_itself = matches!(ending, Some(Ending::Exited(_) | Ending::Signalled(_)));
         let mut put = |text| self.shared.mailbox.put(text);
@@ -55,7 +55,8 @@ impl<'s> Reader<'s> {
         self.shared.mailbox.close();
     }
 
-    /// The telling lines of the output; of two about the same, the more informative one.
+    /// Returns the known phrases in the output; the more informative one if both streams have one
+    /// of a kind.
     pub(super) fn sayings(&self) -> Sayings {
         let (output, error) = (&self.output.sayings, &self.error.sayings);
         let more = |output: &Option<String>, error: &Option<String>| {
@@ -71,7 +72,7 @@ impl<'s> Reader<'s> {
         }
     }
 
-    /// The end of what it printed; its complaints, if there are any.
+    /// Returns the end of standard error, or of standard output if the former is empty.
     pub(super) fn excerpt(&self) -> String {
         let error = self.error.excerpt();
         if error.is_empty() {

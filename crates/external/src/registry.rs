@@ -1,43 +1,43 @@
-//! The planners that are known by name.
+//! Registry of known planners.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
 use super::command::{Command, CommandError, find_program};
 
-/// A planner that is known by name: how to call it, and what it says.
+/// A known planner: its command line and its messages.
 #[derive(Debug)]
 pub struct Registered {
-    /// The name to ask for.
+    /// The name in requests.
     pub name: &'static str,
     /// A summary, in one sentence.
     pub summary: &'static str,
-    /// The variable of the environment that says where the program is.
+    /// The environment variable with the path of the program.
     pub variable: &'static str,
     /// The names of the program in `PATH`.
     pub programs: &'static [&'static str],
     /// Its arguments, with the placeholders of [`Command`].
     pub arguments: &'static [&'static str],
-    /// Where to get it.
+    /// Advice on how to get it.
     pub how_to_get: &'static str,
     /// The phrases it prints.
     pub habits: Habits,
 }
 
-/// Words, in lower case, by which a planner says how it ended without a plan.
+/// Phrases, in lower case, that planners print when they end without a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Habits {
-    /// There is no plan. This is the planner's claim, which is not checked.
+    /// There is no plan. This claim of the planner is not verified.
     pub unsolvable: &'static [&'static str],
-    /// It has given up, or used up a limit of its own.
+    /// The search was abandoned, or reached a limit of the planner's own.
     pub gave_up: &'static [&'static str],
-    /// The problem is beyond it.
+    /// The planner does not support the problem.
     pub unsupported: &'static [&'static str],
-    /// It needs something that is not installed.
+    /// A required component is not installed.
     pub missing: &'static [&'static str],
 }
 
-/// The planners that are known by name, in the order in which documents list them.
+/// The known planners, in the order of the documentation.
 pub const REGISTRY: &[Registered] = &[
     Registered {
         name: "popf",
@@ -86,8 +86,8 @@ pub const REGISTRY: &[Registered] = &[
                   (Gerevini, Saetti and Serina, JAIR 2006)",
         variable: "ELBOWROOM_LPG",
         programs: &["lpg-td", "lpg"],
-        // Its plan files are separated by a small time, what it prints is not. The seed makes it
-        // do the same each time.
+        // Happenings are separated in its plan files, but not in its printed plans. A fixed seed
+        // makes it deterministic.
         arguments: &[
             "-o",
             "{domain}",
@@ -133,7 +133,7 @@ const COLIN_FAMILY: Habits = Habits {
     missing: &[],
 };
 
-/// The phrases of our own shim for unified-planning.
+/// The phrases of the shim for unified-planning.
 const UNIFIED_PLANNING: Habits = Habits {
     unsolvable: &["elbowroom: unsolvable"],
     gave_up: &["elbowroom: gave up"],
@@ -141,7 +141,7 @@ const UNIFIED_PLANNING: Habits = Habits {
     missing: &["elbowroom: missing"],
 };
 
-/// Phrases of programs that are not known by name.
+/// Phrases of planners outside the registry.
 const ANYONE: Habits = Habits {
     unsolvable: &[
         "problem unsolvable",
@@ -162,7 +162,7 @@ const ANYONE: Habits = Habits {
     missing: &[],
 };
 
-/// A program to plan with.
+/// A planner to run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Planner {
     /// The name for messages.
@@ -204,8 +204,8 @@ pub enum PlannerError {
     Command(#[from] CommandError),
 }
 
-/// The engines that have a package `up-ENGINE` of their own. For another name nothing may be
-/// installed that merely happens to be called so.
+/// Engines with a package `up-ENGINE`. For other names no package is suggested, because one with
+/// that name may be unrelated.
 const ENGINES: [&str; 8] = [
     "aries",
     "tamer",
@@ -218,11 +218,11 @@ const ENGINES: [&str; 8] = [
 ];
 
 impl Planner {
-    /// The planner of that name; the engine of unified-planning, for `up:ENGINE`; or the program
-    /// of a command line that has placeholders or spaces in it.
+    /// Returns the known planner with this name, the engine of unified-planning for `up:ENGINE`, or
+    /// the program of a command line, which contains placeholders or spaces.
     ///
     /// # Errors
-    /// When the name is unknown, or the command line does not say where the files go.
+    /// If the name is unknown, or the command line lacks the placeholder of a file.
     pub fn named(text: &str) -> Result<Self, PlannerError> {
         let text = text.trim();
         if let Some(engine) = text.strip_prefix("up:") {
@@ -271,7 +271,7 @@ impl Planner {
 }
 
 impl Registered {
-    /// The planner, with its program found as far as possible.
+    /// Returns the planner with the path of its program, if it is found.
     pub fn planner(&self) -> Planner {
         let named = env::var_os(self.variable).map(PathBuf::from);
         let program = named.unwrap_or_else(|| {

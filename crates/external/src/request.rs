@@ -1,4 +1,4 @@
-//! What a planner is asked, in files, and its answer in our terms.
+//! Input files of a planner, and the translation of its plans.
 
 use std::sync::Arc;
 
@@ -9,9 +9,9 @@ use elbowroom_pddl::{ProblemText, Source, end_times, read_problem, write_problem
 /// A planning request.
 #[derive(Debug)]
 pub struct Request<'a> {
-    /// The task. Plans are given in its terms; their facts enter its table.
+    /// The task. Plans refer to it, and their facts are added to its table.
     pub task: &'a Task,
-    /// Where to begin.
+    /// The initial state of the plan.
     pub situation: &'a Situation,
     /// The text of its domain.
     pub domain: &'a Source,
@@ -19,25 +19,26 @@ pub struct Request<'a> {
     pub problem: &'a Source,
 }
 
-/// The number of digits of numbers without a finite decimal, in files for other programs.
+/// Decimal digits of numbers without a finite decimal, in files for other programs.
 const DIGITS: u32 = 9;
 
-/// The problem as the planner gets it.
+/// The problem in the planner's input.
 #[derive(Debug)]
 pub struct Question {
     /// The text of the problem file.
     pub(super) text: String,
-    /// The task that the planner sees: time 0 is now.
+    /// The task in the planner's input: time 0 is now.
     pub(super) task: Task,
-    /// When running actions are assumed to end, on our clock.
+    /// Assumed end times of the running actions, on the request's clock.
     ends: Vec<Rational>,
 }
 
 impl Question {
-    /// The user's own text at the beginning of the task; otherwise a new one.
+    /// Returns the user's own text at the beginning of the task, and otherwise writes a new
+    /// problem.
     ///
     /// # Errors
-    /// When what is running cannot be told in a problem file.
+    /// If the running actions cannot be expressed in a problem file.
     pub fn of(request: &Request<'_>) -> Result<Self, String> {
         if *request.situation == Situation::initial(request.task) {
             return Ok(Self {
@@ -65,22 +66,22 @@ impl Question {
         })
     }
 
-    /// The text of the problem file.
+    /// Returns the text of the problem file.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The task that the planner sees: time 0 is now.
+    /// Returns the task in the planner's input: time 0 is now.
     pub fn task(&self) -> &Task {
         &self.task
     }
 
-    /// A plan for the planner's task, as one for ours: times on our clock, and what is running
-    /// goes on to its assumed end.
+    /// Translates a plan for the planner's task to one for the request's task: times are on its
+    /// clock, and running actions continue until their assumed ends.
     ///
     /// # Errors
-    /// When an action cannot be instantiated, which the two tasks having the same objects rules
-    /// out.
+    /// If an action cannot be instantiated. This cannot happen, because both tasks have the same
+    /// objects.
     pub fn translate(
         &self,
         plan: &TimeTriggeredPlan,

@@ -1,4 +1,4 @@
-//! From a request to an outcome.
+//! Run of a planner, from request to outcome.
 
 use std::io;
 use std::ops::ControlFlow;
@@ -20,16 +20,17 @@ use super::start::{not_started, prepare};
 use super::supervise::{Ended, Ending, Limits, supervise};
 use super::workspace::Workspace;
 
-/// How often the observer is asked whether to go on.
+/// Interval between calls of the observer.
 const HEARTBEAT: Duration = Duration::from_millis(20);
-/// How long after the time limit plans that wait to be judged still count.
+/// Grace period after the time limit for the validation of queued plans.
 const GRACE: Duration = Duration::from_millis(50);
-/// Asks a planner for a plan. `observe` hears of each plan, and otherwise about fifty times a
-/// second; it can end the run, which then answers with the last plan found. `repair` gets plans
-/// that the judge refuses.
+/// Runs a planner. `observe` receives each plan, and is otherwise called about fifty times per
+/// second. It can end the run, whose outcome is then the last plan found. `repair` receives plans
+/// that the validator rejects.
 ///
-/// Every plan in the report, and in the events before, has been accepted by the judge
-/// ([`elbowroom_model::validate_from`]). When this returns, no process and no file is left.
+/// Every plan in the report and in the events has been accepted by the validator
+/// ([`elbowroom_model::validate_from`]). When this function returns, no process and no file is
+/// left.
 pub fn plan(
     planner: &Planner,
     request: &mut Request<'_>,
@@ -40,7 +41,7 @@ pub fn plan(
     let prepared = if cfg!(unix) {
         prepare(planner, request, settings)
     } else {
-        // Before anything asks for a clock or a folder: some systems have neither.
+        // Checked before any use of clocks and folders, which some systems lack.
         let reason = format!(
             "{} is another program, and this system runs none",
             planner.name
@@ -64,22 +65,22 @@ pub fn plan(
     }
 }
 
-/// A run under way, on the side of the judge.
+/// A running planner, as seen by the validating thread.
 struct Run<'a, 'r> {
     judge: Judge<'a, 'r>,
     settings: &'a Settings,
     observe: &'a mut dyn FnMut(&Event<'_>) -> ControlFlow<()>,
     clock: Clock,
     best: Option<Found>,
-    /// The last plan refused: why, and its text.
+    /// The last rejected plan: the objection, and its text.
     refused: Option<(String, String)>,
-    /// Why the last text that looked like a plan was none.
+    /// The reason why the last text similar to a plan was unreadable.
     unreadable: Option<String>,
     statistics: Statistics,
     is_stopped: bool,
 }
 
-/// Sets its flag when it goes.
+/// Sets its flag on drop.
 struct StopAtEnd<'s>(&'s AtomicBool);
 
 impl Drop for StopAtEnd<'_> {
@@ -107,8 +108,8 @@ impl<'a, 'r> Run<'a, 'r> {
         }
     }
 
-    /// One thread keeps the time and reads, this one judges: a long judgement does not keep the
-    /// planner alive beyond its time.
+    /// Runs the planner. One thread reads the output and enforces the limits; this one validates,
+    /// so that a long validation does not delay the planner's end.
     fn run(mut self, planner: &Planner, workspace: Workspace, command: process::Command) -> Report {
         let shared = Shared::default();
         let limits = Limits {
@@ -118,7 +119,7 @@ impl<'a, 'r> Run<'a, 'r> {
         };
         let mut reader = Reader::new(planner, workspace, &shared);
         let ended = thread::scope(|scope| {
-            // Should the judge or the observer panic, the planner goes too.
+            // Ends the planner if the validator or the observer panics.
             let _stop = StopAtEnd(&shared.stop);
             let supervisor = scope.spawn(|| {
                 let ended = supervise(command, limits, &shared.stop, &mut reader);
@@ -129,7 +130,7 @@ impl<'a, 'r> Run<'a, 'r> {
             supervisor.join()
         });
         let Ok(ended) = ended else {
-            // A bug of ours; the process is gone all the same.
+            // A bug of this crate; the process has ended.
             std::panic::resume_unwind(Box::new("the supervisor of a planner panicked"));
         };
         let ended = match ended {
@@ -139,7 +140,7 @@ impl<'a, 'r> Run<'a, 'r> {
         self.statistics.printed = reader.printed_bytes();
         let sayings = reader.sayings();
         let excerpt = reader.excerpt();
-        // The folder goes before anyone hears of the end.
+        // The folder is removed before the outcome is reported.
         drop(reader);
         self.report(planner, ended, sayings, excerpt)
     }
@@ -164,7 +165,7 @@ impl<'a, 'r> Run<'a, 'r> {
         }
     }
 
-    /// Whether it is too late for better plans.
+    /// Returns `true` if it is too late for better plans.
     fn is_over(&self) -> bool {
         let limit = self.settings.time_limit;
         self.is_stopped || limit.is_some_and(|limit| self.clock.elapsed() > limit + GRACE)
@@ -181,7 +182,7 @@ impl<'a, 'r> Run<'a, 'r> {
         let elapsed = self.clock.elapsed();
         match judgement {
             Judgement::Accepted(found) => {
-                // The same plan in a file and on the screen is one plan.
+                // A plan that is both written to a file and printed counts once.
                 if self
                     .best
                     .as_ref()
@@ -248,7 +249,7 @@ impl<'a, 'r> Run<'a, 'r> {
         }
     }
 
-    /// The meaning of a run without a valid plan.
+    /// Determines the outcome of a run without a valid plan.
     fn without_plan(&mut self, ended: Ended, sayings: Sayings, excerpt: String) -> Outcome {
         let peak = ended.peak_memory;
         if ended.ending == Ending::MemoryLimit {
@@ -259,7 +260,7 @@ impl<'a, 'r> Run<'a, 'r> {
         }
         match ended.ending {
             Ending::MemoryLimit => Outcome::OutOfMemory { peak },
-            // It may have said so and then have hung.
+            // The planner may report this and then hang.
             Ending::TimeLimit | Ending::Stopped => match sayings.unsolvable {
                 Some(says) => Outcome::Unsolvable { says },
                 None if ended.ending == Ending::Stopped => Outcome::Stopped,
@@ -288,7 +289,7 @@ impl<'a, 'r> Run<'a, 'r> {
         if let Some(signal) = signal {
             return Outcome::Crashed { signal, excerpt };
         }
-        // Planners print no actions, in many ways, where none are needed.
+        // If no actions are needed, planners print empty plans in various forms.
         if self.unreadable.is_none()
             && let Some(found) = self.judge.judge_nothing()
         {
@@ -314,9 +315,9 @@ impl<'a, 'r> Run<'a, 'r> {
     }
 }
 
-/// The signal that ended it; also as shells report it, by an exit code of 128 and more.
+/// Returns the signal that ended the planner, also if a shell reports it by an exit code above 128.
 fn crash_signal(ending: Ending) -> Option<i32> {
-    /// Those by which the system ends a faulty program.
+    /// Signals sent by the system to end a faulty program.
     const FAULTS: [i32; 6] = [4, 6, 7, 8, 9, 11];
     match ending {
         Ending::Signalled(signal) => Some(signal),

@@ -1,4 +1,4 @@
-//! What a planner may use up.
+//! Resource limits of a planner.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -8,12 +8,12 @@ use std::time::Duration;
 pub struct Settings {
     /// The time limit.
     pub time_limit: Option<Duration>,
-    /// How much processor time all its processes may use together. Holds as it stands on a busy
-    /// machine too; Linux only.
+    /// Limit of the processor time of all its processes together. Independent of the load of the
+    /// machine; Linux only.
     pub work_limit: Option<Duration>,
-    /// How much memory all its processes may use together, in bytes.
+    /// Limit of the memory of all its processes together, in bytes.
     pub memory_limit: Option<u64>,
-    /// Where its folder is made; by default where the system keeps temporary files.
+    /// Parent of its folder; the system's temporary folder by default.
     pub scratch: Option<PathBuf>,
 }
 

@@ -1,4 +1,4 @@
-//! From a request to a process that is ready to be started.
+//! Preparation of the planner's process.
 
 use std::fs;
 use std::io;
@@ -13,14 +13,14 @@ use super::request::{Question, Request};
 use super::settings::Settings;
 use super::workspace::Workspace;
 
-/// The shim that speaks with unified-planning.
+/// Python script that runs engines of unified-planning.
 const UP_SHIM: &str = include_str!("up_shim.py");
-/// Given to planners that want a limit of their own where there is none: a day.
+/// Value of `{time}` without a time limit: a day.
 const NO_TIME_LIMIT: u64 = 86_400;
-/// The same for memory: a million MB.
+/// Value of `{memory}` without a memory limit: a million MB.
 const NO_MEMORY_LIMIT: u64 = 1_000_000;
 
-/// Everything that is needed to start the planner, or why it cannot be started.
+/// Returns everything needed to start the planner, or the reason why it cannot be started.
 pub(super) fn prepare(
     planner: &Planner,
     request: &Request<'_>,
@@ -65,7 +65,7 @@ pub(super) fn not_started(reason: String, help: &str) -> Outcome {
     }
 }
 
-/// The process to be.
+/// Returns the command of the process.
 fn command(
     planner: &Planner,
     program: &Path,
@@ -97,9 +97,9 @@ fn command(
     }
     command
         .current_dir(workspace.path())
-        // What it writes elsewhere for a while goes with the folder.
+        // Temporary files are removed with the folder.
         .env("TMPDIR", workspace.path())
-        // Points, not commas, in numbers.
+        // Decimal points in numbers, not commas.
         .env("LC_ALL", "C")
         .env("PYTHONUNBUFFERED", "1")
         .env("PYTHONDONTWRITEBYTECODE", "1");

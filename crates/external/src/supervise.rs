@@ -1,4 +1,4 @@
-//! A process that cannot get away.
+//! Supervision of a process and all its children.
 
 use std::io;
 use std::process::Command;
@@ -19,18 +19,18 @@ pub(super) struct Limits {
     pub(super) memory: Option<u64>,
 }
 
-/// The way in which a process ended.
+/// The end of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// By itself, with this exit code.
     Exited(i32),
-    /// By a signal that we did not send.
+    /// By a signal that the supervisor did not send.
     Signalled(i32),
-    /// We ended it: its time was up.
+    /// Ended at the time limit.
     TimeLimit,
-    /// We ended it: it used too much memory.
+    /// Ended at the memory limit.
     MemoryLimit,
-    /// We ended it: we were asked to.
+    /// Ended on request.
     Stopped,
 }
 
@@ -38,11 +38,10 @@ pub enum Ending {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ended {
     pub(super) ending: Ending,
-    /// Processor time that its processes were seen to use together; 0 where that cannot be
-    /// measured.
+    /// Measured processor time of all its processes together; 0 if it cannot be measured.
     pub(super) work: Duration,
-    /// The most memory that its processes were seen to use together, in bytes; 0 where that cannot
-    /// be measured.
+    /// The largest measured memory use of all its processes together, in bytes; 0 if it cannot be
+    /// measured.
     pub(super) peak_memory: u64,
 }
 
@@ -57,15 +56,15 @@ pub(super) enum Stream {
 pub(super) trait Watcher {
     /// The process has printed something.
     fn printed(&mut self, stream: Stream, bytes: &[u8]);
-    /// Called every now and then, with the memory in use.
+    /// Called regularly with the memory in use.
     fn tick(&mut self, memory: u64);
 }
 
-/// Runs a process to its end, or to that of its limits, or until `stop` is set. It gets nothing to
-/// read. When this returns, it and its children are gone.
+/// Runs a process until it ends, reaches a limit, or `stop` is set. Its standard input is empty.
+/// When this function returns, the process and its children are gone.
 ///
 /// # Errors
-/// When it cannot be started.
+/// If the process cannot be started.
 pub(super) fn supervise(
     command: Command,
     limits: Limits,

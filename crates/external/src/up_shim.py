@@ -90,7 +90,7 @@ def main():
     warnings.simplefilter("ignore")
     environment = up.environment.get_environment()
     environment.credits_stream = None
-    # In PDDL an object may be called as its type is.
+    # In PDDL an object may have the name of its type.
     environment.error_used_name = False
     if ":" in engine:
         module, _, name = engine.partition(":")

@@ -1,4 +1,4 @@
-//! The folder that a planner runs in.
+//! Working folder of a planner.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -9,16 +9,16 @@ use std::time::SystemTime;
 use elbowroom_pddl::LineKind;
 use tempfile::TempDir;
 
-/// A larger plan file is none.
+/// Maximum size of a plan file; larger files are ignored.
 const LARGEST_PLAN: u64 = 16 << 20;
-/// More files are not looked at.
+/// Maximum number of files that are checked.
 const MOST_FILES: usize = 1000;
 
-/// A fresh folder, removed with all that is in it when this is dropped.
+/// A temporary folder, removed with its content on drop.
 #[derive(Debug)]
 pub(super) struct Workspace {
     folder: TempDir,
-    /// The plan files met, with how they looked when last seen and whether they were read so.
+    /// Known plan files with their last state, and whether that state was read.
     files: BTreeMap<PathBuf, Seen>,
 }
 
@@ -35,7 +35,7 @@ struct Seen {
 }
 
 impl Workspace {
-    /// A fresh folder in `parent`, or where the system keeps temporary files, with the two texts.
+    /// Creates a folder in `parent`, or in the system's temporary folder, with the two texts.
     pub(super) fn new(parent: Option<&Path>, domain: &str, problem: &str) -> io::Result<Self> {
         let mut builder = tempfile::Builder::new();
         builder.prefix("elbowroom-");
@@ -64,13 +64,13 @@ impl Workspace {
         self.path().join("problem.pddl")
     }
 
-    /// Where `{plan}` points. Not there yet.
+    /// Returns the path for `{plan}`. The file does not exist yet.
     pub(super) fn plan(&self) -> PathBuf {
         self.path().join("plan")
     }
 
-    /// The contents of plan files that are new since the last call, the oldest first. A file that
-    /// is still growing is left for later, unless this is the `last` call.
+    /// Returns the contents of new plan files since the last call, the oldest first. A file that is
+    /// still growing is skipped, except in the `last` call.
     pub(super) fn new_plans(&mut self, last: bool) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.path()) else {
             return Vec::new();
@@ -104,7 +104,7 @@ impl Workspace {
     }
 }
 
-/// Whether there is a plan in it. Some planners also write files to say that there is none.
+/// Returns `true` if the text contains a plan. Some planners also write files if there is none.
 fn has_actions(text: &str) -> bool {
     let kinds = text.split(['\n', '\r']).map(LineKind::of);
     kinds

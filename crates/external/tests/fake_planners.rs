@@ -1,5 +1,5 @@
-//! Planners that hang, crash, eat memory, babble or lie: the right outcome each time, nothing left
-//! running, nothing left on disk.
+//! Planners that hang, crash, exhaust memory, print garbage or wrong plans. Each has the right
+//! outcome, and no process or file is left.
 #![cfg(unix)]
 
 #[path = "../../../testing/skipped.rs"]
@@ -27,25 +27,25 @@ const DOMAIN: &str = "(define (domain shop)
 const PROBLEM: &str = "(define (problem day) (:domain shop)
     (:init (open) (at 30 (not (open)))) (:goal (sold)))";
 
-/// What became of a fake planner.
+/// Result of a fake planner.
 struct Run {
     report: Report,
-    /// One word for each event that is about a plan: its makespan, or `refused`.
+    /// For each event about a plan, its makespan or `refused`.
     events: Vec<String>,
     /// The plan found, as text.
     plan: Option<String>,
 }
 
-/// A word that the processes of one fake planner have in their command lines.
+/// Returns a unique word for the command lines of one fake planner's processes.
 fn tag() -> String {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
-    // As digits behind a point it can stand in the argument of `sleep`.
+    // Digits can be appended to the decimal point in an argument of `sleep`.
     format!("{}{count:03}", std::process::id())
 }
 
-/// Runs a shell script as a planner. `$TAG` in it is a word of its own, by which its processes are
-/// looked for afterwards.
+/// Runs a shell script as a planner. `$TAG` in it is a unique word, used to find remaining
+/// processes afterwards.
 fn run(script: &str, seconds: u64) -> Run {
     run_with(script, |settings| {
         settings.time_limit = Some(Duration::from_secs(seconds));
@@ -75,7 +75,7 @@ fn run_with(script: &str, set: impl FnOnce(&mut Settings)) -> Run {
     run
 }
 
-/// The problem of the two texts.
+/// Reads the problem of the two texts.
 fn problem_of(domain: &Source, problem: &Source) -> Problem {
     read_problem(domain, problem).expect("they are right").0
 }
@@ -121,7 +121,7 @@ fn run_line(
     }
 }
 
-/// The command lines of processes that have the word in them.
+/// Returns the command lines of processes that contain the word.
 fn left_running(tag: &str) -> Vec<String> {
     let Ok(entries) = fs::read_dir("/proc") else {
         return Vec::new();
@@ -205,7 +205,7 @@ fn children_that_leave_the_group_are_found() {
         skipped("this needs /proc and setsid");
         return;
     }
-    // A session of its own, and its parent gone: only its environment tells whose it is.
+    // A process with its own session whose parent is gone; only its environment identifies it.
     let script = "setsid sh -c '(setsid sleep 999.$TAG &) ; exit' & wait; sleep 0.2; exit 1";
     let run = run(script, 30);
     assert_eq!(run.report.outcome.name(), "not understood");
@@ -228,7 +228,7 @@ fn a_crash_is_called_by_its_signal() {
         panic!("{outcome:?}");
     };
     assert_eq!(excerpt, "about to fall");
-    // As a wrapper script reports the crash of what it wraps.
+    // A wrapper script that reports the crash of its child by its exit code.
     let outcome = run("sh -c 'kill -ABRT $$'; exit $?", 30).report.outcome;
     assert_eq!(outcome.to_string(), "it crashed (SIGABRT)");
 }
@@ -440,7 +440,8 @@ fn in_mid_execution_the_problem_is_told_anew_and_the_plan_is_shifted_back() {
         domain: &domain,
         problem: &problem,
     };
-    // It answers only if it is told the deadline and the end of the sweeping from now.
+    // It prints a plan only if the problem contains the deadline and the end of the sweeping,
+    // relative to now.
     let script = "grep -q '(at 10 (not (open)))' \"$1\" && grep -q '(at 2 (clean))' \"$1\" &&
         echo '1: (sell) [5]'";
     let line = format!(

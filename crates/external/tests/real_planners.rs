@@ -1,5 +1,5 @@
-//! Planners that others have made, where they are installed: `ELBOWROOM_LPG` names the program of
-//! LPG-td, `ELBOWROOM_PYTHON` a Python that has unified-planning and up-aries.
+//! Third-party planners, if they are installed: `ELBOWROOM_LPG` is the path of LPG-td,
+//! `ELBOWROOM_PYTHON` a Python with unified-planning and up-aries.
 #![cfg(unix)]
 
 #[path = "../../../testing/skipped.rs"]
@@ -43,7 +43,7 @@ fn problem(length: &str, deadline: u32) -> String {
     )
 }
 
-/// The report, and the plan as text.
+/// Returns the report, and the plan as text.
 fn ask(planner: &str, problem: &str, start: i64) -> (Report, Option<String>) {
     let domain = Source::new("post.pddl", DOMAIN);
     let problem = Source::new("letter.pddl", problem);
@@ -76,7 +76,7 @@ fn ask(planner: &str, problem: &str, start: i64) -> (Report, Option<String>) {
     (report, plan)
 }
 
-/// Whether the variable of the environment says where a planner is.
+/// Returns `true` if the environment variable names a planner.
 fn is_there(variable: &str) -> bool {
     let is_there = env::var_os(variable).is_some_and(|path| !path.is_empty());
     if !is_there {
@@ -101,7 +101,7 @@ fn lpg_delivers() {
     }
     let (report, plan) = ask("lpg-td", &problem("7.5", 30), 0);
     let expected = ["drive home office", "deliver office"];
-    // Its small separations are below ours; without repair that is an objection, not a plan.
+    // Its separations are smaller than ε. Without a repair, the validator objects.
     match report.outcome {
         Outcome::Plan(_) => assert_eq!(actions(plan.as_deref()), expected),
         Outcome::Refused { reason, .. } => assert!(reason.contains("0.001"), "{reason}"),

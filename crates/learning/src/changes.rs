@@ -1,59 +1,61 @@
-//! How often facts change by themselves, per second: [`learn`].
+//! Rates at which facts change by themselves, per second: [`learn`].
 //!
 //! A fact that becomes false at a rate of λ per second while it is true does so after an
-//! exponentially distributed time, whatever has been before. So it does not matter when it became
-//! true, or that somebody else ends the time in between: what counts is for how many seconds it has
-//! been true, and how often it became false by itself. The most likely rate is the one divided by
-//! the other, and given the time, the number of changes is Poisson distributed.
+//! exponentially distributed time, independently of the past. It is therefore irrelevant when the
+//! fact became true, or that an action ends that period. Only two numbers matter: the seconds for
+//! which the fact was true, and how many times it became false by itself. The maximum likelihood
+//! estimate of the rate is the second divided by the first. Given the time, the number of changes
+//! is Poisson distributed.
 
 use std::collections::BTreeMap;
 
-/// A fact of a log, in one direction.
+/// Exposure of a fact to changes in one direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exposure {
     /// The fact: `(open office)`.
     pub fact: String,
-    /// What it becomes.
+    /// Truth value after a change.
     pub becomes: bool,
-    /// For how many seconds it was the opposite, and so could become this by itself.
+    /// Time with the opposite truth value, in seconds, during which a change was possible.
     pub seconds: f64,
-    /// How often it did.
+    /// Number of changes.
     pub changes: u64,
 }
 
-/// A number of changes in a time.
+/// Number of changes and exposure time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rate {
-    /// How many changes.
+    /// Number of changes.
     pub changes: u64,
-    /// In how many seconds.
+    /// Exposure time in seconds.
     pub seconds: f64,
 }
 
-/// The facts of one predicate, in one direction.
+/// Changes of the facts of one predicate, in one direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Changes {
     /// The predicate: `open`.
     pub predicate: String,
-    /// What its facts become.
+    /// Truth value after a change.
     pub becomes: bool,
-    /// All of them together.
+    /// Rate of all facts together.
     pub all: Rate,
-    /// Each fact of which a log says something, by its name: `(open office)`.
+    /// Rate of each fact with exposure time, by its name: `(open office)`.
     pub facts: Vec<(String, Rate)>,
-    /// Whether each fact is described by itself, rather than all alike.
+    /// `true` if each fact has its own rate, instead of one rate for all.
     pub is_apart: bool,
 }
 
 impl Rate {
-    /// The most likely rate, per second; `None` where there was no time.
+    /// Returns the maximum likelihood estimate of the rate, per second; `None` without exposure
+    /// time.
     pub fn per_second(self) -> Option<f64> {
         (self.seconds > 0.0).then(|| float(self.changes) / self.seconds)
     }
 
-    /// An interval that holds the true rate with a probability of at least 95 % (Garwood 1936): at
-    /// its ends, so many changes or more, or so many or fewer, come about once in forty times.
-    /// `None` where there was no time.
+    /// Returns an interval that contains the true rate with a probability of at least 95 % (Garwood
+    /// 1936). At its lower end, this number of changes or more has probability 1/40, and at its
+    /// upper end, this number or fewer. `None` without exposure time.
     pub fn interval(self) -> Option<(f64, f64)> {
         const TAIL: f64 = 0.025;
         if self.seconds <= 0.0 {
@@ -71,8 +73,8 @@ impl Rate {
         Some((lower / self.seconds, upper / self.seconds))
     }
 
-    /// The logarithm of the likelihood of the most likely rate, but for what does not depend on how
-    /// facts are grouped.
+    /// Returns the log-likelihood at the estimated rate, without the terms that do not depend on
+    /// the grouping of facts.
     fn log_likelihood(self) -> f64 {
         match self.per_second() {
             Some(rate) if rate > 0.0 => float(self.changes) * (rate.ln() - 1.0),
@@ -81,7 +83,7 @@ impl Rate {
     }
 }
 
-/// Whether as many changes as `count` come about, of a Poisson distribution.
+/// Poisson probabilities of a number of changes.
 struct Counts {
     count: u64,
     /// ln(count!)
@@ -96,13 +98,13 @@ impl Counts {
         }
     }
 
-    /// P(so many or fewer), given their mean.
+    /// Returns P(X ≤ count) for a Poisson variable X with this mean.
     fn at_most(&self, mean: f64) -> f64 {
         if mean <= 0.0 {
             return 1.0;
         }
         let own = (float(self.count) * mean.ln() - mean - self.log_factorial).exp();
-        // From the own term away from the mean, where terms become smaller.
+        // Sums from the term of `count` away from the mean, so that terms decrease.
         if float(self.count) < mean {
             let mut sum = 0.0;
             let mut term = own;
@@ -130,7 +132,8 @@ impl Counts {
     }
 }
 
-/// Up to where a condition on the mean holds, that holds near 0 and no more from some mean on.
+/// Returns the greatest mean for which `holds` is true. `holds` must be true near 0 and false from
+/// some mean on.
 fn root(count: u64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, float(count).max(1.0));
     while holds(high) {
@@ -148,9 +151,10 @@ fn root(count: u64, holds: impl Fn(f64) -> bool) -> f64 {
     high
 }
 
-/// What logs say about changes: predicates of which a fact has changed by itself, in both
-/// directions, by name. Facts of a predicate are described together, or each by itself, by Akaike's
-/// criterion: each rate more has to make the logs e times as likely.
+/// Estimates rates for predicates with at least one fact that has changed by itself, in both
+/// directions, sorted by name. Akaike's criterion decides if the facts of a predicate share one
+/// rate or have separate rates: each additional rate must increase the log-likelihood by more than
+/// 1.
 pub fn learn(exposures: &[Exposure]) -> Vec<Changes> {
     let mut found: BTreeMap<(&str, bool), BTreeMap<&str, Rate>> = BTreeMap::new();
     for exposure in exposures {
@@ -194,7 +198,7 @@ pub fn learn(exposures: &[Exposure]) -> Vec<Changes> {
 }
 
 impl Changes {
-    /// The changes and the time on which the rate of a fact rests.
+    /// Returns the changes and the exposure time for the estimate of a fact's rate.
     pub fn rate_of(&self, fact: &str) -> Rate {
         let own = self.facts.iter().find(|(name, _)| name == fact);
         match own {
@@ -203,8 +207,7 @@ impl Changes {
         }
     }
 
-    /// The rate of each fact, whether they are described together or apart; those that never change
-    /// have none.
+    /// Returns the rates of all facts that have a positive one.
     pub fn rates(&self) -> impl Iterator<Item = (&str, f64)> {
         let facts = self.facts.iter().filter_map(|(fact, _)| {
             let rate = self.rate_of(fact).per_second()?;
@@ -260,8 +263,8 @@ mod tests {
         assert!((low - 998.04).abs() < 0.01 && (high - 1001.96).abs() < 0.01);
     }
 
-    /// Of 20, 50 and 200 traces of half a minute, at three rates, the interval holds the true rate at
-    /// least as often as it says, but for three standard errors of 2,000 tries.
+    /// For 20, 50 and 200 traces of half a minute, at three rates, the interval contains the true
+    /// rate at least as often as stated, up to three standard errors of 2,000 samples.
     #[test]
     fn intervals_hold_the_true_rate_as_often_as_they_say() {
         const TRIES: u32 = 2_000;

@@ -1,14 +1,14 @@
-//! Intervals that hold a value to come with a stated probability, whatever its distribution: split
+//! Intervals that contain the next value with a stated probability, for any distribution: split
 //! conformal prediction (Vovk, Gammerman & Shafer 2005; Lei et al. 2018).
 //!
-//! The only assumption is that the values, past and to come, are exchangeable.
+//! The only assumption is that past and future values are exchangeable.
 
 use crate::survival::{Sample, float};
 
 /// An interval around a nominal value; an end may be infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
-    /// The value that is planned.
+    /// The planned value.
     pub nominal: f64,
     /// The lower end, at most `nominal`.
     pub lower: f64,
@@ -17,7 +17,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// The band with both sides stretched by the same factor.
+    /// Returns the band with both sides multiplied by `factor`.
     #[must_use]
     pub fn stretched(self, factor: f64) -> Self {
         let side = |side: f64| if side == 0.0 { 0.0 } else { side * factor };
@@ -28,11 +28,12 @@ impl Band {
         }
     }
 
-    /// By how much the band must be stretched at least to hold the value, whatever it is if it was
-    /// cut off. Infinite if no stretching does.
+    /// Returns the least stretching factor that makes the band contain the value. For a censored
+    /// sample, the band must contain every possible value. Infinite if no factor suffices.
     pub fn score(&self, sample: Sample) -> f64 {
         if sample.is_censored {
-            // It may be anything greater: as far below as it was seen, and any distance above.
+            // The value may be any greater one: the score below is that of the bound, and the
+            // distance above is unlimited.
             let above = if self.upper.is_infinite() {
                 0.0
             } else {
@@ -59,9 +60,9 @@ impl Band {
     }
 }
 
-/// The factor by which a band must be stretched so that it holds the next value with probability `1 -
-/// miss`: the ⌈(n + 1)(1 − miss)⌉-th smallest score of the calibration samples. Infinite if there are too
-/// few of them ([`fewest`]).
+/// Returns the stretching factor that makes a band contain the next value with probability `1 -
+/// miss`: the ⌈(n + 1)(1 − miss)⌉-th smallest score of the calibration samples. Infinite if there
+/// are fewer than [`fewest`].
 pub fn factor(band: Band, calibration: &[Sample], miss: f64) -> f64 {
     let mut scores: Vec<f64> = calibration
         .iter()
@@ -81,7 +82,7 @@ pub fn factor(band: Band, calibration: &[Sample], miss: f64) -> f64 {
     scores.get(rank - 1).copied().unwrap_or(f64::INFINITY)
 }
 
-/// How many calibration samples [`factor`] needs for a finite answer.
+/// Returns the number of calibration samples that [`factor`] needs for a finite result.
 pub fn fewest(miss: f64) -> usize {
     if miss <= 0.0 {
         return usize::MAX;
@@ -95,9 +96,9 @@ pub fn fewest(miss: f64) -> usize {
     fewest
 }
 
-/// How a probability of failure is divided among bands: each gets a share in proportion to how
-/// often the training samples lie outside its band, counted with one miss more, so that each share
-/// is positive. The shares add up to `miss`.
+/// Divides a probability of failure among bands. Each share is proportional to the fraction of the
+/// training samples outside its band, with one miss added so that it is positive. The shares add up
+/// to `miss`.
 pub fn allotment(bands: &[(Band, Vec<Sample>)], miss: f64) -> Vec<f64> {
     let weights: Vec<f64> = bands
         .iter()
@@ -127,7 +128,7 @@ mod tests {
             lower: 0.0,
             upper: 3.0,
         };
-        // Heavy upper tail.
+        // A distribution with a heavy upper tail.
         let mut draw = || Sample::observed(1.0 / rng.random::<f64>().max(1e-9));
         for (count, miss) in [(20, 0.1), (50, 0.05), (200, 0.2)] {
             let trials = 4_000;
@@ -138,7 +139,7 @@ mod tests {
                 hits += usize::from(band.score(draw()) <= factor);
             }
             let rate = float(hits) / float(trials);
-            // Three standard deviations of the sampling.
+            // Three standard deviations of the sampling error.
             let slack = 3.0 * (miss * (1.0 - miss) / float(trials)).sqrt();
             assert!(rate >= 1.0 - miss - slack, "{count} {miss}: {rate}");
             assert!(

@@ -1,8 +1,8 @@
-//! An alarm when values no longer come from where they came from before: a conformal test
-//! martingale (Vovk 2021, the *simple jumper*).
+//! Detection of changes in the distribution of values: a conformal test martingale (Vovk 2021, the
+//! *simple jumper*).
 //!
-//! While the values are exchangeable, the martingale reaches 1/δ with a probability of at most δ,
-//! however long one goes on (Ville's inequality). That is why it can be looked at after each value.
+//! While the values are exchangeable, the martingale ever reaches 1/δ with a probability of at most
+//! δ (Ville's inequality). It may therefore be tested after each value.
 
 use rand::Rng;
 
@@ -11,19 +11,19 @@ use crate::survival::float;
 /// Evidence in the values so far that their distribution has changed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drift {
-    /// The largest value of the martingale: so many to one that the values have drifted.
+    /// The largest value of the martingale: the odds that the values have drifted.
     pub evidence: f64,
     /// The position, from 0, of the value at which the evidence first reached the limit.
     pub since: Option<usize>,
 }
 
-/// How often the bet changes direction.
+/// Fraction of the capital that is redistributed among the directions in each step.
 const JUMPING: f64 = 0.01;
 
-/// Looks at values in the order in which they came. The alarm is raised where the evidence reaches
-/// `limit`: with 100, in one of a hundred sequences without drift at most.
+/// Tests values in order of observation. The alarm is raised when the evidence reaches `limit`:
+/// with 100, in at most 1 % of the sequences without drift.
 ///
-/// Equal values are told apart by chance, which `rng` provides.
+/// Ties are broken randomly with `rng`.
 pub fn drift(values: &[f64], limit: f64, rng: &mut impl Rng) -> Drift {
     let mut sorted: Vec<f64> = Vec::with_capacity(values.len());
     let mut capital = [1.0 / 3.0; 3];
@@ -47,7 +47,7 @@ pub fn drift(values: &[f64], limit: f64, rng: &mut impl Rng) -> Drift {
         if drift.since.is_none() && total >= limit {
             drift.since = Some(position);
         }
-        // Nothing is gained by betting on.
+        // The evidence is sufficient.
         if total > 1e12 {
             break;
         }
@@ -71,7 +71,7 @@ mod tests {
             let values: Vec<f64> = (0..200).map(|_| rng.random::<f64>().powi(3)).collect();
             alarms += usize::from(drift(&values, 20.0, &mut rng).since.is_some());
         }
-        // At most one in twenty, and some sampling error.
+        // At most 5 %, plus sampling error.
         assert!(alarms <= 70, "{alarms}");
     }
 

@@ -1,42 +1,42 @@
-//! Distributions fitted to right-censored samples by maximum likelihood, and the choice among
-//! families.
+//! Maximum likelihood fits of distributions to right-censored samples, and the choice of a family.
 
 use elbowroom_sim::Distribution;
 
 use crate::survival::{Sample, SurvivalFunction, float};
 
-/// A distribution, and how well it explains the samples.
+/// A distribution with its goodness of fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
     /// The distribution.
     pub distribution: Distribution,
     /// Its mean.
     pub mean: f64,
-    /// The standard error of the mean; `None` where the family has none.
+    /// The standard error of the mean; `None` if the family provides none.
     pub standard_error: Option<f64>,
-    /// The logarithm of the probability of the samples, counted in steps of the resolution.
+    /// The logarithm of the probability of the samples, for intervals of the width of the
+    /// resolution.
     pub log_likelihood: f64,
-    /// Akaike's criterion, corrected for small samples (Hurvich & Tsai 1989): less is better.
+    /// Akaike's criterion, corrected for small samples (Hurvich & Tsai 1989); lower is better.
     pub aicc: f64,
-    /// Whether the distance to the product-limit estimate is larger than chance explains at the 1 %
-    /// level (Lilliefors's limit for large samples, 1.035 / √n).
+    /// `true` if the distance to the product-limit estimate is significant at the 1 % level
+    /// (Lilliefors's limit for large samples, 1.035 / √n).
     pub is_doubtful: bool,
 }
 
-/// Lilliefors's limit at the 1 % level for large samples, times √n. It is meant for normal
-/// distributions with fitted parameters, and is taken for the others too.
+/// Lilliefors's limit at the 1 % level for large samples, times √n. It was derived for normal
+/// distributions with fitted parameters, and is used for the other families as well.
 const LILLIEFORS: f64 = 1.035;
 
-/// The fewest observed values for which a family can be called doubtful.
+/// Minimum number of observed values for the test of a family.
 const FEWEST_TO_DOUBT: usize = 20;
 
-/// The family that explains the samples best: constant, normal, lognormal or uniform, by the
-/// corrected criterion of Akaike. If even that one is doubtful, and nothing was cut off beyond the
-/// values that were observed, the observed values themselves.
+/// Returns the family with the best corrected Akaike criterion: constant, normal, lognormal or
+/// uniform. If that family is doubtful and no sample was censored above the observed values,
+/// returns the empirical distribution.
 ///
-/// Probabilities are those of the interval of the width `resolution` around a value, so that values
-/// that are all equal have probability 1 in a constant distribution. `None` if nothing was observed
-/// to its end.
+/// Probabilities are those of the interval of width `resolution` around a value, so that equal
+/// values have probability 1 in a constant distribution. Returns `None` if all samples are
+/// censored.
 pub fn best(samples: &[Sample], resolution: f64) -> Option<Fit> {
     let fits = [
         constant(samples, resolution),
@@ -69,7 +69,7 @@ fn cut_off(samples: &[Sample]) -> impl Iterator<Item = f64> + Clone + '_ {
     censored.map(|sample| sample.value)
 }
 
-/// The log-likelihood of a distribution with this density and survival function.
+/// Returns the log-likelihood of a distribution with this density and survival function.
 fn log_likelihood(
     samples: &[Sample],
     resolution: f64,
@@ -111,7 +111,7 @@ fn fit(
     }
 }
 
-/// The largest distance between a survival function and the product-limit estimate.
+/// Returns the largest distance between a survival function and the product-limit estimate.
 fn distance(samples: &[Sample], survival: impl Fn(f64) -> f64) -> f64 {
     let estimate = SurvivalFunction::of(samples);
     let mut before = 1.0;
@@ -124,7 +124,7 @@ fn distance(samples: &[Sample], survival: impl Fn(f64) -> f64) -> f64 {
     most
 }
 
-/// All observed values are equal, and nothing is known to be greater.
+/// Fits a constant: all observed values must be equal, and no censored one greater.
 fn constant(samples: &[Sample], resolution: f64) -> Option<Fit> {
     let value = observed(samples).next()?;
     let is_same = observed(samples).all(|other| (other - value).abs() <= resolution / 2.0);
@@ -137,7 +137,7 @@ fn constant(samples: &[Sample], resolution: f64) -> Option<Fit> {
         mean: value,
         standard_error: None,
         log_likelihood: 0.0,
-        // One parameter; with a single sample there is nothing better.
+        // One parameter. With at most two samples, no family is better.
         aicc: if samples.len() > 2 {
             aicc(0.0, 1, samples.len())
         } else {
@@ -167,7 +167,7 @@ fn lognormal(samples: &[Sample], resolution: f64) -> Option<Fit> {
     if observed(samples).any(|value| value <= 0.0) {
         return None;
     }
-    // What was cut off at 0 or below says nothing.
+    // A sample censored at 0 or below contains no information.
     let logarithms: Vec<Sample> = samples
         .iter()
         .filter(|sample| sample.value > 0.0)
@@ -192,7 +192,7 @@ fn lognormal(samples: &[Sample], resolution: f64) -> Option<Fit> {
         return None;
     }
     let distribution = Distribution::LogNormal { mean, deviation };
-    // By the delta method, the scale taken as known.
+    // By the delta method, with the scale treated as known.
     let error = Some(mean * error);
     Some(fit(
         samples,
@@ -204,7 +204,8 @@ fn lognormal(samples: &[Sample], resolution: f64) -> Option<Fit> {
     ))
 }
 
-/// From the least observed value to the greatest; cut-off values must lie below that.
+/// Fits a uniform distribution between the least and the greatest observed value. Censored values
+/// must lie below the greatest.
 fn uniform(samples: &[Sample], resolution: f64) -> Option<Fit> {
     let from = observed(samples).reduce(f64::min)?;
     let to = observed(samples).reduce(f64::max)?;
@@ -226,10 +227,11 @@ fn uniform(samples: &[Sample], resolution: f64) -> Option<Fit> {
     ))
 }
 
-/// The observed values, each as often as the product-limit estimate says: a value that stands for
-/// others that were cut off counts for more. `None` if some were cut off beyond the greatest one.
+/// Returns the empirical distribution, weighted by the product-limit estimate: a value after
+/// censored ones has a greater weight. Returns `None` if a sample was censored above the greatest
+/// value.
 fn empirical(samples: &[Sample]) -> Option<Fit> {
-    /// A value of the least probability stands here so many times at most.
+    /// Maximum number of copies of a value, as a multiple of the number of samples.
     const MOST_COPIES: f64 = 8.0;
     let survival = SurvivalFunction::of(samples);
     let last = survival.steps().last()?;
@@ -275,12 +277,12 @@ fn empirical(samples: &[Sample]) -> Option<Fit> {
     })
 }
 
-/// Location, scale, and the standard error of the location of a normal distribution, by maximum
-/// likelihood from right-censored samples; `None` if there are fewer than two different observed
-/// values.
+/// Returns location, scale, and the standard error of the location of a normal distribution, fitted
+/// to right-censored samples by maximum likelihood. Returns `None` with fewer than two different
+/// observed values.
 ///
-/// In the parameters 1/σ and μ/σ the log-likelihood is concave (Olsen 1978), so that Newton's
-/// method with halved steps finds its only maximum.
+/// In the parameters 1/σ and μ/σ the log-likelihood is concave (Olsen 1978), so Newton's method
+/// with step halving finds its only maximum.
 fn location_and_scale(samples: &[Sample]) -> Option<(f64, f64, f64)> {
     let n = float(observed(samples).count());
     if n < 2.0 {
@@ -288,7 +290,7 @@ fn location_and_scale(samples: &[Sample]) -> Option<(f64, f64, f64)> {
     }
     let mean = observed(samples).sum::<f64>() / n;
     let variance = observed(samples).map(|x| (x - mean).powi(2)).sum::<f64>() / n;
-    // Equal up to rounding is equal.
+    // Values that are equal up to rounding count as equal.
     if !variance.is_finite() || variance <= (mean.abs() * 1e-12).powi(2) {
         return None;
     }
@@ -377,12 +379,12 @@ fn standard_density(z: f64) -> f64 {
     (-z * z / 2.0).exp() / std::f64::consts::TAU.sqrt()
 }
 
-/// The probability that a standard normal variable is greater.
+/// Returns the probability that a standard normal variable is greater than `z`.
 pub(crate) fn upper_tail(z: f64) -> f64 {
     libm::erfc(z / std::f64::consts::SQRT_2) / 2.0
 }
 
-/// The hazard of the standard normal distribution, φ(z) / (1 − Φ(z)).
+/// Returns the hazard of the standard normal distribution, φ(z) / (1 − Φ(z)).
 fn inverse_mills(z: f64) -> f64 {
     if z > 30.0 {
         // The first terms of its asymptotic series.

@@ -1,5 +1,5 @@
-//! From attempts to rules of a world: which actions are described together, by which distributions,
-//! and how often they fail.
+//! Estimation of a world's rules from attempts: grouping of actions, distributions of durations,
+//! and failure rates.
 
 use std::collections::BTreeMap;
 
@@ -12,15 +12,14 @@ use crate::fit::{Fit, best};
 use crate::records::{Outcome, Record};
 use crate::survival::{Sample, SurvivalFunction, float};
 
-/// How to learn.
+/// Settings of the estimation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Times in the logs are multiples of this, in seconds.
+    /// Resolution of times in the logs, in seconds.
     pub resolution: f64,
-    /// The evidence at which values are said to have drifted: the reciprocal of the probability of
-    /// a false alarm.
+    /// Evidence at which drift is reported: the reciprocal of the false alarm probability.
     pub drift_limit: f64,
-    /// For telling equal values apart when looking for drift.
+    /// Random seed for breaking ties in the test for drift.
     pub seed: u64,
 }
 
@@ -39,50 +38,49 @@ impl Default for Settings {
 pub struct Learnt {
     /// The name: `drive`.
     pub name: String,
-    /// How many attempts there were.
+    /// Number of attempts.
     pub attempts: usize,
-    /// How long the actions take.
+    /// Distribution of durations.
     pub durations: Durations,
-    /// How long after the command they start; `None` where no log says, or where it is always at
-    /// once.
+    /// Delay between command and start; `None` if it is not logged, or always 0.
     pub delay: Option<Fit>,
-    /// How often they fail, of those attempts that ended by themselves.
+    /// Proportion of failures among the attempts that ended by themselves.
     pub failures: Proportion,
-    /// When they fail, if they do.
+    /// Time of failures.
     pub when: Failure,
-    /// How often what a start had changed was as before when an action had failed, of those failures of which a log tells
-    /// that. Logs of attempts alone do not.
+    /// Proportion of failures that undid the effects of the start, among those for which a log
+    /// contains the state. Tables of attempts do not contain it.
     pub undone: Proportion,
-    /// Whether their durations change from log to log.
+    /// Evidence that durations change over the logs.
     pub drift: Drift,
-    /// Whether the frequency of their failures does.
+    /// Evidence that the failure rate changes over the logs.
     pub failure_drift: Drift,
 }
 
 impl Learnt {
-    /// Whether most failures undo what the start has changed.
+    /// Returns `true` if most failures undo the effects of the start.
     pub fn is_undone(&self) -> bool {
         2 * self.undone.successes > self.undone.count
     }
 }
 
-/// How long the actions of one name take.
+/// Distributions of the durations of the actions with one name.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Durations {
-    /// Nothing was seen to its end, or there is no duration.
+    /// No duration was observed, or there is none.
     Unknown,
-    /// All alike.
+    /// One distribution for all.
     Together(Group),
-    /// As multiples of the planned duration.
+    /// One distribution of the ratio to the planned duration.
     Relative(Group),
-    /// Each ground action by itself.
+    /// One distribution for each ground action.
     Apart(BTreeMap<String, Group>),
 }
 
-/// Samples that are described by one distribution.
+/// Samples with a common distribution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group {
-    /// In the order of the logs.
+    /// The samples, in the order of the logs.
     pub samples: Vec<Sample>,
     /// The distribution.
     pub fit: Fit,
@@ -94,7 +92,7 @@ impl Group {
         Some(Self { samples, fit })
     }
 
-    /// How many samples were observed, and how many cut off.
+    /// Returns the numbers of observed and of censored samples.
     pub fn counts(&self) -> (usize, usize) {
         let censored = self.samples.iter().filter(|sample| sample.is_censored);
         let censored = censored.count();
@@ -102,11 +100,11 @@ impl Group {
     }
 }
 
-/// The fewest observed durations of each ground action for them to be described apart.
+/// Minimum number of observed durations of each ground action for separate distributions.
 const FEWEST_APART: usize = 5;
 
-/// What the attempts say, by the actions' names. They stand in the order in which they were made,
-/// log by log.
+/// Estimates the statistics of actions from attempts, sorted by name. `records` must be in the
+/// order of execution, log by log.
 pub fn learn(records: &[Record], settings: &Settings) -> Vec<Learnt> {
     let mut by_name: BTreeMap<&str, Vec<&Record>> = BTreeMap::new();
     for record in records {
@@ -127,7 +125,7 @@ fn of_name(name: &str, records: &[&Record], settings: &Settings) -> Learnt {
     let mut durations = durations(records, Outcome::is_whole, settings);
     let when = when(records, &durations, settings);
     if when == Failure::AtEnd {
-        // What fails at its end has shown how long it takes.
+        // An attempt that fails at its end also shows the duration.
         let shows = |outcome: Outcome| outcome.is_whole() || outcome == Outcome::Failed;
         durations = self::durations(records, shows, settings);
     }
@@ -152,14 +150,13 @@ fn of_name(name: &str, records: &[&Record], settings: &Settings) -> Learnt {
 }
 
 impl Outcome {
-    /// Whether the action was seen to its end.
+    /// Returns `true` if the action was observed until its end.
     fn is_whole(self) -> bool {
         self == Self::Succeeded
     }
 }
 
-/// How long an attempt took, or at least took; `None` of one that never started, and of
-/// instantaneous actions.
+/// Returns the duration of an attempt, or a lower bound of it; `None` if it never started.
 fn sample(record: &Record, is_whole: impl Fn(Outcome) -> bool) -> Option<Sample> {
     let duration = record.end - record.start?;
     let sample = if is_whole(record.outcome) {
@@ -180,7 +177,7 @@ fn durations(
         .iter()
         .filter_map(|record| Some((*record, sample(record, is_whole)?)))
         .collect();
-    // Actions without any duration have none to learn.
+    // Instantaneous actions have no durations to learn.
     if all
         .iter()
         .all(|(record, sample)| sample.value <= 0.0 && record.planned.is_none())
@@ -199,14 +196,16 @@ fn durations(
         .collect();
     if let Some(relative) = relative {
         let samples = relative.iter().map(|(sample, _)| *sample).collect();
-        // A step of the resolution is a different share of each planned duration.
+        // The resolution, relative to the planned durations, differs between attempts; this is
+        // their mean.
         let mean = relative
             .iter()
             .map(|(_, planned)| planned.ln())
             .sum::<f64>()
             / float(all.len());
         if let Some(group) = Group::of(samples, resolution / mean.exp()) {
-            // With equal criteria multiples are preferred: they also fit what was not seen yet.
+            // At equal criteria, ratios are preferred, because they also apply to actions not
+            // observed yet.
             if group.fit.aicc <= best.0 {
                 best = (group.fit.aicc, Durations::Relative(group));
             }
@@ -236,7 +235,7 @@ fn durations(
 }
 
 impl Durations {
-    /// The group that says how long an action takes, and the unit of its samples in seconds.
+    /// Returns the group with the duration of an action, and the unit of its samples in seconds.
     pub fn of(&self, action: &str, planned: f64) -> Option<(&Group, f64)> {
         match self {
             Self::Unknown => None,
@@ -246,7 +245,7 @@ impl Durations {
         }
     }
 
-    /// The observed values, group by group; within a group in the order of the logs.
+    /// Returns the observed values, group by group, in the order of the logs within a group.
     fn in_order(&self) -> Vec<f64> {
         let observed = |group: &Group| {
             let observed = group.samples.iter().filter(|sample| !sample.is_censored);
@@ -273,9 +272,9 @@ fn delay(records: &[&Record], settings: &Settings) -> Option<Fit> {
     best(&delays, settings.resolution)
 }
 
-/// When the failed attempts failed: most of them before they had started, or at once; or else,
-/// whichever of *at the end* and *at a moment of the duration, all alike* makes the observed times
-/// likelier.
+/// Returns the time of failures: the start if most attempts failed before or at their start.
+/// Otherwise it is the end if attempts failed on average after more than 3/4 of the mean duration,
+/// or else a uniformly distributed moment.
 fn when(records: &[&Record], durations: &Durations, settings: &Settings) -> Failure {
     let failed: Vec<(&str, f64, Option<f64>)> = records
         .iter()
@@ -296,8 +295,8 @@ fn when(records: &[&Record], durations: &Durations, settings: &Settings) -> Fail
             Failure::AtStart
         };
     }
-    // How far into its duration an attempt failed, in units of the mean duration: at the end, that
-    // is about 1, and midway about 1/2.
+    // Time of each failure as a fraction of the mean duration: about 1 at the end, and about 1/2 in
+    // the middle.
     let shares: Vec<f64> = failed
         .iter()
         .filter(|(_, duration, _)| *duration > settings.resolution)
@@ -316,7 +315,7 @@ fn when(records: &[&Record], durations: &Durations, settings: &Settings) -> Fail
     }
 }
 
-/// The mean of the observed part of a distribution.
+/// Returns the mean of the observed part of a distribution.
 fn mean(survival: &SurvivalFunction) -> Option<f64> {
     let mut before = 1.0;
     let mut sum = 0.0;
@@ -327,7 +326,7 @@ fn mean(survival: &SurvivalFunction) -> Option<f64> {
     (before < 1.0).then(|| sum / (1.0 - before))
 }
 
-/// A distribution that always has the same value, and that value.
+/// Returns the value of a distribution with only one value.
 pub(crate) fn constant(distribution: &Distribution) -> Option<f64> {
     match distribution {
         Distribution::Constant(value) => Some(*value),

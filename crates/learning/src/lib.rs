@@ -1,16 +1,14 @@
-//! What logs of executed plans say about the world: how long actions take, how late they start, how
-//! often they fail, whether that changes, and within which limits the next run will stay.
+//! Estimation of a world's behaviour from logs: durations, start delays, failure rates, their
+//! drift, and prediction intervals.
 //!
 //! - [`records`]: attempts to execute actions, from traces of runs; [`table`]: the same from CSV.
-//! - [`survival`], [`fit`]: distributions from samples of which some were cut off, because the
-//!   action was cancelled or failed (right-censored); leaving these out would make slow actions
-//!   look quick.
-//! - [`changes`]: how often facts change by themselves, per second.
-//! - [`learn`]: which actions are described together, and by what; [`world`]: the result as a world
-//!   file.
-//! - [`conformal`]: intervals that hold the next value with a stated probability, whatever its
+//! - [`survival`], [`fit`]: distributions from right-censored samples, whose actions were cancelled
+//!   or failed. Without these samples, slow actions would seem fast.
+//! - [`changes`]: rates at which facts change by themselves, per second.
+//! - [`learn`]: grouping of actions and their distributions; [`world`]: the result as a world file.
+//! - [`conformal`]: intervals that contain the next value with a stated probability, for any
 //!   distribution.
-//! - [`drift`]: an alarm when values no longer come from where they came from.
+//! - [`drift`]: detection of changes in the distribution of values.
 //!
 //! ```
 //! use elbowroom_learning::learn::{Settings, learn};

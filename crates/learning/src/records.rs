@@ -1,4 +1,4 @@
-//! What was done, start by start, as logs tell it.
+//! Attempts to execute actions, extracted from logs.
 
 use std::collections::BTreeMap;
 
@@ -6,17 +6,17 @@ use elbowroom_num::Rational;
 use elbowroom_report::trace::line::{GivenLine, ObservationLine};
 use elbowroom_report::trace::{Line, Stored};
 
-/// How an attempt to do something ended.
+/// Outcome of an attempt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
-    /// As it should.
+    /// The action succeeded.
     Succeeded,
-    /// Without success, whether by chance or because a condition of it did not hold: logs tell that
-    /// in free text only.
+    /// The action failed, by chance or because a condition did not hold: logs give the reason in
+    /// free text only.
     Failed,
-    /// Because it was told to.
+    /// The action was cancelled.
     Cancelled,
-    /// Not before the log did.
+    /// The action was running at the end of the log.
     Running,
 }
 
@@ -25,28 +25,27 @@ pub enum Outcome {
 pub struct Record {
     /// The action with its objects: `(drive rover depot shelf)`.
     pub action: String,
-    /// When it was commanded, in seconds; `None` where the log does not say.
+    /// Time of the command, in seconds; `None` if it is not logged.
     pub commanded: Option<f64>,
-    /// When it started; `None` if it never did.
+    /// Start time; `None` if it never started.
     pub start: Option<f64>,
-    /// When it ended, or the log did.
+    /// End time, or the end of the log.
     pub end: f64,
-    /// How it ended.
+    /// Outcome.
     pub outcome: Outcome,
-    /// How long it was planned to take; `None` where the log does not say, and for instantaneous
-    /// actions.
+    /// Planned duration; `None` if it is not logged, and for instantaneous actions.
     pub planned: Option<f64>,
 }
 
 impl Record {
-    /// The name of the action, without its objects.
+    /// Returns the name of the action, without its objects.
     pub fn name(&self) -> &str {
         let inner = self.action.trim_matches(['(', ')']);
         inner.split_whitespace().next().unwrap_or_default()
     }
 }
 
-/// A start whose end has not been seen yet.
+/// A start without an observed end.
 struct Open {
     action: String,
     commanded: f64,
@@ -54,9 +53,9 @@ struct Open {
     start: Option<f64>,
 }
 
-/// The starts of a trace, in the order of the commands. What was observed and not taken at its word
-/// is left out. An action whose start was never reported has started when it was commanded, if it
-/// ended at all.
+/// Returns the starts of a trace, in the order of the commands. Observations that the run ignored
+/// are omitted. If the start of a successful action was not reported, it is the time of the
+/// command.
 pub fn of_trace(trace: &Stored) -> Vec<Record> {
     let mut open: BTreeMap<u64, Open> = BTreeMap::new();
     let mut records: Vec<(u64, Record)> = Vec::new();
@@ -85,7 +84,7 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
                 Some(ObservationLine::Started { ticket, time, .. }) => {
                     let commanded = open.get(ticket).map_or(0.0, |open| open.commanded);
                     let time = float(&time.0).max(commanded);
-                    // What takes no time is done when it has started; no end is reported.
+                    // An instantaneous action is complete at its start. No end is reported.
                     let is_instantaneous =
                         open.get(ticket).is_some_and(|open| open.planned.is_none());
                     if let Some(started) = open.get_mut(ticket) {

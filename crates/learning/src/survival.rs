@@ -1,17 +1,17 @@
-//! Right-censored samples: values that were observed, and values of which only a lower bound is
-//! known, because the action was cancelled or failed before it could end.
+//! Right-censored samples: observed values, and lower bounds of values whose actions were cancelled
+//! or failed before they ended.
 
-/// One value, or a lower bound of one.
+/// A value, or a lower bound of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// The value, or what it is greater than.
+    /// The value, or its lower bound.
     pub value: f64,
-    /// Whether `value` is only a lower bound (right-censored).
+    /// `true` if `value` is only a lower bound (right-censored).
     pub is_censored: bool,
 }
 
 impl Sample {
-    /// A value that was observed.
+    /// Creates a sample of an observed value.
     pub fn observed(value: f64) -> Self {
         Self {
             value,
@@ -19,7 +19,7 @@ impl Sample {
         }
     }
 
-    /// A value that is greater than this.
+    /// Creates a sample that is greater than `value`.
     pub fn censored(value: f64) -> Self {
         Self {
             value,
@@ -27,7 +27,7 @@ impl Sample {
         }
     }
 
-    /// The sample in another unit.
+    /// Returns the sample in another unit.
     #[must_use]
     pub fn over(self, unit: f64) -> Self {
         Self {
@@ -45,10 +45,10 @@ pub struct SurvivalFunction {
 }
 
 impl SurvivalFunction {
-    /// The estimate from these samples, which must be finite.
+    /// Computes the estimate from these samples, which must be finite.
     pub fn of(samples: &[Sample]) -> Self {
         let mut sorted = samples.to_vec();
-        // At the same value, what was observed comes before what was cut off there.
+        // At equal values, observed samples come before censored ones.
         sorted.sort_by(|a, b| {
             let order = a.value.total_cmp(&b.value);
             order.then(a.is_censored.cmp(&b.is_censored))
@@ -73,7 +73,7 @@ impl SurvivalFunction {
         Self { steps }
     }
 
-    /// The probability of a greater value.
+    /// Returns the probability of a greater value.
     pub fn at(&self, value: f64) -> f64 {
         let after = self.steps.partition_point(|(step, _)| *step <= value);
         match after {
@@ -82,7 +82,7 @@ impl SurvivalFunction {
         }
     }
 
-    /// The observed values in increasing order, each with the probability of being greater.
+    /// Returns the observed values in increasing order, each with the probability of being greater.
     pub fn steps(&self) -> &[(f64, f64)] {
         &self.steps
     }
@@ -103,8 +103,8 @@ mod tests {
 
     #[test]
     fn a_worked_example_by_hand() {
-        // At 3 one of 5 ends, at 5 one of 3 (4 was cut off), at 8 the last one that is left but
-        // one.
+        // One of 5 ends at 3, one of 3 at 5 (4 is censored), and the last one at 8 (the other 5 is
+        // censored).
         let samples = [
             Sample::observed(3.0),
             Sample::censored(4.0),

@@ -1,19 +1,19 @@
-//! Logs as tables: CSV with a header, one attempt a row (`docs/formats/log-csv.md`).
+//! Logs as tables: CSV with a header, one attempt per row (`docs/formats/log-csv.md`).
 
 use elbowroom_text::{Diagnostic, Diagnostics, Report, Severity, Source, Span, nearest};
 
 use crate::records::{Outcome, Record};
 
-/// The columns that must be there, in any order.
+/// Required columns, in any order.
 const NEEDED: [&str; 4] = ["action", "start", "end", "outcome"];
-/// The columns that may be there.
+/// Optional columns.
 const OPTIONAL: [&str; 2] = ["commanded", "planned"];
 const OUTCOMES: [&str; 4] = ["succeeded", "failed", "cancelled", "running"];
 
 /// Reads a table.
 ///
 /// # Errors
-/// All mistakes, with their places.
+/// All errors, with their positions.
 pub fn read(source: &Source) -> Result<Vec<Record>, Diagnostics> {
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
@@ -49,7 +49,7 @@ pub fn read(source: &Source) -> Result<Vec<Record>, Diagnostics> {
     report.finish(Some(records)).map(|(records, _)| records)
 }
 
-/// Where each column stands.
+/// Position of each column.
 struct Columns {
     action: usize,
     start: usize,
@@ -141,7 +141,7 @@ fn record(columns: &Columns, row: &csv::StringRecord) -> Result<Record, String> 
     })
 }
 
-/// The action as plans write it: in parentheses, lower case, one space between words.
+/// Normalises the action to the form in plans: parentheses, lower case, single spaces.
 fn action(text: &str) -> Result<String, String> {
     let inner = text
         .strip_prefix('(')

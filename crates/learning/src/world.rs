@@ -1,4 +1,4 @@
-//! What was learnt, as a world file (`docs/formats/world.md`).
+//! Learnt model as a world file (`docs/formats/world.md`).
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -11,7 +11,7 @@ use crate::changes::{Changes, Rate};
 use crate::fit::Fit;
 use crate::learn::{Durations, Group, Learnt, constant};
 
-/// The world file, with a comment on each section that says on what it rests.
+/// Writes the world file. A comment on each section states the data on which it is based.
 pub fn write(learnt: &[Learnt], changes: &[Changes], resolution: f64) -> String {
     let mut text = String::from("format = \"elbowroom-world\"\nversion = 1\n");
     let _ = writeln!(text, "resolution = {}", Value::Float(resolution));
@@ -29,8 +29,8 @@ pub fn write(learnt: &[Learnt], changes: &[Changes], resolution: f64) -> String 
     text
 }
 
-/// The rates of a predicate's facts: one section for all, or one for each, as soon as one direction
-/// is described fact by fact; what a section says of both directions counts.
+/// Writes the rates of a predicate's facts: one section for all facts, or one for each fact if at
+/// least one direction has separate rates. A section contains the rates of both directions.
 fn hazards(text: &mut String, changes: &[Changes]) {
     let mut section = |fact: &str, rates: &[(bool, Rate)]| {
         let changing = rates.iter().filter(|(_, rate)| rate.changes > 0);
@@ -83,7 +83,7 @@ fn durations(text: &mut String, learnt: &Learnt) {
             );
         }
         Durations::Relative(group) => {
-            // As planned needs no rule.
+            // Durations as planned need no rule.
             let is_as_planned =
                 constant(&group.fit.distribution).is_some_and(|share| (share - 1.0).abs() < 1e-9);
             if !is_as_planned {
@@ -197,7 +197,7 @@ fn section(
             let values = values.iter().map(|value| Value::Float(*value)).collect();
             push(text, "values", Value::Array(values));
         }
-        // Nothing here is fitted by these.
+        // These families are never fitted here.
         Distribution::Exponential { .. } | Distribution::Gamma { .. } => {}
     }
     if is_relative {

@@ -1,5 +1,5 @@
-//! What was true while a plan was executed, and which values numbers had: what the executor
-//! believed, worked out again from what was reported.
+//! State during a run: the executor's beliefs about facts and numbers, recomputed from the reports
+//! in the trace.
 
 mod limits;
 
@@ -17,27 +17,27 @@ use elbowroom::report::short::nearest;
 use crate::document::{Change, SeriesLine, Texts};
 use limits::{Allowed, Limits};
 
-/// At most so many points are kept of one number, so that a long run's page stays small.
+/// Maximum number of points kept for each number, so that the page of a long run stays small.
 const MOST_POINTS: usize = 20_000;
 
-/// The state during a run.
+/// Believed state during a run, with its history.
 pub(crate) struct Belief<'t> {
     task: &'t Arc<Task>,
     progression: Progression,
-    /// The facts as they were last observed.
+    /// Facts at the last call of [`Belief::note`].
     facts: Vec<bool>,
-    /// The values then, by fluent.
+    /// Values at the last call of [`Belief::note`], by fluent.
     values: Vec<Option<Rational>>,
     /// The changes so far.
     changes: Vec<Change>,
-    /// The numbers so far: time and value.
+    /// Points of each number so far: time and value.
     numbers: BTreeMap<FluentId, Vec<(Rational, Rational)>>,
-    /// Which numbers were allowed.
+    /// Limits that conditions impose on numbers.
     limits: Limits,
 }
 
 impl<'t> Belief<'t> {
-    /// Before anything has happened.
+    /// Creates the initial state.
     pub(crate) fn new(task: &'t Arc<Task>, texts: &mut Texts) -> Self {
         let progression = Progression::new(Arc::clone(task));
         let mut belief = Self {
@@ -53,7 +53,7 @@ impl<'t> Belief<'t> {
         belief
     }
 
-    /// Time passes.
+    /// Advances the state to the time `to`.
     pub(crate) fn advance(&mut self, to: &Rational, texts: &mut Texts) {
         let past: Vec<Rational> = self
             .task
@@ -64,14 +64,14 @@ impl<'t> Belief<'t> {
             .collect();
         for time in past.iter().chain([to]) {
             if time > self.progression.time() {
-                // A number without a value moves nowhere; there is nothing to show of it.
+                // An error means that a number has no value. Such a number is not shown.
                 let _ = self.progression.advance(time);
                 self.note(texts);
             }
         }
     }
 
-    /// An action that was told to last so long has started.
+    /// Records the start of an action with this planned duration.
     pub(crate) fn started(
         &mut self,
         ticket: u64,
@@ -98,7 +98,7 @@ impl<'t> Belief<'t> {
         self.note(texts);
     }
 
-    /// Anything else was reported.
+    /// Records an observation other than a start.
     pub(crate) fn reported(&mut self, observation: &ObservationLine, texts: &mut Texts) {
         match observation {
             ObservationLine::Ended {
@@ -156,7 +156,7 @@ impl<'t> Belief<'t> {
         self.note(texts);
     }
 
-    /// The changes, and each number that has changed as a line.
+    /// Returns the changes, and a line for each number that has changed.
     pub(crate) fn finish(self) -> (Vec<Change>, Vec<SeriesLine>) {
         let changed = self.numbers.into_iter().filter(|(_, points)| {
             let first = points.first().map(|(_, value)| value);
@@ -189,7 +189,7 @@ impl<'t> Belief<'t> {
             .collect()
     }
 
-    /// Notes what has changed since it last did.
+    /// Records the changes since the last call.
     fn note(&mut self, texts: &mut Texts) {
         let time = self.progression.time().clone();
         let at = time.to_f64();
@@ -219,7 +219,7 @@ impl<'t> Belief<'t> {
             let is_moving = self.is_moving(fluent);
             let points = self.numbers.entry(fluent).or_default();
             if points.len() < MOST_POINTS {
-                // Until just now it was what it was.
+                // The number jumps: it had the previous value until now.
                 if let (Some(before), false) = (before, is_moving) {
                     points.push((time.clone(), before));
                 }
@@ -234,7 +234,7 @@ impl<'t> Belief<'t> {
         }
     }
 
-    /// Whether a running action changes it continuously.
+    /// Returns `true` if a running action changes the fluent continuously.
     fn is_moving(&self, fluent: FluentId) -> bool {
         self.progression.running().values().any(|underway| {
             let body = underway.action.durative();
@@ -243,7 +243,7 @@ impl<'t> Belief<'t> {
     }
 }
 
-/// A number as a line, with its extremes in words.
+/// Converts a number to a line, with its extremes as text.
 fn line(name: String, points: &[(Rational, Rational)]) -> SeriesLine {
     let values = || points.iter().map(|(_, value)| value);
     let word = |value: Option<&Rational>| value.map(nearest).unwrap_or_default();

@@ -1,6 +1,6 @@
-//! Times as other viewers count them.
+//! Conversion of times to the units of other viewers.
 
-/// Whole nanoseconds.
+/// Converts seconds to whole nanoseconds.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -1,6 +1,6 @@
-//! What a page shows, as data: what the script in the page reads.
+//! Content of a page as data, read by the script in the page.
 //!
-//! Numbers are for drawing; whatever is read is a text, and was worked out exactly.
+//! Numbers are approximate and used for drawing only. Displayed values are texts, computed exactly.
 
 use std::collections::BTreeMap;
 
@@ -20,10 +20,10 @@ pub struct Document {
     pub sections: Vec<Section>,
     /// Texts that occur often; see [`Text`].
     pub texts: Vec<String>,
-    /// Whether this is a run that is paused.
+    /// `true` for a run that is paused.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub is_paused: bool,
-    /// Pages that rows of tables lead to ([`Table::opens`]).
+    /// Subpages, linked from rows of tables ([`Table::opens`]).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub more: Vec<Document>,
 }
@@ -31,21 +31,21 @@ pub struct Document {
 /// The answer in one line.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Verdict {
-    /// How it looks.
+    /// The tone, which determines the colour.
     pub tone: Tone,
     /// The words.
     pub words: String,
 }
 
-/// How an answer is to be taken.
+/// Tone of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tone {
-    /// Yes.
+    /// Positive.
     Good,
-    /// No.
+    /// Negative.
     Bad,
-    /// Neither.
+    /// Neutral.
     Plain,
 }
 
@@ -55,7 +55,7 @@ pub enum Tone {
 pub enum Text {
     /// The text itself.
     Own(String),
-    /// Its position.
+    /// Its position in [`Document::texts`].
     Shared(usize),
 }
 
@@ -79,7 +79,7 @@ pub(crate) struct Texts {
 }
 
 impl Texts {
-    /// The text's position.
+    /// Returns a reference to the text, which is added if it is new.
     pub(crate) fn share(&mut self, text: &str) -> Text {
         if let Some(&position) = self.positions.get(text) {
             return Text::Shared(position);
@@ -107,46 +107,46 @@ pub enum Section {
     Rates(Rates),
     /// Numbers over time.
     Series(Series),
-    /// Quantities to change, and what comes of it.
+    /// Sliders for quantities, with their effects on the plan.
     Sliders(Sliders),
-    /// Where a plan works, by two quantities at a time.
+    /// Region of valid values, as a plot of two quantities.
     Plane(Plane),
     /// Sentences.
     Prose(Prose),
 }
 
-/// Actions in time, on lanes.
+/// Timeline of actions, on lanes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Chart {
     /// The heading.
     pub heading: String,
-    /// Where the time axis ends; it begins at 0.
+    /// End of the time axis, which begins at 0.
     pub end: f64,
-    /// The ways to put the actions on lanes.
+    /// The possible assignments of actions to lanes.
     pub groupings: Vec<Grouping>,
-    /// The grouping to begin with.
+    /// Position of the initial grouping.
     pub chosen: usize,
-    /// The plans, by name, if there are several; [`Bar::plan`] says which one's an action is.
+    /// Names of the plans if there are several; see [`Bar::plan`].
     pub plans: Vec<String>,
     /// The actions.
     pub bars: Vec<Bar>,
     /// Deadlines and other moments.
     pub marks: Vec<Mark>,
-    /// The orderings of the plans: positions in [`Chart::bars`], the one that comes first, and the
-    /// other.
+    /// The orderings of the plans: positions of the earlier and of the later action in
+    /// [`Chart::bars`].
     pub orderings: Vec<(usize, usize)>,
     /// The guarantee over time.
     pub guarantee: Vec<Segment>,
-    /// The changes of facts and numbers in order of time, so that the state at any time can be
-    /// shown; only of a run.
+    /// The changes of facts and numbers, in order of time; only for a run. The page uses them to
+    /// compute the state at any time.
     pub changes: Vec<Change>,
-    /// The decisions, in order of time; only of a run.
+    /// The decisions, in order of time; only for a run.
     pub decisions: Vec<DecisionAt>,
-    /// Whether the actions were executed: there is a past to look at.
+    /// `true` if the actions were executed.
     pub is_run: bool,
 }
 
-/// A way to put actions on lanes.
+/// An assignment of actions to lanes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Grouping {
     /// The kind of lane, such as `robot`.
@@ -162,63 +162,64 @@ pub struct Bar {
     pub name: String,
     /// Planned start and end; equal for an instantaneous action.
     pub planned: Option<(f64, f64)>,
-    /// Real start and end.
+    /// Observed start and end.
     pub actual: Option<(f64, f64)>,
-    /// How it came out: `succeeded`, `failed`, `cancelled`, `running`, or nothing.
+    /// Outcome: `succeeded`, `failed`, `cancelled`, `running`, or empty.
     pub outcome: &'static str,
-    /// The earliest and latest start; `None` where there is no limit.
+    /// Earliest and latest start; `None` where there is no limit.
     pub starts: Option<(Option<f64>, Option<f64>)>,
-    /// The earliest and latest end.
+    /// Earliest and latest end.
     pub ends: Option<(Option<f64>, Option<f64>)>,
     /// The lane in each grouping.
     pub lanes: Vec<usize>,
-    /// The plan that it belongs to.
+    /// Position of its plan in [`Chart::plans`].
     pub plan: usize,
     /// The details shown on hover: names and values.
     pub details: Vec<(&'static str, Text)>,
 }
 
-/// A moment.
+/// A marked moment on the time axis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mark {
-    /// When.
+    /// Time of the moment.
     pub at: f64,
     /// The happening.
     pub name: String,
-    /// Whether it is a moment of the run, not one of the problem.
+    /// `true` for an event of the run, `false` for a moment of the problem.
     pub is_event: bool,
 }
 
-/// A stretch of time with one guarantee.
+/// A period with a constant guarantee.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Segment {
-    /// From when on.
+    /// Start of the period.
     pub from: f64,
-    /// Until when.
+    /// End of the period.
     pub to: f64,
-    /// 3: all of the envelope; 2: a part of it; 1: as planned; 0: luck; -1: none is made.
+    /// Level of the guarantee. 3: whole envelope; 2: part of the envelope; 1: planned durations
+    /// only; 0: none, the plan may succeed by chance; -1: not applicable.
     pub level: i8,
     /// The guarantee in words.
     pub words: String,
 }
 
-/// A fact or a number that has changed, or an action that starts or ends.
+/// A change of a fact or a number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// When.
+    /// Time of the change.
     pub at: f64,
     /// `fact` or `number`.
     pub kind: &'static str,
-    /// Which fact, fluent or action.
+    /// Name of the fact or fluent.
     pub name: Text,
-    /// The new value; a fact that no longer holds has `None`.
+    /// New value; `None` for a fact that has become false.
     pub value: Option<String>,
 }
 
 /// A decision.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DecisionAt {
-    /// When.
+    /// Time of the decision.
     pub at: f64,
     /// The decision and its reason.
     pub words: String,
@@ -231,20 +232,20 @@ pub struct Table {
     pub heading: String,
     /// A note on it.
     pub note: String,
-    /// The columns: their headings, and whether they hold numbers.
+    /// The columns: heading, and `true` if the column holds numbers.
     pub columns: Vec<(String, bool)>,
     /// The rows.
     pub rows: Vec<Vec<Text>>,
     /// The time of each row, in ascending order, if the rows are events of a run.
     pub times: Vec<f64>,
-    /// The bar of the first chart that each row is about, if rows are about actions.
+    /// For each row, the position of its action in the bars of the first chart, if rows are about
+    /// actions.
     pub bars: Vec<usize>,
-    /// For each row, the page that it leads to, by its position in [`Document::more`], if rows lead
-    /// to pages.
+    /// For each row, the position of the linked page in [`Document::more`], if rows link to pages.
     pub opens: Vec<Option<usize>>,
 }
 
-/// Shares with their intervals.
+/// Success rates with their confidence intervals.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Rates {
     /// The heading.
@@ -255,25 +256,25 @@ pub struct Rates {
     pub groups: Vec<RateGroup>,
 }
 
-/// Shares that are compared with each other.
+/// Rates that are compared with each other.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RateGroup {
-    /// The property that they share.
+    /// The property that the rates of the group share.
     pub name: String,
-    /// The shares.
+    /// The rates.
     pub rates: Vec<Rate>,
 }
 
-/// A share with its interval.
+/// A rate with its confidence interval.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Rate {
-    /// The name of the share.
+    /// The name of the rate.
     pub name: String,
-    /// The share, its lower and its upper end, between 0 and 1; `None` if there was no trial.
+    /// Rate, lower and upper end of its interval, between 0 and 1; `None` without trials.
     pub share: Option<(f64, f64, f64)>,
-    /// A share to compare it with: a published one, or the greatest possible.
+    /// Reference value: a published rate, or the greatest possible one.
     pub mark: Option<f64>,
-    /// The same in words.
+    /// The rate as text.
     pub words: String,
 }
 
@@ -282,9 +283,9 @@ pub struct Rate {
 pub struct Series {
     /// The heading.
     pub heading: String,
-    /// Where the time axis ends.
+    /// End of the time axis.
     pub end: f64,
-    /// One line for each.
+    /// One line for each number.
     pub lines: Vec<SeriesLine>,
 }
 
@@ -293,69 +294,70 @@ pub struct Series {
 pub struct SeriesLine {
     /// Its name.
     pub name: String,
-    /// Time and value, in order of time; between them, it changes evenly.
+    /// Time and value, ordered by time; linear in between.
     pub points: Vec<(f64, f64)>,
     /// Its first, least, greatest and last value.
     pub words: String,
-    /// Which values conditions allowed.
+    /// Limits that conditions impose.
     pub limits: Vec<Limit>,
-    /// Where it came closest to a limit, in words; `None` if there are no limits.
+    /// Description of the smallest distance from a limit; `None` without limits.
     pub closest: Option<String>,
 }
 
 /// A limit of a number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Limit {
-    /// Since when.
+    /// Start of the limit.
     pub from: f64,
-    /// Until when; equal to `from` for a moment.
+    /// End of the limit; equal to `from` for a single moment.
     pub to: f64,
     /// The limit.
     pub value: f64,
-    /// -1: the number is not to be below it; 1: not above; 0: neither.
+    /// -1: lower bound; 1: upper bound; 0: required value.
     pub side: i8,
     /// The limit in words: `>= 20 during (drive rover depot shelf)`.
     pub words: String,
 }
 
-/// Quantities to change. Whether the plan works with the values chosen is worked out on the page,
-/// in whole numbers.
+/// Sliders for quantities. The page decides in integer arithmetic if the plan works with the chosen
+/// values.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Sliders {
     /// The heading.
     pub heading: String,
-    /// What there is to say about them.
+    /// Explanatory note.
     pub note: String,
-    /// One for each quantity.
+    /// One slider for each quantity.
     pub sliders: Vec<Slider>,
     /// For each bar of the first chart, the time points of its start and end.
     pub bars: Vec<(usize, usize)>,
-    /// What these bars are called.
+    /// Names of these bars.
     pub names: Vec<Text>,
-    /// What every schedule has to satisfy.
+    /// Inequalities that every schedule satisfies.
     pub system: Inequalities,
 }
 
-/// A quantity to change. Numbers are exact.
+/// A slider for a quantity. Numbers are exact.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Slider {
     /// The parameter's name.
     pub name: String,
-    /// What it is.
+    /// Description of the quantity.
     pub quantity: String,
     /// The value as planned.
     pub nominal: String,
-    /// From where to where it may go, in words.
+    /// Interval of guaranteed values, as text.
     pub room: String,
-    /// Where the slider begins.
+    /// Lower end of the slider.
     pub from: String,
-    /// Where it ends.
+    /// Upper end of the slider.
     pub to: String,
-    /// The least change.
+    /// Smallest change.
     pub step: String,
 }
 
-/// A region, to look at by two quantities at a time. Numbers are for drawing.
+/// A region, plotted for two quantities at a time. Numbers are approximate and used for drawing
+/// only.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Plane {
     /// The heading.
@@ -364,7 +366,8 @@ pub struct Plane {
     pub note: String,
     /// The quantities.
     pub quantities: Vec<PlaneQuantity>,
-    /// The plan works with the values that satisfy all rows of one of these.
+    /// Polytopes whose union is the region: the plan works if all rows of at least one of them
+    /// hold.
     pub pieces: Vec<Vec<PlaneRow>>,
     /// Boxes to draw.
     pub boxes: Vec<PlaneBox>,
@@ -375,13 +378,13 @@ pub struct Plane {
 pub struct PlaneQuantity {
     /// The parameter's name.
     pub name: String,
-    /// What it is.
+    /// Description of the quantity.
     pub quantity: String,
     /// The value as planned.
     pub nominal: f64,
-    /// Where its axis begins.
+    /// Lower end of its axis.
     pub from: f64,
-    /// Where its axis ends.
+    /// Upper end of its axis.
     pub to: f64,
 }
 
@@ -399,7 +402,7 @@ pub struct PlaneRow {
 pub struct PlaneBox {
     /// The name.
     pub name: String,
-    /// Both ends for each quantity; `None` where there is none.
+    /// Lower and upper end for each quantity; `None` if unbounded.
     pub intervals: Vec<(Option<f64>, Option<f64>)>,
 }
 

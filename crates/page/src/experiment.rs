@@ -58,7 +58,8 @@ pub(crate) fn timed(results: &Results, trials: Trials) -> Document {
     }
 }
 
-/// The kinds of failure, each with a trial to look at if there is one; and the pages of these.
+/// Returns the table of the kinds of failure, linked to example trials, and the pages of these
+/// trials.
 fn failures(results: &Results, trials: Trials) -> (Option<Section>, Vec<Document>) {
     let columns = [
         ("world", false),
@@ -103,8 +104,8 @@ fn failures(results: &Results, trials: Trials) -> (Option<Section>, Vec<Document
     with_trials(table, kinds, trials)
 }
 
-/// The table with these kinds of failure, none if there are none; the rows of those of which there is
-/// a trial to look at lead to its page.
+/// Adds the kinds of failure to `table` and links each row to its example trial, if there is one.
+/// Returns the section, or `None` without failures, and the linked pages.
 pub(crate) fn with_trials(
     mut table: Table,
     kinds: Vec<(FailurePlace, Vec<Text>)>,
@@ -129,7 +130,7 @@ pub(crate) fn with_trials(
     (section, more)
 }
 
-/// Columns: their headings, and whether they hold numbers.
+/// Converts columns: heading, and `true` if the column holds numbers.
 pub(crate) fn named(columns: &[(&str, bool)]) -> Vec<(String, bool)> {
     let named = columns.iter();
     named
@@ -157,7 +158,7 @@ pub(crate) fn document(
     }
 }
 
-/// How many were made.
+/// States the number of trials.
 pub(crate) fn made(count: u64, what: &str, is_interrupted: bool) -> String {
     if is_interrupted {
         return format!("{count} {what}; the experiment was interrupted before all were made.");
@@ -240,7 +241,7 @@ pub(crate) fn mean(mean: Mean) -> String {
         .map_or_else(|| "-".to_owned(), |mean| format!("{mean:.2}"))
 }
 
-/// Each executor against the first one, in the same worlds.
+/// Compares each executor with the first one, in the same worlds.
 fn pairs(results: &Results) -> Table {
     let first = results.rows.first().cloned().unwrap_or_default();
     let columns = [
@@ -280,7 +281,7 @@ fn pairs(results: &Results) -> Table {
     }
 }
 
-/// Counts by name, a column for each name.
+/// Builds a table of counts with a column for each name.
 fn counts(
     results: &Results,
     heading: &str,

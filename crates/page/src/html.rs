@@ -1,4 +1,4 @@
-//! A document as one HTML file.
+//! Rendering of a document as one HTML file.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use crate::document::Document;
 
 const TEMPLATE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
-/// In order: later ones call earlier ones.
+/// Scripts of the page, ordered so that each one calls earlier ones only.
 const SCRIPTS: &[&str] = &[
     include_str!("script/elements.js"),
     include_str!("script/table.js"),
@@ -21,17 +21,17 @@ const SCRIPTS: &[&str] = &[
     include_str!("script/page.js"),
 ];
 
-/// The page as a file that needs nothing else.
+/// Renders the page as a self-contained file.
 pub(crate) fn html(document: &Document) -> String {
     filled(document, &FILE)
 }
 
-/// The page of a run that goes on, for the server that knows more of it.
+/// Renders the live page of a running run, which is updated by its server.
 pub(crate) fn live(document: &Document) -> String {
     filled(document, &LIVE)
 }
 
-/// The places in which a page that is a file differs from one that is served.
+/// Differences between a page in a file and a live page.
 struct Kind {
     live: &'static str,
     reach: &'static str,
@@ -62,7 +62,7 @@ fn filled(document: &Document, kind: &Kind) -> String {
         ("{data}", as_data(document)),
         ("{script}", SCRIPTS.concat()),
     ];
-    // What is put in is not searched: it may have anything in it.
+    // Inserted texts are not searched for placeholders, because they may contain anything.
     let mut page = String::new();
     let mut rest = TEMPLATE;
     while let Some((before, name, after)) = next(rest, &parts) {
@@ -74,7 +74,7 @@ fn filled(document: &Document, kind: &Kind) -> String {
     page
 }
 
-/// The text before the next place that is to be filled, what comes there, and the text behind it.
+/// Returns the text before the next placeholder, its replacement, and the text after it.
 fn next<'a>(template: &'a str, parts: &'a [(&str, String)]) -> Option<(&'a str, &'a str, &'a str)> {
     let places = parts
         .iter()
@@ -87,14 +87,15 @@ fn next<'a>(template: &'a str, parts: &'a [(&str, String)]) -> Option<(&'a str, 
     ))
 }
 
-/// A text between tags.
+/// Escapes a text for use between tags.
 fn as_text(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }
 
-/// A value as JSON in a script block: nothing in it can end the block or begin a comment.
+/// Serializes a value as JSON for a script block. The result cannot end the block or begin a
+/// comment.
 fn as_data(value: &impl Serialize) -> String {
     let json = serde_json::to_string(value).unwrap_or_else(|_| "null".to_owned());
     let mut safe = String::with_capacity(json.len());

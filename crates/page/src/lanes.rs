@@ -1,22 +1,23 @@
-//! On which lane of a chart an action belongs.
+//! Assignment of actions to the lanes of a chart.
 
 use std::collections::BTreeMap;
 
 use crate::document::Grouping;
 
-/// An action as lanes see it: its name, and when it happens.
+/// An action to assign: its name and its time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Occupant<'a> {
     /// `(drive rover depot shelf)`.
     pub(crate) name: &'a str,
     /// Start and end.
     pub(crate) time: (f64, f64),
-    /// Whether it says which lanes to begin with: what was given up does not.
+    /// `true` if the action affects the choice of the initial grouping; `false` for abandoned
+    /// steps.
     pub(crate) counts: bool,
 }
 
-/// The ways to put actions on lanes, the one to begin with, and the lane of each action in each of
-/// them, action by action.
+/// The possible groupings, the position of the initial one, and for each action its lane in each
+/// grouping.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Lanes {
     pub(crate) groupings: Vec<Grouping>,
@@ -27,12 +28,12 @@ pub(crate) struct Lanes {
 /// The lane of actions without an object of the lanes' type.
 const OTHERS: &str = "others";
 
-/// The ways to put these actions on lanes.
+/// Returns the possible groupings of these actions.
 ///
-/// There is one for each type of object that occurs: a lane for each object, with the actions that
-/// mention it first among those of its type. The one to begin with is the type whose objects come
-/// early in the names of most actions, as acting objects do, without having to do two things at
-/// once.
+/// There is one for each type of object that occurs. It has a lane for each object of the type,
+/// with the actions whose first object of that type it is. The initial grouping is the type with
+/// the best
+/// [`score`]: its objects come early in the names of most actions, and have few overlapping actions.
 pub(crate) fn lanes<'a>(
     occupants: &[Occupant<'_>],
     type_of: &dyn Fn(&str) -> Option<&'a str>,
@@ -100,12 +101,12 @@ impl Lanes {
     }
 }
 
-/// The objects that the lanes of a grouping stand for.
+/// Kind of objects whose lanes form a grouping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind<'a> {
     /// The objects of a type.
     Type(&'a str),
-    /// The first object of each action, whatever it is.
+    /// The first object of each action, regardless of its type.
     First,
 }
 
@@ -125,7 +126,7 @@ impl<'a> Kind<'a> {
     }
 }
 
-/// The types that occur, in the order in which they do; without types, the first object counts.
+/// Returns the types in order of occurrence, or [`Kind::First`] if there are no types.
 fn kinds<'a>(
     occupants: &[Occupant<'_>],
     type_of: &dyn Fn(&str) -> Option<&'a str>,
@@ -145,13 +146,13 @@ fn kinds<'a>(
     kinds
 }
 
-/// The objects in an action's name.
+/// Returns the objects in an action's name.
 fn objects(name: &str) -> impl Iterator<Item = &str> {
     name.trim_matches(['(', ')']).split_whitespace().skip(1)
 }
 
-/// How well objects do as lanes: one for each action that names one first, less the later it is
-/// named, and one off for each action that begins while another is on its lane.
+/// Rates a grouping. Each action with an object of the kind adds 1 / (1 + its position among the
+/// arguments), and subtracts 1 if it overlaps an earlier action on the same lane.
 #[allow(
     clippy::cast_precision_loss,
     reason = "positions of arguments are small"

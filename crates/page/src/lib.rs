@@ -1,18 +1,18 @@
 //! Plans, runs and experiments as self-contained HTML pages.
 //!
-//! In: an answer as a document, the trace of a run, or the results of an experiment. Out: one HTML
-//! file with its style, its script and its data inside, which needs no network and can be sent by
-//! mail. It knows no files, no clock and no command line, and the same input gives the same bytes.
+//! The input is an answer as a document, the trace of a run, or the results of an experiment. The
+//! output is one HTML file that contains its style, script and data, and needs no network. The
+//! crate uses no files, no clock and no command line, and the same input gives the same bytes.
 //!
-//! What is read on a page was worked out here, from exact numbers; the script in it draws, filters
-//! and moves through time. The one thing that it decides is whether a plan works with the values of
-//! its sliders, and it does so in whole numbers (`script/points.js`). Names and other texts that
-//! come from outside are data: they reach the page in a block of JSON, and the script only ever
-//! shows them as text.
+//! Displayed values are computed here from exact numbers; the script draws, filters and moves
+//! through time. The script also decides if a plan works with the values of the sliders, in integer
+//! arithmetic (`script/points.js`). Names and other external texts are data: they are embedded in a
+//! block of JSON, and the script displays them as text only.
 //!
-//! - [`document`](mod@document): what a page shows, as data.
-//! - `plan`, `region`, `run`, `experiment`, `perturbed`: from answers, traces and results to documents.
-//! - `lanes`: on which lane of a chart an action belongs.
+//! - [`document`](mod@document): the content of a page, as data.
+//! - `plan`, `region`, `run`, `experiment`, `perturbed`: from answers, traces and results to
+//!   documents.
+//! - `lanes`: assignment of actions to the lanes of a chart.
 //! - `html`: the document as a file.
 //! - `perfetto`, `mcap`: a run for other viewers.
 //!
@@ -55,18 +55,18 @@ use serde::de::DeserializeOwned;
 
 use document::Document;
 
-/// Why no page can be made of a text.
+/// Error of the conversion of a text to a page.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageError {
-    /// It is something else.
+    /// The text has no known format.
     #[error(
         "{0} is none of what a page can be made of: the trace of a run (`run --trace`), \
          an answer (`envelope --json`, `plan --json`, `run --json`), or the results of an experiment \
          (`results.json` of `compare`)"
     )]
     Unknown(String),
-    /// It is a document of this program, but pages show nothing of its kind.
+    /// The text is a document of this program, but there are no pages for its format.
     #[error(
         "{name} is a document of the format {format}; pages are made of traces (`run --trace`), of \
          the answers of `envelope`, `plan` and `run`, and of the results of `compare`"
@@ -74,13 +74,13 @@ pub enum PageError {
     OtherFormat {
         /// The name of the text.
         name: String,
-        /// The format that it says it has.
+        /// The format stated in the text.
         format: String,
     },
-    /// It is no run.
+    /// The text is not a trace of a run.
     #[error("{0} is not the trace of a run (`run --trace`), and other viewers show nothing else")]
     NoRun(String),
-    /// It says that it is one of these, but is damaged, or of another version.
+    /// The text states a supported format, but is damaged or has another version.
     #[error("{name} cannot be read: {why}")]
     Damaged {
         /// The name of the text.
@@ -90,22 +90,22 @@ pub enum PageError {
     },
 }
 
-/// The page about an answer, a trace, or results: an HTML file. `name` is what the text is called,
-/// such as its file.
+/// Returns the page of an answer, a trace or results as an HTML file. `name` is the name of the
+/// text, for example its file.
 ///
 /// # Errors
-/// When the text is none of these, or damaged.
+/// If the text is none of these, or damaged.
 pub fn page(name: &str, text: &str) -> Result<String, PageError> {
     Ok(html::html(&document(name, text)?))
 }
 
-/// The page about the results of an experiment, with the traces of some of its failed trials inside:
-/// the row, the column and the position of the kind of failure in the most frequent ones
-/// ([`Failures::kinds`](elbowroom_laboratory::compare::Failures::kinds)), with the trace's name and
-/// text.
+/// Returns the page of the results of an experiment, which contains the traces of some failed
+/// trials. A trial is given by its row, its column and the position of its kind of failure among
+/// the most frequent ones ([`Failures::kinds`](elbowroom_laboratory::compare::Failures::kinds)),
+/// with the name and text of its trace.
 ///
 /// # Errors
-/// As [`page`], and when one of the traces is damaged.
+/// As [`page`], and if one of the traces is damaged.
 pub fn experiment_page(
     name: &str,
     text: &str,
@@ -128,22 +128,23 @@ fn perturbed_results(name: &str, text: &str) -> Result<PerturbedResults, PageErr
     PerturbedResults::read(text).map_err(|error| damaged(name, &error))
 }
 
-/// The page about a run that goes on, from its trace so far. It follows the run by what its server
-/// tells: `events` is a stream of events, `change` whenever there is more and `over` with the
-/// document of the whole run; `document` is [`live_document`] as JSON. With `#token=…` in its
-/// address, it can also ask the server to `stop` the run. `left_out` is how many lines behind the first
-/// one the text no longer has.
+/// Returns the live page of a running run, from its trace so far.
+///
+/// The page reads `events` from its server, a stream of server-sent events: `change` if there are
+/// new lines, and `over` with the document of the finished run. `document` is [`live_document`] as
+/// JSON. With `#token=…` in its address, the page can also request the server to `stop` the run.
+/// `left_out` is the number of lines after the first one that the text no longer contains.
 ///
 /// # Errors
-/// When the text is no trace of a run, or damaged.
+/// If the text is not a trace of a run, or damaged.
 pub fn live_page(name: &str, text: &str, left_out: usize) -> Result<String, PageError> {
     Ok(html::live(&live_document(name, text, left_out)?))
 }
 
-/// What the page about a run that goes on shows; `left_out` as for [`live_page`].
+/// Returns the content of the live page of a running run; `left_out` as for [`live_page`].
 ///
 /// # Errors
-/// When the text is no trace of a run, or damaged.
+/// If the text is not a trace of a run, or damaged.
 pub fn live_document(name: &str, text: &str, left_out: usize) -> Result<Document, PageError> {
     match format(text).as_deref() {
         Some(TRACE) => of_trace(name, text, run::Record::Growing { left_out }),
@@ -167,25 +168,25 @@ fn damaged(name: &str, error: &impl ToString) -> PageError {
     }
 }
 
-/// The run of a stored trace in the format of Perfetto, <https://ui.perfetto.dev>.
+/// Converts the run of a stored trace to the format of Perfetto, <https://ui.perfetto.dev>.
 ///
 /// # Errors
-/// When the text is no trace of a run, or damaged.
+/// If the text is not a trace of a run, or damaged.
 pub fn perfetto(name: &str, text: &str) -> Result<Vec<u8>, PageError> {
     let no_run = || PageError::NoRun(name.to_owned());
     perfetto::trace(&document(name, text)?).ok_or_else(no_run)
 }
 
-/// The run of a stored trace as an MCAP file, <https://mcap.dev>.
+/// Converts the run of a stored trace to an MCAP file, <https://mcap.dev>.
 ///
 /// # Errors
-/// When the text is no trace of a run, or damaged.
+/// If the text is not a trace of a run, or damaged.
 pub fn mcap(name: &str, text: &str) -> Result<Vec<u8>, PageError> {
     let no_run = || PageError::NoRun(name.to_owned());
     mcap::file(&document(name, text)?).ok_or_else(no_run)
 }
 
-/// What the page about an answer, a trace, or results shows.
+/// Returns the content of the page of an answer, a trace or results.
 ///
 /// # Errors
 /// As [`page`].
@@ -218,7 +219,7 @@ pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
     }
 }
 
-/// The format that a document, or the first line of a trace, says it has.
+/// Returns the format stated in a document, or in the first line of a trace.
 fn format(text: &str) -> Option<String> {
     #[derive(Deserialize)]
     struct Named {

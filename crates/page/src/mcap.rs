@@ -1,9 +1,8 @@
-//! A run as an MCAP file (<https://mcap.dev>), which Foxglove and others open beside a robot's own
-//! logs.
+//! A run as an MCAP file (<https://mcap.dev>), which viewers such as Foxglove open together with
+//! the robot's own logs.
 //!
-//! Messages are JSON with schemas: what happened as a log, what each lane is doing, each number,
-//! and the guarantee. The file is plain: no chunks, no index, no checksums; readers do without
-//! them.
+//! Messages are JSON with schemas: a log of all events, the action of each lane, each number, and
+//! the guarantee. The file has no chunks, index or checksums, which readers do not require.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +11,7 @@ use serde_json::{Value, json};
 use crate::clock::nanoseconds;
 use crate::document::{Chart, Document, Section, Text};
 
-/// The document of a run as an MCAP file; `None` if it has no run.
+/// Converts the document of a run to an MCAP file; `None` if it contains no run.
 pub(crate) fn file(document: &Document) -> Option<Vec<u8>> {
     let chart = document.sections.iter().find_map(|section| match section {
         Section::Chart(chart) if chart.is_run => Some(chart),
@@ -34,7 +33,7 @@ const CHANNEL: u8 = 0x04;
 const MESSAGE: u8 = 0x05;
 const DATA_END: u8 = 0x0f;
 
-/// A message, not yet in order.
+/// A message, before sorting.
 struct Message {
     nanoseconds: u64,
     channel: u16,
@@ -51,7 +50,7 @@ struct File {
 }
 
 impl File {
-    /// A channel with a schema of its own; `None` if there are too many already.
+    /// Adds a channel with its own schema; `None` if there are too many.
     fn channel(&mut self, topic: &str, schema: &str, members: &Value) -> Option<u16> {
         let id = self.channels.checked_add(1)?;
         self.channels = id;
@@ -85,7 +84,7 @@ impl File {
         });
     }
 
-    /// Every line of the trace, in the form that Foxglove's log panel shows.
+    /// Writes every line of the trace, in the form of Foxglove's log panel.
     fn log(&mut self, document: &Document) {
         let log = document.sections.iter().find_map(|section| match section {
             Section::Table(table) if !table.times.is_empty() => Some(table),
@@ -131,7 +130,7 @@ impl File {
         }
     }
 
-    /// The action of each lane over time.
+    /// Writes the action of each lane over time.
     fn lanes(&mut self, chart: &Chart) {
         let Some(grouping) = chart.groupings.get(chart.chosen) else {
             return;
@@ -155,7 +154,7 @@ impl File {
             let Some(channel) = self.channel(&topic, "elbowroom.Lane", &members) else {
                 return;
             };
-            // At one time, what ends does so before something begins.
+            // At equal times, ends come before starts.
             changes.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             let mut running: BTreeMap<&str, usize> = BTreeMap::new();
             for (at, is_start, action) in changes {
@@ -186,7 +185,7 @@ impl File {
         }
     }
 
-    /// A channel for each number.
+    /// Writes a channel for each number.
     fn numbers(&mut self, document: &Document) {
         let members = json!({ "name": { "type": "string" }, "value": { "type": "number" } });
         for section in &document.sections {
@@ -256,7 +255,7 @@ impl Record {
     }
 
     fn text(&mut self, text: &str) {
-        // Longer texts than this are in no trace that fits into memory.
+        // No trace that fits into memory contains longer texts.
         let length = u32::try_from(text.len()).unwrap_or(u32::MAX);
         self.number(length);
         self.bytes.extend(text.as_bytes());
@@ -269,7 +268,7 @@ impl Record {
     }
 }
 
-/// A name as a part of a topic.
+/// Converts a name to a part of a topic.
 fn word(name: &str) -> String {
     let trimmed = name.trim_matches(['(', ')']);
     let kept = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';

@@ -1,15 +1,14 @@
-//! A run as a trace that Perfetto (<https://ui.perfetto.dev>) opens: its native format, track
-//! events.
+//! A run as a trace in the native format of Perfetto (<https://ui.perfetto.dev>), track events.
 //!
-//! Each lane of the chart is a track, with what was done and what was planned below it; slices on
-//! one track do not overlap, as the format asks. Numbers are counters, moments and decisions are
-//! instants, and what the plan orders is joined by flows. The field numbers are those of
+//! Each lane of the chart is a track, with executed and planned actions on tracks below it. Slices
+//! on one track do not overlap, as the format requires. Numbers are counters, moments and decisions
+//! are instants, and flows connect actions ordered by the plan. The field numbers are those of
 //! `perfetto_trace.proto`.
 
 use crate::clock::nanoseconds;
 use crate::document::{Bar, Chart, Document, Section, Series, Text};
 
-/// The document of a run as a Perfetto trace; `None` if it has no run.
+/// Converts the document of a run to a Perfetto trace; `None` if it contains no run.
 pub(crate) fn trace(document: &Document) -> Option<Vec<u8>> {
     let chart = document.sections.iter().find_map(|section| match section {
         Section::Chart(chart) if chart.is_run => Some(chart),
@@ -27,7 +26,7 @@ pub(crate) fn trace(document: &Document) -> Option<Vec<u8>> {
     Some(trace.finish())
 }
 
-/// The one sequence of packets that all events are on.
+/// Identifier of the single sequence of packets.
 const SEQUENCE: u64 = 1;
 
 /// The kind of a track event.
@@ -39,10 +38,10 @@ enum Kind {
     Begin = 1,
 }
 
-/// An event, not yet in order.
+/// An event, before sorting.
 struct Event {
     nanoseconds: u64,
-    /// Among the events of one time, ends come first and begins last.
+    /// Order of events with equal times: ends first, begins last.
     rank: u8,
     message: Message,
 }
@@ -54,7 +53,7 @@ struct Trace {
 }
 
 impl Trace {
-    /// A new track; its number.
+    /// Adds a track and returns its number.
     fn track(&mut self, name: &str, parent: Option<u64>, is_counter: bool) -> u64 {
         let uuid = self.tracks.len() as u64 + 1;
         let mut descriptor = Message::default();
@@ -66,7 +65,7 @@ impl Trace {
         if is_counter {
             descriptor.message(8, &Message::default());
         }
-        // The children of a track stand in the order in which they were made.
+        // Children of a track are shown in order of creation.
         descriptor.number(11, 3);
         descriptor.number(12, uuid);
         let mut packet = Message::default();
@@ -98,7 +97,7 @@ impl Trace {
         });
     }
 
-    /// The actions, lane by lane.
+    /// Writes the actions, lane by lane.
     fn lanes(&mut self, chart: &Chart, run: u64, document: &Document) {
         let Some(grouping) = chart.groupings.get(chart.chosen) else {
             return;
@@ -123,7 +122,7 @@ impl Trace {
         }
     }
 
-    /// Slices on as few tracks as there can be without overlaps.
+    /// Writes slices on as few tracks as possible without overlaps.
     fn slices(
         &mut self,
         name: &str,
@@ -179,7 +178,7 @@ impl Trace {
         }
     }
 
-    /// Deadlines, decisions, and the guarantee.
+    /// Writes deadlines, decisions, and the guarantee.
     fn moments(&mut self, chart: &Chart, run: u64) {
         let named = |name: &str| {
             let name = name.to_owned();
@@ -210,7 +209,7 @@ impl Trace {
         }
     }
 
-    /// Numbers over time.
+    /// Writes numbers over time.
     fn counters(&mut self, series: &Series, run: u64) {
         for line in &series.lines {
             let track = self.track(&line.name, Some(run), true);
@@ -240,7 +239,7 @@ impl Trace {
 /// The flows that leave a bar, and those that end at it: one for each ordering.
 type Flows = (Vec<u64>, Vec<u64>);
 
-/// By bar; only what was done has an order that is to be seen.
+/// Returns the flows of each bar. Only orderings of executed actions are shown.
 fn flows(chart: &Chart) -> Vec<Flows> {
     let mut flows = vec![Flows::default(); chart.bars.len()];
     let is_done = |bar: usize| chart.bars[bar].actual.is_some();
@@ -298,7 +297,7 @@ impl Message {
         self.bytes.extend(&message.bytes);
     }
 
-    /// A name and a value beside an event.
+    /// Adds a named value to an event.
     fn annotation(&mut self, name: &str, value: &str) {
         let mut annotation = Self::default();
         annotation.text(6, value);

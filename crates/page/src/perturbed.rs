@@ -1,4 +1,4 @@
-//! An experiment in worlds without time, and a trial of one.
+//! Pages of an experiment in worlds without time, and of one of its trials.
 
 use elbowroom::report::statistics::Proportion;
 use elbowroom_laboratory::perturbed::{PerturbedResults, StoredCourse, StoredStep};
@@ -83,7 +83,8 @@ pub(crate) fn untimed(results: &PerturbedResults, trials: Trials) -> Document {
     }
 }
 
-/// The kinds of failure, each with a trial to look at if there is one; and the pages of these.
+/// Returns the table of the kinds of failure, linked to example trials, and the pages of these
+/// trials.
 fn failures(results: &PerturbedResults, trials: Trials) -> (Option<Section>, Vec<Document>) {
     let columns = [
         ("case", false),
@@ -194,7 +195,7 @@ pub(crate) fn course(course: &StoredCourse) -> Document {
     }
 }
 
-/// How a trial ended, in words.
+/// Describes the end of a trial.
 fn ending(name: &str) -> &str {
     match name {
         "goal-reached" => "the goal was reached",
@@ -206,7 +207,7 @@ fn ending(name: &str) -> &str {
     }
 }
 
-/// What came of the last step, in words.
+/// Describes the outcome of the last step.
 fn after(cause: &str) -> &str {
     match cause {
         "after-start" => "it started",

@@ -1,4 +1,4 @@
-//! A plan, with its envelope if there is one.
+//! Page of a plan, with its envelope if there is one.
 
 mod sliders;
 mod tables;
@@ -120,7 +120,7 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
     }
 }
 
-/// The page about what a planner found.
+/// The page about the result of a planner.
 pub(crate) fn found(answer: &PlanAnswer) -> Document {
     let mut texts = Texts::default();
     let mut facts = vec![
@@ -173,7 +173,7 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
     }
 }
 
-/// Actions with fixed times: label, name, start and end of each.
+/// Builds a timeline of actions with fixed times: label, name, start and end of each.
 fn fixed<'a>(actions: impl Iterator<Item = (&'a str, &'a str, Exact, Option<Exact>)>) -> Timeline {
     let actions = actions.map(|(instance, action, start, end)| TimedAction {
         instance: instance.to_owned(),
@@ -190,7 +190,7 @@ fn fixed<'a>(actions: impl Iterator<Item = (&'a str, &'a str, Exact, Option<Exac
     }
 }
 
-/// The failure, as sentences and as a schedule.
+/// Describes a counterexample, as sentences and as a schedule.
 fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
     let mut paragraphs = vec![example.message.clone()];
     if let Some(shortfall) = &example.shortfall {
@@ -287,8 +287,8 @@ pub(crate) fn chart(timeline: &Timeline, rooms: &[Room], texts: &mut Texts) -> C
     }
 }
 
-/// Where the axis ends: behind all that is planned, and behind what may come later as far as that
-/// is not so far away that nothing else could be seen.
+/// Returns the end of the time axis: after all planned and executed actions, and after windows and
+/// marks up to three times as far.
 pub(crate) fn end_of_axis(bars: &[Bar], marks: &[Mark]) -> f64 {
     let spans = bars
         .iter()
@@ -306,14 +306,14 @@ pub(crate) fn end_of_axis(bars: &[Bar], marks: &[Mark]) -> f64 {
     if end > 0.0 { end } else { 1.0 }
 }
 
-/// A window for drawing; `None` if it has no end on either side.
+/// Converts a window for drawing; `None` if it is unbounded on both sides.
 pub(crate) fn band(window: &WindowAnswer) -> Option<(Option<f64>, Option<f64>)> {
     let decimal = |end: &Option<Exact>| end.as_ref().map(|it| it.0.to_f64());
     let band = (decimal(&window.earliest), decimal(&window.latest));
     (band != (None, None)).then_some(band)
 }
 
-/// A window in words; `None` if it says nothing.
+/// Describes a window; `None` if it is unbounded on both sides.
 pub(crate) fn window_words(window: &WindowAnswer) -> Option<String> {
     match (&window.earliest, &window.latest) {
         (None, None) => None,
@@ -376,7 +376,8 @@ fn details(
     details
 }
 
-/// Section that names the command for repairs. It is part of each page of a plan that does not work.
+/// Section that names the command for repairs. It is part of each page of a plan that does not
+/// work.
 pub(crate) fn repair_advice() -> Section {
     let advice = "elbowroom envelope DOMAIN PROBLEM PLAN --repair prints the cheapest repair.";
     prose("What to do", vec![advice.to_owned()])
@@ -403,14 +404,14 @@ pub(crate) fn bad(words: &str) -> Verdict {
     }
 }
 
-/// The last part of a path, or something else where there is none.
+/// Returns the last component of a path, or `otherwise` if there is none.
 pub(crate) fn name_of(path: &str, otherwise: &str) -> String {
     let name = path.rsplit(['/', '\\']).next().unwrap_or_default();
     let name = if name.is_empty() { otherwise } else { name };
     name.to_owned()
 }
 
-/// The word by which documents mention it.
+/// Returns the word that documents use for a value.
 pub(crate) fn word(value: &impl serde::Serialize) -> String {
     match serde_json::to_value(value) {
         Ok(serde_json::Value::String(word)) => word,

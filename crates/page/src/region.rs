@@ -1,4 +1,4 @@
-//! All values for which a plan works.
+//! Page of the region: all values for which a plan works.
 
 mod alone;
 
@@ -18,7 +18,7 @@ use crate::plan::{
 };
 use alone::{Alone, reach};
 
-/// More quantities than anybody would look through.
+/// Maximum number of quantities.
 const MOST: usize = 100;
 
 /// The page about a region.
@@ -136,8 +136,8 @@ fn plane(parameters: &[Quantity], pieces: &[PieceAnswer], boxes: &[BoxAnswer]) -
     let quantity = |(place, parameter): (usize, &Quantity)| {
         let nominal = parameter.nominal.to_f64();
         let size = nominal.abs().max(1.0);
-        // As far as the boxes reach, and as the plan works with the others as planned, if that is
-        // not too far to see anything else.
+        // The axis covers the boxes, and the values for which the plan works with the others as
+        // planned, unless these are too far away to show the rest.
         let far = 4.0 * size;
         let near = |value: &f64| (value - nominal).abs() <= far;
         let intervals = || boxes.iter().map(|own| own.intervals[place]);
@@ -146,7 +146,7 @@ fn plane(parameters: &[Quantity], pieces: &[PieceAnswer], boxes: &[BoxAnswer]) -
         let alone = || ends_alone(&pieces, &all, place).into_iter().filter(near);
         let from = lower.chain(alone()).fold(nominal - size, f64::min);
         let to = upper.chain(alone()).fold(nominal + 1.5 * size, f64::max);
-        // Durations begin at zero.
+        // Durations are not negative.
         let from = if nominal >= 0.0 { from.max(0.0) } else { from };
         PlaneQuantity {
             name: parameter.name.clone(),
@@ -168,7 +168,7 @@ fn plane(parameters: &[Quantity], pieces: &[PieceAnswer], boxes: &[BoxAnswer]) -
     }
 }
 
-/// Where rows stop a quantity while the others have these values.
+/// Returns the values at which rows limit a quantity while the others have these values.
 fn ends_alone(pieces: &[Vec<PlaneRow>], values: &[f64], place: usize) -> Vec<f64> {
     let end = |row: &PlaneRow| {
         let own = row.factors.iter().find(|(index, _)| *index == place)?.1;
@@ -229,7 +229,7 @@ fn volume(measure: &Measure) -> String {
     }
 }
 
-/// The share of the region's volume that each box has.
+/// Builds the table of each box's share of the region's volume.
 fn shares(boxes: &[BoxAnswer]) -> Option<Section> {
     let percent = |share: f64| {
         let percent = 100.0 * share;

@@ -1,4 +1,4 @@
-//! A run beside its plans.
+//! Page of a run and its plans.
 
 mod bars;
 mod guarantee;
@@ -27,22 +27,22 @@ use crate::run::bars::Bars;
 use crate::run::guarantee::Guarantees;
 use crate::run::log::Log;
 
-/// The state of a record whose run is not over in it.
+/// State of the record of an unfinished run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Record {
-    /// It ends there.
+    /// The record has ended.
     Ended,
-    /// It grows while the run goes on.
+    /// The run is still recorded.
     Growing {
-        /// How many lines behind the first one it no longer has.
+        /// Number of lines after the first one that the record no longer contains.
         left_out: usize,
     },
 }
 
-/// The page about a run.
+/// Returns the page about a run.
 ///
-/// The problem is read for types of objects, deadlines and the values of numbers; if it cannot be,
-/// the page does without them.
+/// Types of objects, deadlines and values of numbers are read from the problem. The page omits them
+/// if the problem cannot be read.
 #[allow(clippy::too_many_lines, reason = "the page from top to bottom")]
 pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record) -> Document {
     let mut texts = Texts::default();
@@ -51,7 +51,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         Record::Growing { left_out } => left_out,
         Record::Ended => 0,
     };
-    // What was believed follows from the beginning.
+    // Beliefs can only be recomputed from a complete record.
     let mut belief = task
         .as_ref()
         .filter(|_| left_out == 0 && !stored.has_snapshot())
@@ -88,7 +88,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         bars.read(line);
         guarantees.read(line, &bars);
         log.read(line, &bars);
-        // A run that was over may have been gone on with.
+        // A finished run may have been resumed.
         report = match line {
             Line::Over(over) => Some(over),
             _ => None,
@@ -200,7 +200,7 @@ fn predictions(stored: &Stored, spec: &RunSpec, task: &Task) -> Option<Section> 
     })
 }
 
-/// What of the run is not on the page, as its record does not begin at the beginning.
+/// Describes the part of the run that is missing if the record does not begin with the run.
 fn not_shown(stored: &Stored, left_out: usize) -> Option<String> {
     if stored.has_snapshot() {
         let words = "everything before this segment of the journal, except the last actions, facts and numbers";
@@ -210,7 +210,7 @@ fn not_shown(stored: &Stored, left_out: usize) -> Option<String> {
     (left_out > 0).then(words)
 }
 
-/// How a run stands that is not over in its record.
+/// Describes the state of a run that is unfinished in its record.
 fn so_far(record: Record, is_paused: bool, now: &Rational) -> Verdict {
     let now = nearest(now);
     let words = match record {
@@ -280,7 +280,7 @@ fn verdict(report: &ReportLine) -> Verdict {
     }
 }
 
-/// Why plans were given up, and why there is no way on.
+/// Returns the reasons why plans were abandoned, and why no plan reaches the goal.
 fn why(report: &ReportLine) -> Vec<Section> {
     let sentences = |reasons: &[ReasonLine]| -> Vec<String> {
         reasons.iter().map(|reason| reason.words.clone()).collect()
@@ -302,7 +302,7 @@ fn why(report: &ReportLine) -> Vec<Section> {
 }
 
 impl Bars {
-    /// The plans and what was done, as a chart.
+    /// Converts the plans and executed actions to a chart.
     fn chart(&self, task: Option<&Task>, now: &Rational) -> Chart {
         let mut bars = self.drawn(now);
         let occupants: Vec<Occupant<'_>> = bars

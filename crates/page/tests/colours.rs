@@ -1,9 +1,9 @@
-//! Colours that stand side by side on a page can be told apart, also by those who see fewer.
+//! Checks that adjacent colours on a page can be distinguished, also by colour-blind users.
 //!
-//! What somebody without one kind of cone sees is simulated as in Machado, Oliveira & Fernandes ("A
-//! physiologically-based model for simulation of color vision deficiency", TVCG 2009, table 1,
-//! severity 1); how different two colours look is their distance in CIE L*a*b*, in which about 2 is
-//! just noticeable.
+//! Colour blindness is simulated as in Machado, Oliveira & Fernandes ("A physiologically-based
+//! model for simulation of color vision deficiency", TVCG 2009, table 1, severity 1). The
+//! difference of two colours is their distance in CIE L*a*b*. A distance of about 2 is just
+//! noticeable.
 
 use std::collections::BTreeMap;
 
@@ -42,8 +42,8 @@ const VISIONS: [(&str, Matrix); 4] = [
     ),
 ];
 
-/// Colours that stand side by side, and how different they have to look: less where shapes or dashes
-/// tell them apart as well.
+/// Groups of adjacent colours with their minimum distance, which is smaller if shapes or dashes
+/// distinguish them as well.
 const GROUPS: [(&[&str], f64); 4] = [
     (&["g3", "g2", "g1", "g0", "gnone"], 20.0),
     (&["planned", "done", "failed", "cancelled"], 20.0),
@@ -51,7 +51,7 @@ const GROUPS: [(&[&str], f64); 4] = [
     (&["done", "failed", "start", "mark"], 10.0),
 ];
 
-/// The colours of a theme, by name, as shares of linear red, green and blue.
+/// Returns the colours of a theme, by name, as fractions of linear red, green and blue.
 fn theme(block: &str) -> BTreeMap<&str, [f64; 3]> {
     let declarations = block
         .split(';')

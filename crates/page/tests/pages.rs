@@ -1,4 +1,4 @@
-//! Pages of real answers: what stands on them is what the documents say.
+//! Checks that the pages of real answers agree with the documents.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -96,7 +96,7 @@ fn page_of_an_invalid_plan_names_the_command_that_repairs_it() {
         .iter_mut()
         .find(|step| step.duration.is_some())
         .expect("a durative action");
-    // Ten times as long as the domain says.
+    // Ten times the duration in the domain.
     step.duration = step.duration.take().map(|it| it * Rational::from(10));
     let answer = envelope(&EnvelopeRequest::new(&task, plan), &mut Unwatched);
     let json = serde_json::to_string(&answer.expect("an answer").answer).expect("JSON");
@@ -172,7 +172,7 @@ fn the_page_of_a_run_has_what_was_done_beside_what_was_planned() {
         assert_eq!(document.verdict.tone == Tone::Good, is_good);
         reached += usize::from(is_good);
         failed += usize::from(!is_good);
-        // The facts at the end are those that the run left.
+        // The facts at the end are those of the final state of the run.
         let mut facts = std::collections::BTreeSet::new();
         for change in chart.changes.iter().filter(|change| change.kind == "fact") {
             let name = words(&document, &change.name).to_owned();
@@ -270,8 +270,8 @@ fn what_is_no_document_is_refused_with_one_sentence() {
     }
 }
 
-/// A journal that begins anew: what was under way then, or had ended not long before, is on the page, and what is
-/// reported of it later belongs to it.
+/// Page of a rotated journal: it contains actions that were running at the rotation or had ended
+/// shortly before, and later reports about them.
 #[test]
 fn a_journal_that_begins_anew_has_a_page_with_the_starts_from_before() {
     let exact = |number: i64| Exact(Rational::from(number));

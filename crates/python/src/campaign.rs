@@ -17,16 +17,16 @@ use pyo3::prelude::*;
 
 use crate::trouble::{Trouble, guarded};
 
-/// How often the interpreter is asked for signals, and progress is told.
+/// Interval between checks for signals and reports of progress.
 const GLANCE: Duration = Duration::from_millis(50);
 
-/// An experiment that has been read.
+/// A parsed experiment.
 #[pyclass(frozen, module = "elbowroom._native")]
 pub(crate) struct Experiment {
     experiment: AnyExperiment,
 }
 
-/// The files that an experiment names, by these names; they are looked for in a folder.
+/// Reads the files that an experiment mentions from a folder. Returns their texts by name.
 #[pyfunction]
 pub(crate) fn experiment_files(
     py: Python<'_>,
@@ -68,13 +68,13 @@ impl Experiment {
         })
     }
 
-    /// How many trials it asks for.
+    /// Number of trials that the experiment specifies.
     fn trials(&self) -> u64 {
         self.experiment.trials()
     }
 
-    /// Makes a part of the trials: the document as the command writes it, and whether it was ended
-    /// by Ctrl-C.
+    /// Makes a part of the trials. Returns the document as the command writes it, and `True` if
+    /// Ctrl-C ended the trials.
     fn make(
         &self,
         py: Python<'_>,
@@ -102,8 +102,8 @@ impl Experiment {
                 experiment: &self.experiment,
                 part,
             };
-            // Signals are seen by the thread that Python started this in; the trials go on in
-            // others.
+            // Only the thread that Python called can check for signals. The trials run in other
+            // threads.
             let (answer, raised) = thread::scope(|scope| {
                 let trials = scope.spawn(|| compare(request, &mut Shared(&state)));
                 let raised = state.heed(progress.as_ref(), || trials.is_finished());
@@ -118,7 +118,7 @@ impl Experiment {
         })
     }
 
-    /// Puts parts together.
+    /// Merges parts.
     fn merge(&self, py: Python<'_>, parts: Vec<String>) -> PyResult<String> {
         guarded(py, || {
             let parts = parts
@@ -129,7 +129,7 @@ impl Experiment {
         })
     }
 
-    /// The table of results: as CSV, as Markdown, and as text for people.
+    /// The table of results as CSV, as Markdown, and as plain text.
     fn tables(&self, py: Python<'_>, results: &str) -> PyResult<(String, String, String)> {
         guarded(py, || {
             let answer = CompareAnswer::read(results, &self.experiment)?;
@@ -139,12 +139,12 @@ impl Experiment {
     }
 }
 
-/// As the command writes `results.json`.
+/// Formats the answer like the command's `results.json`.
 fn document(answer: &CompareAnswer) -> String {
     format!("{:#}\n", answer.json())
 }
 
-/// How far the trials have come, and whether they are to end.
+/// Progress of the trials, and the request to end them.
 #[derive(Default)]
 struct State {
     done: AtomicU64,
@@ -153,7 +153,7 @@ struct State {
 }
 
 impl State {
-    /// Until the trials are over, looks for signals and tells of progress.
+    /// Checks for signals and reports progress until the trials are over.
     fn heed(&self, progress: Option<&Py<PyAny>>, is_over: impl Fn() -> bool) -> Option<PyErr> {
         let mut told = 0;
         loop {

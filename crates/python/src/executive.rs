@@ -1,4 +1,4 @@
-//! Executives in the process of Python.
+//! Executives inside the Python process.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,14 +23,15 @@ pub(crate) struct Executive {
     inner: elbowroom_executive::Executive,
 }
 
-/// Outcome of the run: the document, the trace if all of it is kept, the reason why the journal is incomplete, and the
-/// exception of the world.
+/// Outcome of the run: the document, the trace if all of it is kept, the reason why the journal is
+/// incomplete, and the exception of the world.
 type Outcome = (String, Option<String>, Option<String>, Option<Py<PyAny>>);
 
 #[pymethods]
 impl Executive {
-    /// Creates an executive for the problem and the options of a run. `learn` is the folder of a model, `segments` the length
-    /// from which a journal is rotated, and the number of earlier segments that are kept. `warn` receives warnings.
+    /// Creates an executive for the problem and the options of a run. `learn` is the folder of a
+    /// model. `segments` holds the length at which a journal is rotated, and the number of earlier
+    /// segments to keep. `warn` receives warnings.
     #[new]
     #[expect(
         clippy::too_many_arguments,
@@ -217,13 +218,14 @@ impl Executive {
         self.inner.is_idle()
     }
 
-    /// Returns `true` if the run replays its journal, so that its state is one of the past.
+    /// Returns `true` if the run is still replaying its journal, so that its state is a past one.
     fn is_replayed(&self) -> bool {
         self.inner.published().is_replayed()
     }
 
-    /// The lines of the trace after line `sent`, the number of earlier lines that are no longer kept, the number of the
-    /// last line, and whether the run has ended. Waits at most `timeout` seconds for a line.
+    /// The lines of the trace after line `sent`, the number of earlier lines that are no longer
+    /// kept, the number of the last line, and `True` if the run has ended. Waits at most `timeout`
+    /// seconds for a line.
     fn lines_after(
         &self,
         py: Python<'_>,
@@ -236,8 +238,8 @@ impl Executive {
         })
     }
 
-    /// Waits at most `timeout` seconds for a line after line `sent`. Returns the number of the last line, and whether the
-    /// run has ended.
+    /// Waits at most `timeout` seconds for a line after line `sent`. Returns the number of the last
+    /// line, and `True` if the run has ended.
     fn last_line(&self, py: Python<'_>, sent: usize, timeout: f64) -> PyResult<(usize, bool)> {
         let (_, _, last, is_over) = self.lines_after(py, sent, timeout)?;
         Ok((last, is_over))
@@ -273,7 +275,7 @@ fn settings(
         learn,
         segments: Some(Segments { size, kept }),
         planner_memory: planner_memory.or(usual.planner_memory),
-        // An exception of the receiver ends nothing.
+        // An exception of the receiver is ignored.
         warnings: WarningSink::new(move |text| {
             let _ = Python::attach(|py| warn.call1(py, (text,)));
         }),

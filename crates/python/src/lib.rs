@@ -1,14 +1,13 @@
 //! The native module of the Python package `elbowroom`.
 //!
-//! What goes in and comes out are texts: PDDL, plans, options as JSON, and the answers of
-//! [`elbowroom::answers`] as the JSON documents that `docs/formats` describes. The Python side
-//! (`crates/python/python/elbowroom`) makes objects of them, with exact fractions; it computes
-//! nothing that stands in an answer. So a question asked in Python has, byte for byte, the answer
-//! that the command gives.
+//! Arguments and results are texts: PDDL, plans, options as JSON, and the answers of
+//! [`elbowroom::answers`] as the JSON documents described in `docs/formats`. The Python side
+//! (`crates/python/python/elbowroom`) converts them to objects with exact fractions, and computes
+//! no part of an answer. The answer is therefore identical, byte for byte, to that of the command.
 //!
-//! Whatever can take long releases the interpreter's lock, is heard of by a progress callback, and
-//! ends at Ctrl-C with what was found until then (`watch`). A panic in here becomes the exception
-//! `elbowroom.BugError` (`trouble`).
+//! Long computations release the interpreter's lock, call a progress callback, and end at Ctrl-C
+//! with the intermediate result (`watch`). A panic becomes the exception `elbowroom.BugError`
+//! (`trouble`).
 //!
 //! ```python
 //! import elbowroom

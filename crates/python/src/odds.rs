@@ -1,4 +1,4 @@
-//! How likely a plan is to succeed.
+//! Success probability of a plan.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::task::{Task, read_options};
 use crate::trouble::{Trouble, guarded, json};
 use crate::watch::Watch;
 
-/// What can be said about odds, as JSON.
+/// The options of the success probability, as JSON.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct OddsOptions {
@@ -67,7 +67,7 @@ impl OddsOptions {
     }
 }
 
-/// The executors of these names.
+/// Parses the names of executors.
 fn executors(names: &[String]) -> Result<Vec<ExecutorSpec>, Trouble> {
     let read = names.iter().map(|name| name.parse::<ExecutorSpec>());
     let read: Vec<_> = read.collect::<Result<_, _>>().map_err(Trouble::request)?;
@@ -80,8 +80,8 @@ fn executors(names: &[String]) -> Result<Vec<ExecutorSpec>, Trouble> {
     }
 }
 
-/// How likely a plan is to succeed: a document, all orders as a picture if they were asked for, and
-/// whether the search was ended by Ctrl-C.
+/// The success probability of a plan: a document, the picture of all orders if it was requested,
+/// and `True` if Ctrl-C ended the search.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,

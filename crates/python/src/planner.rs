@@ -1,4 +1,4 @@
-//! Planners in Python behind the port of [`elbowroom::execution`].
+//! Planners in Python as implementations of the planner interface of [`elbowroom::execution`].
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,11 +14,11 @@ use elbowroom::text::Source;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-/// The exception of a planner, for the caller that made the run.
+/// The exception of a planner, for the caller of the run.
 pub(crate) type Raised = Arc<Mutex<Option<PyErr>>>;
 
-/// A planner that is asked with the texts of a domain and a problem, and answers with the text of a
-/// plan, or with `None` if there is none.
+/// Planner that calls a Python callable with the texts of a domain and a problem. The callable
+/// returns the text of a plan, or `None` if there is none.
 pub(crate) struct PyPlanner {
     pub(crate) callable: Py<PyAny>,
     pub(crate) domain: Source,

@@ -1,4 +1,4 @@
-//! Plans as they are found, for a loop in Python.
+//! Iteration over plans as they are found, for Python.
 
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
@@ -13,10 +13,10 @@ use crate::trouble::{Trouble, guarded, json};
 
 /// Interval between two checks for signals.
 const GLANCE: Duration = Duration::from_millis(50);
-/// Longest time that the search has for its answer after its end. It is part of the time limit.
+/// Grace period for the answer after the end of the search. It is part of the time limit.
 const GRACE: Duration = Duration::from_millis(50);
 
-/// A search for better and better plans.
+/// A search for successively better plans.
 #[pyclass(frozen, module = "elbowroom._native")]
 pub(crate) struct Plans {
     search: Mutex<ImprovingPlans>,
@@ -26,7 +26,7 @@ pub(crate) struct Plans {
 
 #[pymethods]
 impl Plans {
-    /// Starts the search. Its time runs from now on.
+    /// Starts the search and its time limit.
     #[new]
     fn new(
         py: Python<'_>,
@@ -59,13 +59,13 @@ impl Plans {
         })
     }
 
-    /// The next plan or, with `true`, the answer: a document. `None` when the time is up and the
-    /// search does not answer.
+    /// The next plan, or the answer, as a document with `True` for the answer. `None` when the time
+    /// is up and the search does not answer.
     fn next(&self, py: Python<'_>) -> PyResult<Option<(String, bool)>> {
         loop {
             let left = self.limit.map(|it| it.saturating_sub(self.begun.elapsed()));
             let patience = left.map_or(GLANCE, |left| left.min(GLANCE));
-            // The lock is held only while the interpreter's is not.
+            // The lock is only held while the interpreter's lock is released.
             let news = guarded(py, || {
                 let mut search = self.search.lock().unwrap_or_else(PoisonError::into_inner);
                 match search.next_within(patience) {
@@ -94,7 +94,7 @@ impl Plans {
         }
     }
 
-    /// Tells the search to stop.
+    /// Stops the search.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
         guarded(py, || {
             let search = self.search.lock().unwrap_or_else(PoisonError::into_inner);
@@ -104,15 +104,15 @@ impl Plans {
     }
 }
 
-/// News of a search.
+/// Result of one poll of a search.
 enum News {
-    /// A document, and whether it is the answer.
+    /// A document, with `true` if it is the answer.
     Document(String, bool),
-    /// Nothing.
+    /// Nothing new.
     None,
 }
 
-/// Ends the search at the time limit. It runs in a thread that has nothing to do with Python.
+/// Ends the search at the time limit. It runs in a thread without Python.
 struct Clock {
     begun: Instant,
     limit: Option<Duration>,

@@ -1,4 +1,4 @@
-//! Keeps the trace of a run.
+//! In-memory trace of a run.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,7 +17,7 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// A trace that begins with what is run.
+    /// Creates a trace that begins with the specification of the run.
     pub(crate) fn of(task: &Arc<Task>, spec: &RunSpec) -> Result<Self, Trouble> {
         let mut text = String::new();
         let mut sink = |line: &str| text.push_str(line);
@@ -29,7 +29,7 @@ impl Tape {
         })
     }
 
-    /// The text of the record.
+    /// Returns the text of the trace.
     pub(crate) fn text(&self) -> String {
         self.text
             .lock()

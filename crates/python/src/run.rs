@@ -1,4 +1,4 @@
-//! Runs.
+//! Runs in a simulated world, or in one in Python.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, PoisonError};
@@ -20,7 +20,7 @@ use crate::trouble::{Trouble, guarded, json};
 use crate::watch::Watch;
 use crate::world::PyWorld;
 
-/// The executors: name, what the number after it means, summary, source.
+/// The executors: name, meaning of the number after the name, summary, source.
 #[pyfunction]
 pub(crate) fn executors() -> Vec<(
     &'static str,
@@ -34,11 +34,11 @@ pub(crate) fn executors() -> Vec<(
         .collect()
 }
 
-/// What came of a run: the document, the trace if one was kept, whether it was ended by Ctrl-C, and
-/// what the world or the planner has raised.
+/// Result of a run: the document, the trace if one was kept, `true` if Ctrl-C ended the run, and
+/// the exception of the world or the planner.
 type Outcome = (String, Option<String>, bool, Option<PyErr>);
 
-/// Executes a plan, in the world that the options describe or in one in Python.
+/// Executes a plan in the world that the options describe, or in one in Python.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,
@@ -74,7 +74,7 @@ pub(crate) fn run(
 }
 
 impl Task {
-    /// A planner in Python.
+    /// Returns a planner that calls a Python callable.
     pub(crate) fn asking(
         &self,
         callable: Py<PyAny>,
@@ -127,7 +127,7 @@ impl Task {
         ))
     }
 
-    /// The run of this problem that differs from the usual one in what the options say.
+    /// Returns the specification of a run of this problem with these options.
     pub(crate) fn specification(&self, options: &str, has_plan: bool) -> Result<RunSpec, Trouble> {
         let usual = RunSpec {
             has_plan,
@@ -135,7 +135,8 @@ impl Task {
             ..RunSpec::new((&self.domain).into(), (&self.problem).into())
         };
         let mut options: Map<String, Value> = read_options(options)?;
-        // It is no part of a specification: nothing that is decided depends on it.
+        // The number of threads is not part of a specification, because decisions do not depend on
+        // it.
         let jobs = options.remove("jobs").filter(|jobs| !jobs.is_null());
         let jobs = jobs.map(serde_json::from_value).transpose();
         let jobs = jobs.map_err(|error| Trouble::Request(format!("jobs: {error}")))?;
@@ -151,7 +152,7 @@ impl Task {
         Ok(spec)
     }
 
-    /// The problem with the ε of the run.
+    /// Returns the problem with the ε of the run.
     pub(crate) fn with_epsilon_of(&self, spec: &RunSpec) -> Arc<model::Task> {
         if *self.task.epsilon() == spec.epsilon {
             return Arc::clone(&self.task);

@@ -1,4 +1,4 @@
-//! Runs that an event loop drives.
+//! Runs driven by an event loop.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,7 +16,7 @@ use crate::task::Task;
 use crate::trouble::{Trouble, guarded, json};
 use crate::world::{names, read_observations, read_passage};
 
-/// A run, asked what it needs next, and told.
+/// A run that returns its next request, and receives the answer.
 #[pyclass(frozen, module = "elbowroom._native")]
 pub(crate) struct Stepper {
     run: Mutex<Run<'static>>,
@@ -28,7 +28,7 @@ pub(crate) struct Stepper {
     stop: Arc<AtomicBool>,
 }
 
-/// The next need of a run: its kind, and its subject.
+/// The next request of a run: its kind, and its arguments.
 #[derive(IntoPyObject)]
 pub(crate) enum Needed {
     Start(&'static str, String, u64, String, Option<String>),
@@ -40,7 +40,7 @@ pub(crate) enum Needed {
 
 /// The planner of an event loop is not interrupted.
 const ALWAYS: &(dyn Fn() -> bool + Sync) = &|| true;
-/// Nobody looks at a clock: how long making a plan takes in the world is said in the options.
+/// No clock is read: the options set the duration of planning in the world.
 const NO_CLOCK: &(dyn Fn() -> Rational + Sync) = &|| Rational::ZERO;
 
 #[pymethods]
@@ -90,7 +90,7 @@ impl Stepper {
         })
     }
 
-    /// The next need of the run.
+    /// The next request of the run.
     fn next(&self, py: Python<'_>) -> PyResult<Needed> {
         guarded(py, || {
             let mut run = self.run();
@@ -136,7 +136,7 @@ impl Stepper {
         })
     }
 
-    /// Time has passed, and this was observed.
+    /// Answers a wait with the present time and the observations.
     fn observe(&self, py: Python<'_>, passage: &str) -> PyResult<()> {
         guarded(py, || {
             let passage = read_passage(passage, &self.task).map_err(Trouble::request)?;
@@ -144,7 +144,7 @@ impl Stepper {
         })
     }
 
-    /// This was seen.
+    /// Answers a look with the observations.
     fn see(&self, py: Python<'_>, observations: &str) -> PyResult<()> {
         guarded(py, || {
             let seen = read_observations(observations, &self.task).map_err(Trouble::request)?;
@@ -152,7 +152,7 @@ impl Stepper {
         })
     }
 
-    /// The world has failed.
+    /// Reports a failure of the world.
     fn fail(&self, py: Python<'_>, why: &str) -> PyResult<()> {
         guarded(py, || {
             self.run().fail(WorldError::new(why));

@@ -1,4 +1,4 @@
-//! Problems, and the questions about them that need no execution.
+//! Problems, and requests about them that need no execution.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use crate::trouble::{Trouble, guarded, json, number, positive};
 use crate::watch::Watch;
 
-/// A problem, and the texts that it was read from.
+/// A problem with its texts.
 #[pyclass(frozen, module = "elbowroom._native")]
 pub(crate) struct Task {
     pub(crate) task: Arc<model::Task>,
@@ -31,8 +31,8 @@ pub(crate) struct Task {
     pub(crate) problem: Source,
 }
 
-/// Reads a domain and a problem, each a name for messages and a text; also the warnings, as
-/// records.
+/// Reads a domain and a problem, each given by a name for messages and a text. Also returns the
+/// warnings, as records.
 #[pyfunction]
 pub(crate) fn read(
     py: Python<'_>,
@@ -64,14 +64,15 @@ struct CheckOptions {
     rules: Rules,
 }
 
-/// By whose reading of the semantics to judge.
+/// Semantics used by the validator.
 #[derive(Clone, Copy, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Rules {
     /// PDDL 2.1, with ε.
     #[default]
     Pddl,
-    /// The same, with the goal after the plan's last action, whatever timed initials do later.
+    /// The same, but the goal must hold after the plan's last action, regardless of later timed
+    /// initials.
     PddlGoalAfterActions,
     /// The semantics of unified-planning for problems without an ε.
     UnifiedPlanning,
@@ -113,7 +114,7 @@ impl Default for EnvelopeOptions {
     }
 }
 
-/// When a plan is done, which the document does not have.
+/// Makespans of a plan, which the document does not contain.
 #[derive(Serialize)]
 struct Makespans {
     nominal: Exact,
@@ -135,7 +136,7 @@ impl Task {
             .map(|source| (source.name().to_owned(), source.text().to_owned()))
     }
 
-    /// Whether a plan is valid: a document.
+    /// Validates a plan and returns a document.
     fn check(&self, py: Python<'_>, plan: (String, String), options: &str) -> PyResult<String> {
         guarded(py, || {
             let options: CheckOptions = read_options(options)?;
@@ -170,7 +171,7 @@ impl Task {
         })
     }
 
-    /// A plan's steps, and whether it is a plan with fixed times: (start, action, duration).
+    /// The steps of a plan (start, action, duration), and `True` if it is a plan with fixed times.
     fn steps(
         &self,
         py: Python<'_>,
@@ -188,7 +189,7 @@ impl Task {
         })
     }
 
-    /// A plan: a document, and whether the search was ended by Ctrl-C.
+    /// Searches for a plan. Returns a document, and `True` if Ctrl-C ended the search.
     #[pyo3(signature = (planner, time_limit, first, memory, jobs, self_overlap, progress))]
     #[expect(
         clippy::too_many_arguments,
@@ -233,7 +234,7 @@ impl Task {
         })
     }
 
-    /// A plan as a network: a document, its STN plan file, and its drawing for Graphviz.
+    /// Converts a plan to a network: a document, its STN plan file, and its drawing for Graphviz.
     fn stn(
         &self,
         py: Python<'_>,
@@ -255,8 +256,7 @@ impl Task {
         })
     }
 
-    /// An envelope: a document, when the plan is done in it, and whether the search was ended by
-    /// Ctrl-C.
+    /// Computes an envelope: a document, the makespans, and `True` if Ctrl-C ended the computation.
     fn envelope(
         &self,
         py: Python<'_>,
@@ -316,8 +316,8 @@ impl Task {
 }
 
 impl Task {
-    /// Reads a plan of either kind, which its content or the ending `.stn` of its name decides, with
-    /// the default rule about rounded numbers.
+    /// Reads a plan of either kind, with the default rule about rounded numbers. The content, or
+    /// the extension `.stn`, determines the kind.
     fn any_plan(&self, plan: (String, String)) -> Result<AnyPlan, Trouble> {
         self.any_plan_by(plan, &RoundingRule::default())
     }
@@ -332,7 +332,7 @@ impl Task {
         if is_stn_name || PlanKind::of_text(source.text()) == PlanKind::Stn {
             return Ok(format::read(&source, &self.task)?.into());
         }
-        // A list of no steps is a plan, although a text without actions is none.
+        // An empty list of steps is a plan, although a text without actions is not.
         if source.text().is_empty() {
             return Ok(TimeTriggeredPlan::default().into());
         }
@@ -340,7 +340,7 @@ impl Task {
         Ok(plan.into())
     }
 
-    /// A plan with fixed times.
+    /// Reads a plan with fixed times.
     pub(crate) fn time_triggered(
         &self,
         plan: (String, String),
@@ -364,16 +364,16 @@ impl Task {
     }
 }
 
-/// The specifications of the quantities that may vary.
+/// Parses the specifications of the quantities that may vary.
 fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Trouble> {
     let specs = texts.iter().map(|text| text.parse::<VarySpec>());
     specs.collect::<Result<_, _>>().map_err(Trouble::request)
 }
 
-/// As many threads as there are processors.
+/// Value of `jobs` that requests one thread per processor.
 pub(crate) const EVERY_PROCESSOR: usize = 0;
 
-/// How many threads the embedded planner may use for one plan: `jobs`, or as many as usual.
+/// Returns the number of threads of the embedded planner for one plan: `jobs`, or else `usual`.
 pub(crate) fn threads(
     jobs: Option<usize>,
     usual: usize,
@@ -390,10 +390,10 @@ pub(crate) fn threads(
     })
 }
 
-/// Options, as JSON.
+/// Reads options from JSON.
 pub(crate) fn read_options<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, Trouble> {
     serde_json::from_str(text).map_err(|error| {
-        // Where it stands in a text that the user never wrote is of no use.
+        // The position is useless, because the user did not write the JSON text.
         let message = error.to_string();
         let end = message.rfind(" at line ").unwrap_or(message.len());
         Trouble::Request(message[..end].to_owned())

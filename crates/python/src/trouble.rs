@@ -1,4 +1,4 @@
-//! What goes wrong, as exceptions of the Python package.
+//! Errors as exceptions of the Python package.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,21 +12,21 @@ use elbowroom_executive::run::RunError;
 use elbowroom_laboratory::answer::CompareError;
 use pyo3::prelude::*;
 
-/// Why there is no answer.
+/// Reason why there is no answer.
 pub(crate) enum Trouble {
     /// A text cannot be read.
     Read(Diagnostics),
-    /// The request cannot be understood, or the answer is beyond what can be analysed.
+    /// The request is invalid, or the answer is beyond the supported analyses.
     Request(String),
-    /// The problem needs what the planner does not support.
+    /// The planner does not support a feature of the problem.
     Unsupported(String),
-    /// The judge cannot tell.
+    /// The validator cannot decide.
     Undecided(String),
     /// An executive cannot be started or resumed.
     Executive(String),
     /// A planner could not be run.
     Planner(String),
-    /// Something in Python has failed, which says so itself.
+    /// Python code has raised an exception.
     Python(PyErr),
 }
 
@@ -35,7 +35,7 @@ impl Trouble {
         Self::Request(message.to_string())
     }
 
-    /// As an exception of the module `elbowroom._errors`.
+    /// Converts the error to an exception of the module `elbowroom._errors`.
     pub(crate) fn raised(self, py: Python<'_>) -> PyErr {
         match self {
             Self::Read(diagnostics) => {
@@ -109,8 +109,8 @@ impl From<PyErr> for Trouble {
     }
 }
 
-/// Does something without the interpreter's lock. What goes wrong is raised; a panic is a bug, and
-/// says so.
+/// Runs `work` without the interpreter's lock. Errors are raised as exceptions; a panic is raised
+/// as a bug.
 pub(crate) fn guarded<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T, Trouble> + Send,
@@ -122,7 +122,7 @@ pub(crate) fn guarded<T: Send>(
     }
 }
 
-/// The exception about a panic.
+/// Converts a panic to an exception.
 fn bug(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
     let said = panic
         .downcast_ref::<String>()
@@ -154,18 +154,18 @@ pub(crate) fn advised(error: &elbowroom_executive::Error) -> String {
     }
 }
 
-/// A document.
+/// Serializes a document.
 pub(crate) fn json(document: &impl serde::Serialize) -> String {
     serde_json::to_string(document).expect("documents have texts as keys")
 }
 
-/// A number, in any form that Python code writes it in.
+/// Parses a number, in any form that Python code writes.
 pub(crate) fn number(text: &str, what: &str) -> Result<Rational, Trouble> {
     text.parse()
         .map_err(|error| Trouble::Request(format!("`{what}`: {error}")))
 }
 
-/// A positive number.
+/// Parses a positive number.
 pub(crate) fn positive(text: &str, what: &str) -> Result<Rational, Trouble> {
     let number = number(text, what)?;
     if number.is_positive() {
@@ -176,7 +176,7 @@ pub(crate) fn positive(text: &str, what: &str) -> Result<Rational, Trouble> {
     }
 }
 
-/// Panics, so that the tests can see what becomes of that.
+/// Panics, so that tests can check the resulting exception.
 #[pyfunction(name = "_panic_for_test")]
 pub(crate) fn panic_for_test(py: Python<'_>) -> PyResult<()> {
     guarded(py, || panic!("a test wants to see a panic"))

@@ -1,4 +1,4 @@
-//! Watching from Python: progress, a time limit, and Ctrl-C.
+//! Watcher for Python: progress, a time limit, and Ctrl-C.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -11,10 +11,10 @@ use pyo3::prelude::*;
 
 use crate::trouble::Trouble;
 
-/// How often the interpreter is asked for signals, and progress is told.
+/// Interval between checks for signals and reports of progress.
 const GLANCE: Duration = Duration::from_millis(50);
 
-/// Ends the work never, at a time limit, at Ctrl-C, or when the callback raises something.
+/// Watcher that ends the work at a time limit, at Ctrl-C, or if the callback raises an exception.
 pub(crate) struct Watch {
     begun: Instant,
     limit: Option<Duration>,
@@ -23,12 +23,12 @@ pub(crate) struct Watch {
     told: Option<Instant>,
     halt: Option<Halt>,
     raised: Option<PyErr>,
-    /// Somebody else has seen Ctrl-C.
+    /// Set if other code has received Ctrl-C.
     interrupted: Arc<AtomicBool>,
 }
 
 impl Watch {
-    /// Starts to watch.
+    /// Creates a watcher whose time limit starts now.
     pub(crate) fn start(limit: Option<f64>, callback: Option<Py<PyAny>>) -> Self {
         let now = Instant::now();
         Self {
@@ -53,15 +53,15 @@ impl Watch {
         }
     }
 
-    /// For whoever else may see Ctrl-C: a world in Python.
+    /// Returns the flag for other receivers of Ctrl-C, such as a world in Python.
     pub(crate) fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.interrupted)
     }
 
-    /// Whether the work was ended by Ctrl-C.
+    /// Returns `true` if Ctrl-C ended the work.
     ///
     /// # Errors
-    /// What the callback has raised.
+    /// The exception of the callback.
     pub(crate) fn ended(self) -> Result<bool, Trouble> {
         match self.raised {
             Some(error) => Err(error.into()),

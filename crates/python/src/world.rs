@@ -1,4 +1,4 @@
-//! Worlds in Python behind the port of [`elbowroom::execution`].
+//! Worlds in Python as implementations of the world interface of [`elbowroom::execution`].
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,7 +13,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use serde_json::Value;
 
-/// A world whose Python side (`elbowroom._world`) gets and gives the messages of
+/// World whose Python side (`elbowroom._world`) exchanges the messages of
 /// `docs/formats/world-protocol.md`.
 pub(crate) struct PyWorld {
     adapter: Py<PyAny>,
@@ -25,7 +25,7 @@ pub(crate) struct PyWorld {
 }
 
 impl PyWorld {
-    /// A world that tells by `interrupted` of Ctrl-C.
+    /// Creates a world that sets `interrupted` at Ctrl-C.
     pub(crate) fn new(adapter: Py<PyAny>, task: &Arc<Task>, interrupted: Arc<AtomicBool>) -> Self {
         Self {
             adapter,
@@ -36,7 +36,7 @@ impl PyWorld {
         }
     }
 
-    /// Calls the Python side; `None` at Ctrl-C.
+    /// Calls the Python side. Returns `None` at Ctrl-C.
     fn call<'py, A, T>(
         &mut self,
         py: Python<'py>,
@@ -68,10 +68,10 @@ impl PyWorld {
 }
 
 impl PyWorld {
-    /// Notifies the Python side if its answer is invalid, as of an exception.
+    /// Notifies the Python side of an invalid answer, as of an exception.
     fn understood<T>(&self, answer: Result<T, WorldError>) -> Result<T, WorldError> {
         answer.map_err(|error| {
-            // The error of the answer is the one that counts.
+            // The error of the answer takes precedence.
             let _ = Python::attach(|py| self.adapter.call_method0(py, "begin_end").map(|_| ()));
             error.reachable()
         })
@@ -158,7 +158,7 @@ impl EmbeddedWorld for PyWorld {
     }
 }
 
-/// The subjects of a look, in words.
+/// Returns the names of the facts and fluents to observe.
 pub(crate) fn names(
     task: &Task,
     facts: &[FactId],
@@ -169,7 +169,7 @@ pub(crate) fn names(
     (facts.collect(), fluents.collect())
 }
 
-/// The answer to a wait: `{"now": …, "observations": […]}`.
+/// Reads the answer to a wait: `{"now": …, "observations": […]}`.
 pub(crate) fn read_passage(text: &str, task: &Task) -> Result<Passage, WorldError> {
     let message = read(text)?;
     let now =
@@ -178,7 +178,7 @@ pub(crate) fn read_passage(text: &str, task: &Task) -> Result<Passage, WorldErro
     Ok(Passage { now, observations })
 }
 
-/// The answer to a look: a list of observations.
+/// Reads the answer to a look: a list of observations.
 pub(crate) fn read_observations(text: &str, task: &Task) -> Result<Vec<Observation>, WorldError> {
     listed(Some(&read(text)?), task)
 }

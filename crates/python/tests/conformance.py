@@ -40,7 +40,7 @@ def more_cases() -> dict[str, Any]:
     there = importlib.util.find_spec("up_test_cases")
     if there is None:
         return found
-    # Its modules are those of a script beside them.
+    # Its modules are next to the script.
     sys.path.extend(there.submodule_search_locations or [])
     package = importlib.import_module("builtin")
     for module in pkgutil.walk_packages(package.__path__, "builtin.", onerror=lambda _: None):

@@ -41,7 +41,7 @@ def main(path: str, trials: int, parts: int) -> None:
     )
     others = [cluster.add_node(num_cpus=1, object_store_memory=MEMORY) for _ in range(2)]
     ray.init(address=cluster.address, log_to_driver=False)
-    # Who asks talks to one of the nodes; that one has to stay.
+    # The client talks to one of the nodes, which must stay.
     own = ray.get_runtime_context().get_node_id()
     victims = [node for node in others if node.node_id != own][:1]
 

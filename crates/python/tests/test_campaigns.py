@@ -78,7 +78,7 @@ def test_a_damaged_part_is_named_and_made_again(
 def test_a_part_that_the_command_has_made_is_taken(
     whole: elbowroom.Comparison, tmp_path: Path
 ) -> None:
-    # It comes without a sum of its bytes.
+    # This part has no checksum.
     (tmp_path / "part-0-of-2.json").write_text(TABLE.make(4, (0, 2)))
     kept = (tmp_path / "part-0-of-2.json").stat().st_mtime_ns
     assert elbowroom.compare(TABLE, trials=4, shards=2, folder=tmp_path).results == whole.results

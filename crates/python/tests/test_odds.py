@@ -37,7 +37,7 @@ def test_a_published_value_is_found() -> None:
     problem = elbowroom.read(FOLDER / "sf3-domain.pddl", FOLDER / "sf3-problem.pddl")
     odds = problem.odds(likelihoods=FOLDER / "sf3-p1.toml")
     assert odds.is_best and odds.is_proven
-    # What the authors' code returned, to four digits.
+    # The result of the authors' code, to four digits.
     assert abs(odds.probability - 0.1575) < 0.00006
     assert abs(odds.probability + sum(loss.mass for loss in odds.rows()) - 1) < 1e-9
     gains = odds.gains
@@ -92,7 +92,7 @@ def test_what_has_no_odds_says_why(lamp: elbowroom.Problem) -> None:
 def test_the_command_of_the_package_gives_the_same_answer(lamp: elbowroom.Problem) -> None:
     program = shutil.which("elbowroom", path=Path(sys.executable).parent)
     command = [program] if program else [sys.executable, "-m", "elbowroom"]
-    # Also where the package is not installed.
+    # Also works if the package is not installed.
     environment = {**os.environ, "PYTHONPATH": str(Path(elbowroom.__file__).parents[1])}
 
     def run(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:

@@ -42,7 +42,8 @@ JUDGED = [
     for plan in plans
     if elbowroom.up.ElbowroomValidator.supports_plan(plan.kind)
 ]
-# A plan that the case calls valid, though it misses the goal; unified-planning's validator says so, too.
+# Cases with a plan that is declared valid, but misses the goal. unified-planning's validator gives the
+# expected verdict.
 MISTAKEN = {"basic_undef_numeric"}
 SOLVED = [name for name, case in CASES.items() if supported(elbowroom.up.ElbowroomPlanner, case)]
 
@@ -82,7 +83,7 @@ def test_what_is_not_supported_is_refused_by_name(name: str) -> None:
     problem = CASES[name].problem
     features = problem.kind.features - elbowroom.up.ElbowroomPlanner.supported_kind().features
     assert features
-    # Which plan is best is no matter of translation.
+    # Preferences among plans do not affect the translation.
     if not any("OVERSUBSCRIPTION" in feature for feature in features):
         with pytest.raises(elbowroom.UnsupportedError, match="support"):
             elbowroom.up.Translation(problem)
@@ -122,7 +123,8 @@ def test_a_planner_returns_a_network_if_asked() -> None:
     again = plan.convert_to(PlanKind.TIME_TRIGGERED_PLAN, case.problem)
     with PlanValidator(name="elbowroom-val") as validator:
         assert validator.validate(case.problem, again)
-    # What comes back can be asked about: the bounds are read, not one of the schedules.
+    # The resulting plan supports further requests, which use its bounds and not one of its
+    # schedules.
     envelope = elbowroom.envelope(case.problem, plan)
     assert envelope.answer == "envelope"
     assert elbowroom.up.execute(case.problem, plan).verdict == "goal-reached"
@@ -168,14 +170,14 @@ def test_a_replanner_plans_for_what_the_problem_has_become() -> None:
     with Replanner(problem, name="elbowroom") as replanner:
         first = replanner.resolve()
         assert names(first) == {"do0"}
-        # As long as the plan works it is kept.
+        # The plan is kept as long as it works.
         replanner.update_initial_value(done[1], True)
         assert replanner.resolve() is first
         replanner.update_initial_value(done[1], False)
         replanner.add_goal(done[1])
         assert names(replanner.resolve()) == {"do0", "do1"}
         replanner.remove_goal(done[0])
-        # It still works, though it does more than it must.
+        # It still works, although it does more than necessary.
         assert names(replanner.resolve()) == {"do0", "do1"}
         replanner.remove_action("do0")
         assert names(replanner.resolve()) == {"do1"}
@@ -183,7 +185,7 @@ def test_a_replanner_plans_for_what_the_problem_has_become() -> None:
         assert replanner.resolve().status == Status.UNSOLVABLE_PROVEN
         replanner.add_action(problem.action("do1"))
         assert names(replanner.resolve()) == {"do1"}
-        # unified-planning wants warnings from an engine that was asked for by its name.
+        # unified-planning expects warnings from an engine requested by name.
         with pytest.warns(UserWarning, match="do7 is none of"):
             replanner.remove_action("do7")
         with pytest.warns(UserWarning, match="is none of"):
@@ -191,7 +193,7 @@ def test_a_replanner_plans_for_what_the_problem_has_become() -> None:
     strict = elbowroom.up.ElbowroomPlanner(problem, True)
     with pytest.raises(up.exceptions.UPUsageError, match="do7 is none of"):
         strict.remove_action("do7")
-    # What was given has not changed.
+    # The caller's problem has not changed.
     assert len(problem.actions) == 2 and len(problem.goals) == 1
 
 

@@ -82,7 +82,8 @@ def test_refutation_by_the_default_epsilon_is_not_proved_for_a_problem_without_o
              (Fraction("5.0002"), ActionInstance(problem.y), Fraction(5))]  # fmt: skip
     assert verdicts(problem, TimeTriggeredPlan(steps)) == (True, True)
     assert solved(problem).status == Status.UNSOLVABLE_INCOMPLETELY
-    # With an ε of its own, there is no plan; nor without, where the times alone do not fit.
+    # With an ε, there is no plan. Without one, there is none either, because the times alone do not
+    # fit.
     problem.epsilon = Fraction(1, 1000)
     assert solved(problem).status == Status.UNSOLVABLE_PROVEN
     assert solved(window("9.9")).status == Status.UNSOLVABLE_PROVEN
@@ -103,7 +104,7 @@ def test_actions_that_undo_each_other_at_one_time_are_not_refuted() -> None:
         steps.append((Fraction(0), ActionInstance(action), Fraction(1)))
     problem.add_goal(x)
     problem.add_goal(y)
-    # What happens at one time reads the state before; the planner keeps happenings apart.
+    # Simultaneous happenings read the state before; the planner keeps happenings apart.
     assert verdicts(problem, TimeTriggeredPlan(steps)) == (True, True)
     assert solved(problem).status != Status.UNSOLVABLE_PROVEN
 
@@ -138,7 +139,7 @@ def test_parameters_that_differ_in_case_or_blanks_stay_apart() -> None:
     for number, names in enumerate([("x", "X"), ("a b", "a_b"), ("1", "v_1"), ("ä", "ö")]):
         action = InstantaneousAction(f"put{number}", **{name: place for name in names})
         first, second = action.parameters
-        # A variable with the name of a parameter is another one.
+        # A variable shadows a parameter with the same name.
         bound = Variable(names[0], place)
         action.add_precondition(Exists(And(ready(bound), Not(Equals(bound, first))), bound))
         action.add_precondition(Forall(Or(ready(bound), Equals(bound, second)), bound))
@@ -231,7 +232,7 @@ def test_action_does_not_overlap_with_itself_unless_the_problem_allows_it() -> N
         if not overlapping:
             assert all(one[1] <= other[0] for one, other in itertools.pairwise(times))
         assert verdicts(oven(overlapping), result.plan) == (True, True)
-    # Neither validator judges it.
+    # Neither validator enforces this rule.
     problem = oven(False)
     bakes = [(Fraction(0), ActionInstance(problem.action("bake")), Fraction(3)) for _ in range(3)]
     assert verdicts(problem, TimeTriggeredPlan(bakes)) == (True, True)

@@ -83,7 +83,7 @@ def test_timed_effect_at_the_beginning_comes_after_what_is_read_there() -> None:
 
 def test_timed_effects_of_one_time_are_combined_as_by_unified_planning() -> None:
     problem, is_open, level = valve()
-    # The value true wins, and increases add up.
+    # `True` takes precedence, and increases add up.
     for value in (True, False):
         problem.add_timed_effect(GlobalStartTiming(5), is_open, value)
     problem.add_increase_effect(GlobalStartTiming(5), level, 2)
@@ -103,7 +103,7 @@ def test_timed_effects_may_be_close_to_each_other() -> None:
     result = solved(problem)
     assert result.status == Status.SOLVED_SATISFICING, result.log_messages
     assert verdicts(problem, result.plan) == (True, True)
-    # They cannot keep an ε of the problem, which is about actions.
+    # They cannot respect the problem's ε, which applies to actions.
     problem.epsilon = Fraction(1, 100)
     assert solved(problem).status == Status.UNSUPPORTED_PROBLEM
     problem.epsilon = Fraction(1, 10_000)
@@ -138,7 +138,7 @@ def jars(lower: int | None, upper: int | None) -> Any:
     drain.set_fixed_duration(2)
     drain.add_decrease_effect(StartTiming(), jar, 2)
     drain.add_effect(EndTiming(), drained, True)
-    # Its condition is false, and it stays an action of the problem.
+    # Its condition is false, but it remains an action of the problem.
     never = InstantaneousAction("never")
     never.add_precondition(False)
     problem.add_actions([fill, drain, never])

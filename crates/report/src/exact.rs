@@ -1,4 +1,4 @@
-//! Exact numbers in documents: as a text, and beside it the nearest float.
+//! Exact numbers in documents: as a text, with the nearest float.
 //!
 //! ```json
 //! { "exact": "1393/2", "decimal": 696.5 }
@@ -10,25 +10,25 @@ use elbowroom_num::{End, Rational};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How documents write infinity.
+/// Infinity in documents.
 pub const INFINITY: &str = "inf";
-/// The same below all numbers.
+/// Minus infinity in documents.
 pub const MINUS_INFINITY: &str = "-inf";
 
-/// A number as documents have it.
+/// A number in a document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Exact(pub Rational);
 
-/// Either member of the pair, as it stands.
+/// The pair as it is read.
 #[derive(Deserialize)]
 struct Pair {
     exact: String,
-    /// For readers without fractions; ignored when read.
+    /// For readers without rational arithmetic; ignored when read.
     #[serde(rename = "decimal")]
     _decimal: Option<f64>,
 }
 
-/// The pair of a number, which is written digit by digit: traces have a great many of them.
+/// The pair as it is written, digit by digit, because traces contain very many numbers.
 #[derive(Serialize)]
 struct Written<T: Display> {
     #[serde(serialize_with = "text")]
@@ -73,17 +73,17 @@ pub fn serialize<S: Serializer>(number: &Rational, serializer: S) -> Result<S::O
 /// Reads a number, for `#[serde(with = "…")]`.
 ///
 /// # Errors
-/// When it is none.
+/// If it is not a number.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Rational, D::Error> {
     let pair = Pair::deserialize(deserializer)?;
     pair.exact.parse().map_err(D::Error::custom)
 }
 
-/// Numbers that may be absent: `null`.
+/// Numbers that may be absent (`null`).
 pub mod option {
     use super::{Deserialize, Deserializer, Exact, Rational, Serialize, Serializer};
 
-    /// Writes it.
+    /// Writes the number, or `null`.
     ///
     /// # Errors
     /// As the serializer.
@@ -98,10 +98,10 @@ pub mod option {
         number.clone().map(Exact).serialize(serializer)
     }
 
-    /// Reads it.
+    /// Reads the number, or `null`.
     ///
     /// # Errors
-    /// When it is none.
+    /// If it is neither.
     pub fn deserialize<'de, D: Deserializer<'de>>(
         deserializer: D,
     ) -> Result<Option<Rational>, D::Error> {
@@ -114,7 +114,7 @@ pub mod option {
 pub mod lower {
     use super::{Deserializer, End, Serializer};
 
-    /// Writes it.
+    /// Writes the end.
     ///
     /// # Errors
     /// As the serializer.
@@ -122,10 +122,10 @@ pub mod lower {
         super::serialize_end(end, super::MINUS_INFINITY, serializer)
     }
 
-    /// Reads it.
+    /// Reads the end.
     ///
     /// # Errors
-    /// When it is none.
+    /// If it is neither a number nor infinity.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<End, D::Error> {
         super::deserialize_end(super::MINUS_INFINITY, deserializer)
     }
@@ -135,7 +135,7 @@ pub mod lower {
 pub mod upper {
     use super::{Deserializer, End, Serializer};
 
-    /// Writes it.
+    /// Writes the end.
     ///
     /// # Errors
     /// As the serializer.
@@ -143,10 +143,10 @@ pub mod upper {
         super::serialize_end(end, super::INFINITY, serializer)
     }
 
-    /// Reads it.
+    /// Reads the end.
     ///
     /// # Errors
-    /// When it is none.
+    /// If it is neither a number nor infinity.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<End, D::Error> {
         super::deserialize_end(super::INFINITY, deserializer)
     }
@@ -163,7 +163,7 @@ fn serialize_end<S: Serializer>(
     }
 }
 
-/// Infinity, which has no decimal.
+/// Writes infinity, which has no decimal.
 ///
 /// # Errors
 /// As the serializer.

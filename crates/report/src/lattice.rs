@@ -1,9 +1,9 @@
-//! A picture of all orders of a plan's happenings, as SVG.
+//! Picture of all orders of a plan's happenings, as SVG.
 //!
-//! A [`LatticePicture`] shows the sets of happenings that an order can have behind it, from nothing
-//! on the left to everything on the right, with a line for each happening that can be next. How
-//! dark a set is says how likely the best of the orders through it is to succeed; one order is
-//! drawn through it all. No fonts are read, and the same picture gives the same bytes.
+//! A [`LatticePicture`] shows the sets of happenings that an order can have executed, from the
+//! empty set on the left to the full set on the right, with a line for each possible next
+//! happening. The darkness of a set shows the success probability of the best order through it. One
+//! order is highlighted. No fonts are read, and the same picture gives the same bytes.
 
 use std::fmt::Write as _;
 
@@ -12,39 +12,39 @@ use std::fmt::Write as _;
 pub struct LatticePicture {
     /// The title.
     pub title: String,
-    /// Below the title.
+    /// The text below the title.
     pub subtitle: String,
-    /// The sets; a line leads from an earlier to a later one.
+    /// The sets. A line leads from an earlier to a later one.
     pub nodes: Vec<PictureNode>,
     /// The lines.
     pub edges: Vec<PictureEdge>,
-    /// One order: the positions of the sets that it leads through.
+    /// Positions of the sets along the highlighted order.
     pub shown: Vec<usize>,
 }
 
-/// A set.
+/// A set of happenings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PictureNode {
-    /// How many happenings are in it: how far to the right it is.
+    /// Number of happenings in the set; determines its column.
     pub level: usize,
     /// The label.
     pub words: String,
-    /// A probability.
+    /// Success probability.
     pub value: f64,
-    /// Whether an order may end there.
+    /// `true` if an order may end there.
     pub is_end: bool,
 }
 
-/// A line.
+/// A line between two sets.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PictureEdge {
-    /// The position of a set.
+    /// Position of the smaller set.
     pub from: usize,
-    /// The position of a set.
+    /// Position of the larger set.
     pub to: usize,
     /// The happening.
     pub words: String,
-    /// A probability.
+    /// Success probability.
     pub value: f64,
 }
 
@@ -55,13 +55,14 @@ const ROW: f64 = 34.0;
 const MARGIN: f64 = 40.0;
 /// Pixels from one line of words to the next.
 const LINE: f64 = 16.0;
-/// Room above the sets, for the titles.
+/// Height of the area for the titles.
 const HEAD: f64 = 84.0;
-/// Where a level has more sets than this, their probabilities are told only by hovering.
+/// Maximum number of sets on a level at which probabilities are printed. In larger pictures, they
+/// are shown on hover only.
 const MOST_LABELLED: usize = 14;
 
 impl LatticePicture {
-    /// The picture as an SVG document.
+    /// Renders the picture as an SVG document.
     pub fn svg(&self) -> String {
         let places = self.places();
         let levels = self.nodes.iter().map(|node| node.level).max().unwrap_or(0);
@@ -88,7 +89,8 @@ impl LatticePicture {
         for (position, node) in self.nodes.iter().enumerate() {
             self.set(&mut svg, (position, node), places[position], best, tallest);
         }
-        // Words would stand upon lines and sets: along the order are numbers, and the words below.
+        // Names would overlap lines and sets, so the lines of the highlighted order are numbered,
+        // and a legend below has the names.
         for (step, edge) in self.steps().enumerate() {
             let (from, to) = (places[edge.from], places[edge.to]);
             let middle = f64::midpoint(from.0, to.0);
@@ -103,7 +105,7 @@ impl LatticePicture {
         svg
     }
 
-    /// The lines along the order that is shown.
+    /// Returns the lines along the highlighted order.
     fn steps(&self) -> impl Iterator<Item = &PictureEdge> {
         let pairs = self.shown.windows(2);
         pairs.filter_map(|pair| {
@@ -123,7 +125,8 @@ impl LatticePicture {
         pairs.any(|pair| [edge.from, edge.to] == *pair)
     }
 
-    /// The middle of each set: level by level, each close to those from which lines come.
+    /// Returns the centre of each set. Sets on a level are sorted by the mean height of their
+    /// predecessors.
     fn places(&self) -> Vec<(f64, f64)> {
         let levels = self.nodes.iter().map(|node| node.level).max().unwrap_or(0);
         let tallest = float(self.tallest().max(3));
@@ -203,7 +206,7 @@ fn text(svg: &mut String, (x, y): (f64, f64), size: u32, anchor: &str, words: &s
     );
 }
 
-/// From white to the blue of Okabe & Ito.
+/// Returns a colour between white and the blue of Okabe & Ito.
 fn blue(share: f64) -> String {
     let share = share.clamp(0.0, 1.0);
     let mixed = |end: f64| 255.0 + (end - 255.0) * share;
@@ -279,7 +282,7 @@ mod tests {
         let svg = diamond().svg();
         assert_eq!(svg.matches("<circle").count(), 4);
         assert_eq!(svg.matches("<line").count(), 4);
-        // The order that is shown is numbered, and its happenings stand below.
+        // The highlighted order is numbered, and its happenings are listed below.
         assert_eq!(svg.matches(">1  (a)</text>").count(), 1);
         assert_eq!(svg.matches(">2  (b)</text>").count(), 1);
         assert!(

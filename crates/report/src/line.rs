@@ -1,4 +1,4 @@
-//! The lines of a trace, for those who write and those who read: `docs/formats/trace.md`.
+//! Lines of a trace, for writers and readers: `docs/formats/trace.md`.
 
 use elbowroom_num::Rational;
 use indexmap::IndexMap;
@@ -15,28 +15,28 @@ pub use goal::{GoalChangeLine, GoalState, terms};
 pub use observed::{ObservationLine, ObservedLine};
 pub use shortfall::{LatenessLine, ShortfallLine};
 
-/// A line of a trace, but for its first one.
+/// A line of a trace, except the first one.
 ///
-/// A number is [`Exact`]; the decimal beside it is for people, and is ignored when read.
+/// A number is [`Exact`]; its decimal is for people, and is ignored when read.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Line {
-    /// A plan is taken up.
+    /// The run adopted a plan.
     Plan(PlanLine),
-    /// The executor decided.
+    /// The executor made a decision.
     Decided(DecidedLine),
-    /// The world was given a command.
+    /// A command was sent to the world.
     Command(CommandLine),
     /// Time has passed.
     Passed(PassedLine),
-    /// The world was asked to look at the goal.
+    /// The world observed the facts and numbers of the goal on request.
     Looked(LookedLine),
-    /// An observation, and what was made of it.
+    /// The world reported an observation.
     Observed(ObservedLine),
-    /// A plan is being made.
+    /// Planning has started.
     Planning(PlanningLine),
-    /// A plan has been made, or not.
+    /// Planning has ended, with or without a plan.
     Planned(PlannedLine),
     /// An action has used most of the time that the plan tolerates, or most of its time-out.
     Warning(WarningLine),
@@ -44,9 +44,9 @@ pub enum Line {
     Kept(KeptLine),
     /// A goal is closed, set aside, or pursued again.
     Goal(GoalChangeLine),
-    /// A lasting run waits for a change.
+    /// A persistent run is idle.
     Resting(RestingLine),
-    /// Somebody asked the run to end.
+    /// The end of the run was requested.
     Interrupted(InterruptedLine),
     /// The world failed; running actions are cancelled.
     WorldFailed(WorldFailedLine),
@@ -54,7 +54,7 @@ pub enum Line {
     Over(ReportLine),
 }
 
-/// A plan is taken up; its times count from its `origin`.
+/// Adoption of a plan. Its times are relative to `origin`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanLine {
@@ -64,7 +64,7 @@ pub struct PlanLine {
     pub origin: Exact,
     /// The actions.
     pub steps: Vec<StepLine>,
-    /// The plan with room.
+    /// The plan as an STN.
     pub network: NetworkLine,
     /// The parameters.
     pub parameters: Vec<ParameterLine>,
@@ -96,7 +96,7 @@ pub struct NetworkLine {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceLine {
-    /// By which nodes are named.
+    /// Label of the action in the names of its nodes.
     pub label: String,
     /// Its name.
     pub action: String,
@@ -106,13 +106,13 @@ pub struct InstanceLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConstraintLine {
-    /// A node.
+    /// The first node.
     pub from: String,
-    /// A node.
+    /// The second node.
     pub to: String,
-    /// Not less.
+    /// Lower bound.
     pub lower: Option<BoundLine>,
-    /// Not more.
+    /// Upper bound.
     pub upper: Option<BoundLine>,
 }
 
@@ -120,31 +120,31 @@ pub struct ConstraintLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum BoundLine {
-    /// The value of the parameter of that name.
+    /// The value of a parameter.
     Parameter {
-        /// The name.
+        /// Its name.
         parameter: String,
     },
     /// A number.
     Number(Exact),
 }
 
-/// Something left open.
+/// A parameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterLine {
     /// Its name.
     pub name: String,
-    /// Its value if nothing deviates.
+    /// Its value in the plan.
     pub nominal: Exact,
-    /// For which values the plan is guaranteed to work.
+    /// Values for which the plan is guaranteed to work.
     pub envelope: Option<IntervalLine>,
 }
 
-/// The ends of an interval; `None` where it has none.
+/// The lower and upper end of an interval; `None` if infinite.
 pub type IntervalLine = (Option<Exact>, Option<Exact>);
 
-/// The executor decided.
+/// A decision of the executor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DecidedLine {
@@ -156,28 +156,28 @@ pub struct DecidedLine {
     pub reason: ReasonLine,
 }
 
-/// A decision, as a trace has it.
+/// A decision in a trace.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum DecisionLine {
-    /// To start actions.
+    /// Start actions.
     Start {
         /// The actions to start.
         orders: Vec<OrderLine>,
     },
-    /// To wait.
+    /// Wait.
     Wait {
-        /// Until when, if nothing is observed earlier.
+        /// Time of the end of the wait, unless something is observed before; `None` if unlimited.
         until: Option<Exact>,
     },
-    /// To stop actions.
+    /// Cancel actions.
     Cancel {
         /// The steps to cancel.
         steps: Vec<u32>,
     },
-    /// To give up the plan.
+    /// Abandon the plan.
     Replan,
-    /// That the goal is reached.
+    /// The goal is reached.
     GoalReached,
 }
 
@@ -191,7 +191,7 @@ pub struct OrderLine {
     pub action: String,
     /// The planned duration; `None` for an instantaneous action.
     pub duration: Option<Exact>,
-    /// When it may start.
+    /// Time window of its start.
     pub planned: WindowLine,
 }
 
@@ -205,35 +205,35 @@ pub struct WindowLine {
     pub latest: Option<Exact>,
 }
 
-/// A reason: its words, and its parts.
+/// A reason, as a sentence and in parts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReasonLine {
     /// The kind of reason: [`Cause::name`](elbowroom_execution::Cause::name).
     pub cause: String,
-    /// The whole of it as a sentence.
+    /// The reason as a sentence.
     pub words: String,
-    /// The action that it is about.
+    /// The affected action.
     pub action: Option<String>,
-    /// The quantity, condition or moment that it is about, in words.
+    /// The affected quantity, condition or moment, in words.
     pub about: Option<String>,
     /// The observed value.
     pub observed: Option<Exact>,
-    /// The interval that is allowed.
+    /// The allowed interval.
     pub allowed: Option<IntervalLine>,
-    /// The constraints behind that, in words.
+    /// The constraints that cause the bound, in words.
     pub behind: Vec<String>,
-    /// By how much it was missed.
+    /// Distance of the observed value from the allowed interval.
     pub by: Option<Exact>,
-    /// Since when this has been so.
+    /// Time since which the reason has existed.
     pub since: Option<Exact>,
-    /// What is still promised of the rest of the plan, where the executor makes promises:
+    /// Remaining guarantee of the plan, if the executor gives guarantees:
     /// [`Promise::name`](elbowroom_execution::Promise::name).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub promise: Option<String>,
 }
 
-/// The world was given a command.
+/// A command to the world.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CommandLine {
@@ -241,7 +241,7 @@ pub struct CommandLine {
     pub now: Exact,
     /// The command.
     pub command: GivenLine,
-    /// When that was planned.
+    /// Planned time window of the command.
     pub planned: WindowLine,
     /// The time-out of an action that is started, in seconds from its start or its last progress;
     /// left out if time-outs are off.
@@ -255,16 +255,16 @@ pub struct CommandLine {
 pub enum GivenLine {
     /// Start an action.
     Start {
-        /// By which reports refer to it.
+        /// Identifier of the start in reports.
         ticket: u64,
         /// Its name.
         action: String,
         /// The planned duration.
         duration: Option<Exact>,
     },
-    /// Stop an action.
+    /// Cancel an action.
     Cancel {
-        /// Which start.
+        /// Ticket of its start.
         ticket: u64,
     },
 }
@@ -273,7 +273,7 @@ pub enum GivenLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassedLine {
-    /// Until when the world was asked to wait at most.
+    /// Latest time at which the world had to answer.
     pub until: Exact,
     /// The present time.
     pub now: Exact,
@@ -281,7 +281,7 @@ pub struct PassedLine {
     pub observations: Vec<ObservationLine>,
 }
 
-/// The world was asked to look at the goal.
+/// Observation of the goal's facts and numbers on request.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LookedLine {
@@ -291,7 +291,7 @@ pub struct LookedLine {
     pub observations: Vec<ObservationLine>,
 }
 
-/// A plan is being made.
+/// Start of planning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanningLine {
@@ -299,11 +299,11 @@ pub struct PlanningLine {
     pub now: Exact,
     /// The reason.
     pub reason: ReasonLine,
-    /// From where.
+    /// Initial state of the new plan.
     pub situation: SituationLine,
 }
 
-/// The state in which a plan begins.
+/// Initial state of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SituationLine {
@@ -313,7 +313,7 @@ pub struct SituationLine {
     pub facts: Vec<String>,
     /// The values of the fluents.
     pub values: IndexMap<String, Exact>,
-    /// The actions under way.
+    /// The running actions.
     pub running: Vec<RunningLine>,
 }
 
@@ -323,35 +323,35 @@ pub struct SituationLine {
 pub struct RunningLine {
     /// Its name.
     pub action: String,
-    /// The time at which it has started.
+    /// The start time.
     pub start: Exact,
     /// The expected duration.
     pub duration: IntervalLine,
 }
 
-/// A plan has been made, or not.
+/// End of planning, with or without a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlannedLine {
     /// The time, planning time included.
     pub now: Exact,
-    /// The time that it took, by the world's clock.
+    /// The duration of planning, by the world's clock.
     pub took: Exact,
-    /// The plan.
+    /// The plan, if one was found.
     pub plan: Option<Vec<StepLine>>,
-    /// Why there is none.
+    /// The reason why there is no plan.
     pub why_not: Option<String>,
-    /// Whether it is certain that there is none.
+    /// `true` if it is proved that there is no plan.
     #[serde(rename = "unsolvable")]
     pub is_unsolvable: bool,
-    /// Whether there is none because the planner has failed; left out where it has not.
+    /// `true` if there is no plan because the planner failed; left out otherwise.
     #[serde(
         rename = "planner_failed",
         default,
         skip_serializing_if = "std::ops::Not::not"
     )]
     pub has_failed: bool,
-    /// What the planner has to say about it: why it is this plan; left out where it is nothing.
+    /// Remark of the planner on its choice of the plan; left out if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
     /// Known reasons for which the goals have no plan; left out if none is known.
@@ -359,17 +359,18 @@ pub struct PlannedLine {
     pub shortfall: Option<ShortfallLine>,
 }
 
-/// An action has used most of the time that the plan tolerates, or most of its time-out.
+/// Warning about an action that has used most of the time that the plan tolerates, or most of its
+/// time-out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WarningLine {
     /// The time.
     pub now: Exact,
-    /// Its start.
+    /// Ticket of its start.
     pub ticket: u64,
     /// Its name.
     pub action: String,
-    /// When a new plan is needed, or when the action times out, if it has not ended.
+    /// Time at which a new plan is needed, or the action times out, unless it ends before.
     pub until: Exact,
     /// `true` if the action times out then; left out where a new plan is needed.
     #[serde(
@@ -378,38 +379,38 @@ pub struct WarningLine {
         skip_serializing_if = "std::ops::Not::not"
     )]
     pub is_timeout: bool,
-    /// The same in words.
+    /// The warning as a sentence.
     pub words: String,
 }
 
-/// The goals have changed, and the rest of the running plan reaches these, too.
+/// The goals have changed, and the remaining plan reaches the new ones as well.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeptLine {
     /// The time.
     pub now: Exact,
-    /// How they have changed.
+    /// Description of the change.
     pub reason: ReasonLine,
 }
 
-/// A lasting run waits for a change.
+/// A persistent run becomes idle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RestingLine {
     /// The time.
     pub now: Exact,
-    /// What came of the goals: [`Verdict::name`](elbowroom_execution::run::Verdict::name); `None` if
+    /// Outcome of the goals: [`Verdict::name`](elbowroom_execution::run::Verdict::name); `None` if
     /// there were none.
     pub verdict: Option<String>,
     /// A further explanation.
     pub why: Option<String>,
-    /// The goals by name: those that were reached, or else those that are open.
+    /// Names of the reached goals, or else of the open ones.
     pub goals: Vec<String>,
-    /// What can never become true again.
+    /// Conditions that can never become true again.
     pub dead_end: Vec<ReasonLine>,
 }
 
-/// Somebody asked the run to end.
+/// Request to end the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InterruptedLine {
@@ -430,18 +431,18 @@ pub struct WorldFailedLine {
 /// The report on a finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReportLine {
-    /// How it ended: [`Verdict::name`](elbowroom_execution::run::Verdict::name).
+    /// Outcome: [`Verdict::name`](elbowroom_execution::run::Verdict::name).
     pub verdict: String,
     /// A further explanation.
     pub why: Option<String>,
     /// The time, by the world's clock.
     #[serde(with = "exact")]
     pub time: Rational,
-    /// The number of new plans made, or asked for.
+    /// The number of new plans made or requested.
     pub replans: usize,
-    /// The reason.
+    /// The reasons for new plans.
     pub reasons: Vec<ReasonLine>,
-    /// Facts and numbers that can never become true again, where no plan reaches the goal any more.
+    /// Conditions that can never become true again, if no plan reaches the goal any more.
     pub dead_end: Vec<ReasonLine>,
     /// The number of actions started.
     pub starts: usize,
@@ -449,26 +450,27 @@ pub struct ReportLine {
     pub executed: Vec<ExecutedLine>,
 }
 
-/// Something that was done.
+/// An executed action.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExecutedLine {
-    /// The time at which it started.
+    /// The start time.
     pub start: Exact,
     /// Its name.
     pub action: String,
-    /// The time taken; `None` for an instantaneous action.
+    /// The observed duration; `None` for an instantaneous action.
     pub duration: Option<Exact>,
-    /// Which start it was.
+    /// Ticket of its start.
     pub ticket: u64,
-    /// How it ended; `None` if it had not.
+    /// Outcome; `None` if it has not ended.
     pub outcome: Option<String>,
 }
 
 impl Line {
-    /// The line as it stands in a trace, without a line feed.
+    /// Returns the line as text, without a line feed.
     pub fn text(&self) -> String {
-        /// The last line has always ended with its name; all others begin with it.
+        /// For compatibility, the event name is the last member of this line, and the first one of
+        /// all others.
         #[derive(Serialize)]
         struct Over<'a> {
             #[serde(flatten)]
@@ -476,7 +478,7 @@ impl Line {
             event: &'static str,
         }
 
-        /// A line that begins with its name.
+        /// A line whose first member is its event name.
         #[derive(Serialize)]
         #[serde(tag = "event", rename_all = "kebab-case")]
         enum Named<'a> {

@@ -1,4 +1,4 @@
-//! A picture of two quantities: areas, boxes and a point, as SVG.
+//! Picture of two quantities: areas, boxes and a point, as SVG.
 //!
 //! No fonts are read, and the same picture gives the same bytes.
 
@@ -9,17 +9,17 @@ use std::fmt::Write as _;
 pub struct PlanePicture {
     /// The title.
     pub title: String,
-    /// Below the title.
+    /// The text below the title.
     pub subtitle: String,
-    /// The names of the quantities, from left to right and upwards.
+    /// Names of the horizontal and of the vertical axis.
     pub axes: [String; 2],
-    /// The lower left and the upper right corner of what is shown.
+    /// Lower left and upper right corner of the visible window.
     pub window: [[f64; 2]; 2],
     /// Convex polygons, by their corners.
     pub areas: Vec<Vec<[f64; 2]>>,
-    /// What the areas are.
+    /// Name of the areas in the legend.
     pub areas_name: String,
-    /// Names with lower left and upper right corners; what lies outside the window is cut off.
+    /// Names with lower left and upper right corners. Parts outside the window are clipped.
     pub boxes: Vec<(String, [[f64; 2]; 2])>,
     /// A point, and its name.
     pub point: Option<(String, [f64; 2])>,
@@ -29,23 +29,23 @@ pub struct PlanePicture {
 const SIDE: f64 = 400.0;
 const LEFT: f64 = 76.0;
 const TOP: f64 = 70.0;
-/// The room for names beside the plane.
+/// Width of the legend.
 const LEGEND: f64 = 210.0;
 const BELOW: f64 = 60.0;
 const INK: &str = "#3c3c3c";
-/// Colours of Okabe & Ito that are told apart whatever colours one sees, each with dashes of its
-/// own.
+/// Colours of Okabe & Ito, which colour-blind readers can distinguish, each with its own dash
+/// pattern.
 const LINES: [(&str, &str); 4] = [
     ("#d55e00", ""),
     ("#009e73", "8 4"),
     ("#cc79a7", "3 3"),
     ("#e69f00", "10 3 2 3"),
 ];
-/// About so many numbers along an axis.
+/// Approximate number of ticks on an axis.
 const TICKS: f64 = 6.0;
 
 impl PlanePicture {
-    /// The picture as an SVG document.
+    /// Renders the picture as an SVG document.
     pub fn svg(&self) -> String {
         let (width, height) = (LEFT + SIDE + LEGEND, TOP + SIDE + BELOW);
         let mut svg = String::new();
@@ -122,7 +122,7 @@ impl PlanePicture {
         svg
     }
 
-    /// Where a point is, in pixels.
+    /// Returns the position of a point, in pixels.
     fn place(&self, point: &[f64; 2]) -> (f64, f64) {
         let share = |axis: usize| {
             let (from, to) = (self.window[0][axis], self.window[1][axis]);
@@ -142,7 +142,7 @@ impl PlanePicture {
         format!("{x:.2},{y:.2}")
     }
 
-    /// A box, with lines only where its sides are in the window.
+    /// Draws a box. Only sides inside the window have lines.
     fn outline(&self, svg: &mut String, corners: &[[f64; 2]; 2], style: &str) {
         let [low, high] = corners;
         let is_shown = |axis: usize, value: f64| {
@@ -192,7 +192,7 @@ impl PlanePicture {
     }
 }
 
-/// Round numbers from one to the other.
+/// Returns round numbers between the ends.
 fn ticks(from: f64, to: f64) -> Vec<f64> {
     let span = to - from;
     if span.is_nan() || span <= 0.0 || span.is_infinite() {

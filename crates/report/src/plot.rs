@@ -1,8 +1,8 @@
 //! Plots of results, as SVG.
 //!
-//! One kind is there: an [`IntervalPlot`] shows, for each of several groups, one value of each of
-//! several series, with its interval. With the feature `plots` it is drawn by `plotters`, with its
-//! SVG backend alone: no fonts are read, and the same plot gives the same bytes.
+//! An [`IntervalPlot`] shows, for each group, one value of each series, with its interval. With the
+//! feature `plots` it is drawn by the SVG backend of `plotters`: no fonts are read, and the same
+//! plot gives the same bytes.
 
 #[cfg(feature = "plots")]
 mod drawn;
@@ -10,7 +10,7 @@ mod drawn;
 #[cfg(feature = "plots")]
 pub use drawn::PlotError;
 
-/// Values side by side, group by group.
+/// Values of several series, group by group.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct IntervalPlot {
     /// The title.
@@ -21,7 +21,7 @@ pub struct IntervalPlot {
     pub groups: Vec<String>,
     /// The series compared in each group.
     pub series: Vec<Series>,
-    /// A line across each group, with its name: what could be reached, say.
+    /// Reference line across each group, with its name, for example an upper bound.
     pub reference: Option<Series>,
 }
 
@@ -30,11 +30,11 @@ pub struct IntervalPlot {
 pub struct Series {
     /// The name.
     pub name: String,
-    /// In the order of the groups; `None` where there is no value.
+    /// Values in the order of the groups; `None` if missing.
     pub points: Vec<Option<Point>>,
 }
 
-/// A value, and where it may be.
+/// A value with its interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// The value.

@@ -1,11 +1,11 @@
-//! Exact numbers for people: short decimals, rounded in a known direction.
+//! Exact numbers as short decimals, rounded in a known direction.
 
 use elbowroom_num::Rational;
 
-/// Digits after the point that people get to see.
+/// Maximum number of decimal digits.
 const DIGITS: u32 = 3;
 
-/// In which direction a number may be changed to be short.
+/// Direction of rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
     /// Towards minus infinity: for upper ends.
@@ -14,18 +14,18 @@ pub enum Rounding {
     Up,
 }
 
-/// The number with three digits at most, rounded to the nearest.
+/// Formats the number with at most three decimal digits, rounded to the nearest.
 pub fn nearest(value: &Rational) -> String {
     value.to_decimal(DIGITS)
 }
 
-/// The number with `digits` digits at most, rounded in that direction.
+/// Formats the number with at most `digits` decimal digits, rounded in the given direction.
 pub fn rounded(value: &Rational, digits: u32, rounding: Rounding) -> String {
     round(value, digits, rounding).to_decimal(digits)
 }
 
-/// An end of an interval around `inside`, rounded inwards; as an exact fraction where rounding
-/// would step over `inside`.
+/// Formats an end of an interval around `inside`, rounded inwards, or as an exact fraction if
+/// rounding would cross `inside`.
 pub fn between(end: &Rational, inside: &Rational, rounding: Rounding) -> String {
     let short = round(end, DIGITS, rounding);
     let stays = match rounding {

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Proportion {
-    /// How many succeeded.
+    /// Number of successes.
     pub successes: u64,
-    /// Of how many.
+    /// Number of trials.
     pub count: u64,
 }
 
@@ -16,13 +16,13 @@ pub struct Proportion {
 const NORMAL_975: f64 = 1.959_963_984_540_054;
 
 impl Proportion {
-    /// The share, between 0 and 1; `None` of nothing.
+    /// Returns the proportion, between 0 and 1; `None` without trials.
     pub fn share(self) -> Option<f64> {
         (self.count > 0).then(|| float(self.successes) / float(self.count))
     }
 
-    /// Wilson's 95 % interval for the probability behind it (Wilson 1927). Unlike the textbook
-    /// interval it makes sense for 0 of n and n of n.
+    /// Returns Wilson's 95 % interval for the underlying probability (Wilson 1927). Unlike the
+    /// textbook interval it makes sense for 0 of n and n of n.
     pub fn wilson(self) -> Option<(f64, f64)> {
         let share = self.share()?;
         let (n, z) = (float(self.count), NORMAL_975);
@@ -36,53 +36,53 @@ impl Proportion {
         ))
     }
 
-    /// One more.
+    /// Adds a trial.
     pub fn add(&mut self, is_success: bool) {
         self.count += 1;
         self.successes += u64::from(is_success);
     }
 
-    /// All of both.
+    /// Adds the trials of `other`.
     pub fn merge(&mut self, other: Self) {
         self.successes += other.successes;
         self.count += other.count;
     }
 }
 
-/// A mean of whole numbers, kept exactly, so that parts add up to the whole in any order.
+/// A mean of integers. Sum and count are exact, so the order of merging does not matter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mean {
     /// The sum.
     pub sum: u64,
-    /// Of how many.
+    /// Number of values.
     pub count: u64,
 }
 
 impl Mean {
-    /// One more.
+    /// Adds a value.
     pub fn add(&mut self, value: u64) {
         self.sum += value;
         self.count += 1;
     }
 
-    /// The mean; `None` of nothing.
+    /// Returns the mean; `None` without values.
     pub fn value(self) -> Option<f64> {
         (self.count > 0).then(|| float(self.sum) / float(self.count))
     }
 
-    /// All of both.
+    /// Adds the values of `other`.
     pub fn merge(&mut self, other: Self) {
         self.sum += other.sum;
         self.count += other.count;
     }
 }
 
-/// The two-sided p-value of McNemar's exact test: how likely trials that were each decided for one
-/// of two sides divide at least as unevenly if both sides are equally likely. 1 if there are none.
+/// Returns the two-sided p-value of McNemar's exact test: the probability that discordant pairs are
+/// divided at least as unevenly if both sides are equally likely. Returns 1 if there are none.
 pub fn mcnemar(first: u64, second: u64) -> f64 {
     let count = first + second;
-    // ln C(n, k) - n ln 2, from k = 0 on, so that no term is too large or too small on the way.
+    // ln C(n, k) − n ln 2, from k = 0 on, so that no intermediate term overflows or underflows.
     let mut logarithm = -float(count) * std::f64::consts::LN_2;
     let mut tail = 0.0;
     for k in 0..=first.min(second) {
@@ -104,7 +104,7 @@ fn float(count: u64) -> f64 {
 mod tests {
     use super::{Proportion, mcnemar};
 
-    /// The sum of the definition, in whole numbers.
+    /// Computes the sum of the definition in integer arithmetic.
     fn mcnemar_by_counting(first: u64, second: u64) -> f64 {
         let (count, most) = (first + second, first.min(second));
         let few = (0_u32..1 << count).filter(|bits| u64::from(bits.count_ones()) <= most);

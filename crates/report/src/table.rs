@@ -7,19 +7,19 @@ use std::fmt::Write as _;
 pub struct Table {
     /// The caption.
     pub caption: String,
-    /// One for each column.
+    /// One heading for each column.
     pub headings: Vec<String>,
-    /// How many of the first columns say together what a row is about; they are repeated where a
-    /// table is folded. At least 1.
+    /// Number of leading columns that identify a row; at least 1. They are repeated if a table is
+    /// folded.
     pub keys: usize,
     /// Rows.
     pub rows: Vec<Vec<String>>,
-    /// Notes on the rows; only in Markdown, below the table.
+    /// Notes on the rows, printed below the table in Markdown only.
     pub notes: Vec<String>,
 }
 
 impl Table {
-    /// As Markdown, with the caption above it.
+    /// Renders the table as Markdown, with the caption above it.
     pub fn markdown(&self) -> String {
         let widths = self.widths();
         let mut text = format!("{}\n\n", self.caption);
@@ -47,7 +47,7 @@ impl Table {
         text
     }
 
-    /// As comma-separated values (RFC 4180), without the caption.
+    /// Renders the table as comma-separated values (RFC 4180), without the caption.
     pub fn csv(&self) -> String {
         let mut text = String::new();
         for row in std::iter::once(&self.headings).chain(&self.rows) {
@@ -57,7 +57,7 @@ impl Table {
         text
     }
 
-    /// For a terminal: columns two spaces apart.
+    /// Renders the table for a terminal, with two spaces between columns.
     pub fn plain(&self) -> String {
         let widths = self.widths();
         let mut text = format!("{}\n\n", self.caption);
@@ -72,8 +72,8 @@ impl Table {
         text
     }
 
-    /// For a terminal of `width` columns: headings are broken between words, and columns that do
-    /// not fit follow below, each time after the keys.
+    /// Renders the table for a terminal of `width` columns. Headings are broken between words.
+    /// Columns that do not fit follow in further blocks, which repeat the keys.
     pub fn within(&self, width: usize) -> String {
         let longest_word = |heading: &String| {
             let words = heading.split(' ').map(|word| word.chars().count());
@@ -98,7 +98,7 @@ impl Table {
         text
     }
 
-    /// Some columns, with their headings.
+    /// Writes some columns, with their headings.
     fn write_block(&self, text: &mut String, columns: &[usize], widths: &[usize]) {
         let heading = |column: &usize| broken(&self.headings[*column], widths[*column]);
         let headings: Vec<Vec<String>> = columns.iter().map(heading).collect();
@@ -132,7 +132,7 @@ impl Table {
     }
 }
 
-/// Which columns stand side by side: the keys, and as many others as fit, but at least one.
+/// Divides the columns into blocks: the keys, and as many others as fit, but at least one.
 fn blocks(widths: &[usize], keys: usize, width: usize) -> Vec<Vec<usize>> {
     let keys = keys.min(widths.len());
     if keys == 0 {
@@ -154,7 +154,7 @@ fn blocks(widths: &[usize], keys: usize, width: usize) -> Vec<Vec<usize>> {
     blocks
 }
 
-/// The words in lines that are no longer than `width`, where words are not.
+/// Breaks a text into lines of at most `width` characters. Longer words are not broken.
 fn broken(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ') {

@@ -1,9 +1,9 @@
-//! The record of a run as JSON Lines: `docs/formats/trace.md`.
+//! Record of a run as JSON Lines: `docs/formats/trace.md`.
 //!
-//! A trace holds all that came in from outside: what the world reported and which plans the
-//! planner made. Everything else follows from that, and a [`Replay`] shows that it does.
+//! A trace contains all external input of the run: the reports of the world and the plans of the
+//! planner. They determine everything else, and a [`Replay`] checks that.
 //!
-//! Whoever reads a trace has its lines as types ([`mod@line`]), from [`Stored::read`].
+//! [`Stored::read`] parses a trace into typed lines ([`mod@line`]).
 
 mod of;
 mod replay;
@@ -27,7 +27,7 @@ pub use snapshot::{
 pub const FORMAT: &str = "elbowroom-trace";
 /// The version of the format.
 pub const VERSION: u64 = 1;
-/// The kind of the second line of a record that begins anew.
+/// Kind of the second line of a rotated record.
 const SNAPSHOT: &str = "snapshot";
 /// The kind of the first line.
 const HEADER: &str = "header";
@@ -39,15 +39,16 @@ pub struct TraceWriter<'a> {
 }
 
 impl<'a> TraceWriter<'a> {
-    /// A writer that gives each line, with its line feed, to `sink`, which keeps it at once.
+    /// Creates a writer that passes each line, with its line feed, to `sink`, which must store it
+    /// immediately.
     pub fn new(task: Arc<Task>, sink: &'a mut (dyn FnMut(&str) + Send)) -> Self {
         Self { task, sink }
     }
 
-    /// The first line: what is run, as an object of the caller's choice.
+    /// Writes the first line: the specification of the run, as an object of the caller's choice.
     ///
     /// # Errors
-    /// When `spec` cannot be written as an object.
+    /// If `spec` cannot be written as an object.
     pub fn header(&mut self, spec: &impl Serialize) -> Result<(), serde_json::Error> {
         let header = serde_json::to_string(&Header {
             spec,
@@ -60,7 +61,7 @@ impl<'a> TraceWriter<'a> {
     }
 }
 
-/// The second line of a record that begins anew, without its line feed.
+/// Returns the second line of a rotated record, without its line feed.
 pub fn snapshot_text(snapshot: &SnapshotLine) -> String {
     #[derive(Serialize)]
     struct Named<'a> {

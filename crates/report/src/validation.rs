@@ -413,7 +413,7 @@ impl<'a> Validation<'a> {
         }
     }
 
-    /// The parts of goals that do not hold, in words.
+    /// Returns the parts of goals that do not hold, in words.
     fn unmet<'g>(
         &self,
         goals: impl IntoIterator<Item = &'g Condition>,

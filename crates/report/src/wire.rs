@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::line::{GivenLine, ObservationLine};
 
-/// A message that cannot be understood.
+/// Error: a message is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct WireError {
@@ -25,7 +25,7 @@ pub(crate) fn wrong(message: impl Into<String>) -> WireError {
     }
 }
 
-/// A number.
+/// Writes a number.
 pub fn number(value: &Rational) -> Value {
     json!({ "exact": value.to_string(), "decimal": value.to_f64() })
 }
@@ -43,10 +43,10 @@ pub fn read_number(value: &Value) -> Option<Rational> {
     }
 }
 
-/// The field `name` as a number.
+/// Returns the field `name` as a number.
 ///
 /// # Errors
-/// When it is missing, or no number.
+/// If it is missing or not a number.
 pub fn field_number(message: &Value, name: &str) -> Result<Rational, WireError> {
     let value = message
         .get(name)
@@ -54,10 +54,10 @@ pub fn field_number(message: &Value, name: &str) -> Result<Rational, WireError> 
     read_number(value).ok_or_else(|| wrong(format!("`{name}` must be a number")))
 }
 
-/// The field `name` as a text.
+/// Returns the field `name` as a text.
 ///
 /// # Errors
-/// When it is missing, or no text.
+/// If it is missing or not a text.
 pub fn field_text<'a>(message: &'a Value, name: &str) -> Result<&'a str, WireError> {
     let value = message
         .get(name)
@@ -67,12 +67,12 @@ pub fn field_text<'a>(message: &'a Value, name: &str) -> Result<&'a str, WireErr
         .ok_or_else(|| wrong(format!("`{name}` must be a text")))
 }
 
-/// A command.
+/// Writes a command.
 pub fn command(command: &Command) -> Value {
     value(&GivenLine::of(command))
 }
 
-/// An observation.
+/// Writes an observation.
 pub fn observation(task: &Task, observation: &Observation) -> Value {
     value(&ObservationLine::of(task, observation))
 }
@@ -81,10 +81,10 @@ fn value(line: &impl Serialize) -> Value {
     serde_json::to_value(line).unwrap_or(Value::Null)
 }
 
-/// Reads an observation. It may be of facts and fluents that nothing has mentioned before.
+/// Reads an observation. Its facts and fluents need not have been mentioned before.
 ///
 /// # Errors
-/// When it is none, or names what the problem does not have.
+/// If it is not an observation, or refers to objects that the problem does not have.
 pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, WireError> {
     let ticket = || {
         let ticket = message.get("ticket").and_then(Value::as_u64);
@@ -129,7 +129,7 @@ pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, Wir
                 value: field_number(message, "value")?,
             }
         }
-        // What was written down of something that could not be read.
+        // Record of an invalid message.
         "unintelligible" => Event::Unintelligible {
             said: field_text(message, "said")?.to_owned(),
             why: field_text(message, "why")?.to_owned(),

@@ -1,42 +1,43 @@
-//! The interface of the module: memory and one function, as C would call them.
+//! C interface of the module: memory management and one function.
 //!
-//! A host reserves room with [`elbowroom_reserve`], writes a question in UTF-8 there, and calls
-//! [`elbowroom_ask`]. The reply begins with its length in bytes, four of them, the lowest first;
-//! the reply itself follows, in UTF-8. The host gives back what it was given with
+//! A host allocates a buffer with [`elbowroom_reserve`], writes a question in UTF-8 into it, and
+//! calls [`elbowroom_ask`]. The result is the length of the reply in bytes, as a little-endian
+//! 32-bit integer, followed by the reply in UTF-8. The host frees both buffers with
 //! [`elbowroom_release`]. On WebAssembly the module imports one function, `now` from `elbowroom`:
-//! milliseconds since some fixed moment, as a double.
+//! milliseconds since a fixed moment, as a double.
 //!
-//! A panic ends the instance, which is of no more use then: the host makes a new one.
+//! A panic makes the instance unusable; the host must create a new one.
 
 #![allow(unsafe_code, reason = "callers in other languages pass addresses")]
 
 use std::time::Duration;
 
-/// The bytes before a reply: its length.
+/// Length of the head of a reply, in bytes.
 const HEAD: usize = 4;
 
-/// Room for that many bytes, which belongs to the host until it gives it back.
+/// Allocates a buffer of `length` bytes. The host must release it.
 #[unsafe(no_mangle)]
 pub extern "C" fn elbowroom_reserve(length: usize) -> *mut u8 {
     handed_over(vec![0; length])
 }
 
-/// Takes back room.
+/// Frees a buffer.
 ///
 /// # Safety
-/// `start` and `length` are those of room that was reserved, or of a reply with its head, and it
-/// has not been given back before.
+/// `start` and `length` must be those of a buffer from [`elbowroom_reserve`], or of a reply with
+/// its head, which has not been released before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn elbowroom_release(start: *mut u8, length: usize) {
     let slice = std::ptr::slice_from_raw_parts_mut(start, length);
-    // SAFETY: what is handed over is a boxed slice of that length, by `handed_over`.
+    // SAFETY: by this function's contract, the memory is a boxed slice of that length from
+    // `handed_over`.
     drop(unsafe { Box::from_raw(slice) });
 }
 
-/// The reply to a question.
+/// Returns the reply to a question.
 ///
 /// # Safety
-/// The host has written that many bytes at `start`.
+/// The host must have written `length` bytes at `start`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn elbowroom_ask(start: *const u8, length: usize) -> *mut u8 {
     // SAFETY: by this function's own contract.
@@ -79,7 +80,7 @@ mod tests {
     fn a_reply_comes_with_its_length_and_can_be_given_back() {
         let question = b"no question";
         let room = elbowroom_reserve(question.len());
-        // SAFETY: the room is as long as the question, and both it and the reply are given back
+        // SAFETY: the buffer is as long as the question, and buffer and reply are both released
         // once.
         let reply = unsafe {
             room.copy_from_nonoverlapping(question.as_ptr(), question.len());

@@ -1,4 +1,4 @@
-//! From questions to replies.
+//! Computation of replies.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -31,7 +31,7 @@ use crate::question::{
 use crate::reply::{Failure, Reply, document};
 use crate::watch::Watch;
 
-/// What the exit codes say.
+/// Exit codes, see `docs/exit-codes.md`.
 const YES: u8 = 0;
 const NO: u8 = 1;
 const BAD_INPUT: u8 = 2;
@@ -53,7 +53,7 @@ pub(crate) fn answer(question: &Question, clock: &mut Clock<'_>) -> Result<Reply
     }
 }
 
-/// A problem, and what there was to remark on in its texts.
+/// A problem, and the warnings about its texts.
 struct Read {
     task: Task,
     warnings: Vec<Diagnostic>,
@@ -70,7 +70,7 @@ impl Read {
         Ok(Self { task, warnings })
     }
 
-    /// A plan of either kind: told by its content, or by a name that ends in `.stn`.
+    /// Reads a plan of either kind. The content, or the extension `.stn`, determines the kind.
     fn plan(&mut self, text: &Text) -> Result<AnyPlan, Failure> {
         self.plan_by(text, &RoundingRule::default())
     }
@@ -273,7 +273,7 @@ fn widened(
     })
 }
 
-/// The whole region.
+/// Computes the whole region.
 fn delimited(
     question: &EnvelopeQuestion,
     request: &EnvelopeRequest,
@@ -302,7 +302,7 @@ fn delimited(
     })
 }
 
-/// The rule that sets time-outs.
+/// Parses the rule that sets time-outs.
 fn timeout(text: Option<&str>) -> Result<TimeoutRule, Failure> {
     text.map_or(Ok(TimeoutRule::default()), str::parse)
         .map_err(|error| Failure::new(format!("timeout: {error}")))
@@ -368,7 +368,7 @@ fn ran(
     })
 }
 
-/// What is wrong with a world or with likelihoods is said of their texts.
+/// Converts a specification error. Errors of a world or of likelihoods refer to their texts.
 fn contradiction(error: SpecError) -> Failure {
     match error {
         SpecError::World(wrong) | SpecError::Likelihoods(wrong) => wrong.into(),

@@ -1,10 +1,10 @@
-//! The library for browsers: a question goes in as JSON, the answer comes out as JSON.
+//! The library for browsers: questions and answers are JSON.
 //!
-//! Built for `wasm32-unknown-unknown`, this is a module with a plain C interface ([`abi`]) that
-//! needs no generated bindings. A [`Question`] holds all that it is about, texts included, because
-//! a browser has no files; a [`Reply`] holds the document that the command prints with `--json`,
-//! byte for byte, and the exit code that the command would end with. This crate only translates:
-//! what an answer *is* stands in `elbowroom`, and what a page shows in `elbowroom-page`.
+//! Built for `wasm32-unknown-unknown`, this crate is a module with a plain C interface ([`abi`])
+//! that needs no generated bindings. A [`Question`] contains all its input, including texts,
+//! because a browser has no files. A [`Reply`] contains the document that the command prints with
+//! `--json`, byte for byte, and the command's exit code. This crate only translates: answers are
+//! defined in `elbowroom`, and pages in `elbowroom-page`.
 //!
 //! ```
 //! use elbowroom_web::reply;
@@ -34,10 +34,10 @@ pub use reply::Reply;
 
 use reply::Failure;
 
-/// The reply to a question, which is a [`Question`] as JSON. `clock` says how much time has passed
-/// since some fixed moment.
+/// Returns the reply to a question, which is a [`Question`] as JSON. `clock` returns the time since
+/// a fixed moment.
 ///
-/// A question that cannot be understood is replied to, too.
+/// The reply to an invalid question is an error document.
 pub fn reply(question: &str, clock: &mut (dyn FnMut() -> Duration + Send)) -> Reply {
     let question: Question = match serde_json::from_str(question) {
         Ok(question) => question,

@@ -1,32 +1,32 @@
-//! What can be asked. The members are named as the options of the command, and mean the same.
+//! Questions. Members have the names and meanings of the command's options.
 
 use elbowroom::envelope::{self, Growth, Guarantee, Objective};
 use elbowroom::execute::NamedText;
 use elbowroom::text::Source;
 use serde::Deserialize;
 
-/// A question, told by its member `ask`.
+/// A question. The member `ask` determines its kind.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "ask", rename_all = "lowercase")]
 #[allow(clippy::large_enum_variant, reason = "there is one at a time")]
 pub enum Question {
-    /// Is a plan valid? `elbowroom check`.
+    /// Validation of a plan: `elbowroom check`.
     Check(CheckQuestion),
-    /// Is there a plan? `elbowroom plan`.
+    /// Search for a plan: `elbowroom plan`.
     Plan(PlanQuestion),
-    /// Which orderings and times does it need? `elbowroom stn`.
+    /// Orderings and time bounds of a plan: `elbowroom stn`.
     Stn(StnQuestion),
-    /// How far may each quantity deviate? `elbowroom envelope`.
+    /// Tolerated deviations of quantities: `elbowroom envelope`.
     Envelope(EnvelopeQuestion),
-    /// What comes of executing it? `elbowroom run`.
+    /// Simulated execution of a plan: `elbowroom run`.
     Run(RunQuestion),
-    /// What does that look like? `elbowroom report`.
+    /// Page of an answer or a trace: `elbowroom report`.
     Page(PageQuestion),
-    /// Which version is this, and which executors are there?
+    /// Version, and list of executors.
     About,
 }
 
-/// A file: its name, for messages, and what stands in it.
+/// A file: its name, for messages, and its content.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Text {
@@ -36,7 +36,7 @@ pub struct Text {
     pub text: String,
 }
 
-/// Asks whether a plan is valid, or, without a plan, whether a problem can be read.
+/// Validates a plan, or, without a plan, only reads the problem.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckQuestion {
@@ -47,16 +47,15 @@ pub struct CheckQuestion {
     /// The plan, with fixed times.
     #[serde(default)]
     pub plan: Option<Text>,
-    /// The least separation of interfering happenings, as an exact number: `0.001` if there is
-    /// none.
+    /// Minimum separation of interfering happenings, as an exact number; `0.001` by default.
     #[serde(default)]
     pub epsilon: Option<String>,
-    /// By how much times may be off, as VAL's `-t`.
+    /// Tolerance of times, as VAL's `-t`.
     #[serde(default)]
     pub tolerance: Option<String>,
 }
 
-/// Asks for a plan.
+/// Searches for a plan.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PlanQuestion {
@@ -67,11 +66,11 @@ pub struct PlanQuestion {
     /// As for a [check](CheckQuestion::epsilon).
     #[serde(default)]
     pub epsilon: Option<String>,
-    /// Better plans are looked for until so many seconds have passed; without it, the first is
-    /// taken.
+    /// Time limit of the search for better plans, in seconds. Without it, the first plan is
+    /// returned.
     #[serde(default)]
     pub time_limit: Option<String>,
-    /// Whether the first plan is enough, whatever time is left.
+    /// `true` if the search ends with the first plan.
     #[serde(default)]
     pub first: bool,
     /// `true` if a ground action may overlap itself in the plan.
@@ -79,7 +78,7 @@ pub struct PlanQuestion {
     pub self_overlap: bool,
 }
 
-/// Asks for a plan's network.
+/// Converts a plan to a network.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StnQuestion {
@@ -94,7 +93,7 @@ pub struct StnQuestion {
     pub epsilon: Option<String>,
 }
 
-/// Asks for an envelope, or whether a box is inside.
+/// Computes an envelope, or checks if a box is inside.
 #[allow(
     clippy::struct_excessive_bools,
     reason = "each is an option of the command"
@@ -111,60 +110,60 @@ pub struct EnvelopeQuestion {
     /// As for a [check](CheckQuestion::epsilon).
     #[serde(default)]
     pub epsilon: Option<String>,
-    /// What may deviate; all durations if empty.
+    /// Quantities that may deviate; all durations if empty.
     #[serde(default)]
     pub vary: Vec<String>,
     /// Actions whose durations the executor chooses.
     #[serde(default)]
     pub controllable: Vec<String>,
-    /// What holds inside the envelope.
+    /// Guarantee inside the envelope.
     #[serde(default)]
     pub guarantee: Option<Guarantee>,
-    /// Whether the dispatcher enforces conditions that bound the difference of two times.
+    /// `true` if the dispatcher enforces conditions that bound the difference of two times.
     #[serde(default)]
     pub enforce: bool,
     /// The rule that sets the time-out of each action: `none`, a number of seconds, or `10x,600`, the
     /// default.
     #[serde(default)]
     pub timeout: Option<String>,
-    /// The box that is asked about; without one, a large one is looked for.
+    /// The box to check; without it, a large box is computed.
     #[serde(default)]
     pub contains: Option<String>,
     /// The algorithm.
     #[serde(default)]
     pub method: Option<Method>,
-    /// With the method `exact`: whether the answer has the region's volume, and boxes with their
-    /// shares of it.
+    /// With the method `exact`: `true` to compute the region's volume, and the shares of boxes.
     #[serde(default)]
     pub volume: bool,
-    /// The seed of what is sampled for that.
+    /// Random seed of the samples for the volume.
     #[serde(default)]
     pub seed: u64,
-    /// What the best box is the greatest of.
+    /// Objective of the best box.
     #[serde(default)]
     pub objective: Objective,
-    /// With the objective `probability`: the world that says how long actions take
+    /// With the objective `probability`: the world with the distributions of durations
     /// (`docs/formats/world.md`).
     #[serde(default)]
     pub world: Option<Text>,
-    /// Whether both ends of the best box's intervals are equally far from the nominal value.
+    /// `true` if both ends of each interval of the best box must be equally far from the nominal
+    /// value.
     #[serde(default)]
     pub symmetric: bool,
-    /// The step size at which the search ends; without one, a hundredth of each nominal value.
+    /// Step size at which the search ends; a hundredth of each nominal value by default.
     #[serde(default)]
     pub precision: Option<String>,
-    /// Whether steps double after a success.
+    /// Growth of steps after a success.
     #[serde(default)]
     pub growth: Growth,
-    /// Whether each bound is moved to its limit in the end.
+    /// `true` if each bound is finally moved to its limit.
     #[serde(default)]
     pub sharpen: bool,
-    /// The search ends after so many seconds.
+    /// Time limit of the search, in seconds.
     #[serde(default)]
     pub time_limit: Option<String>,
 }
 
-/// Asks for a run in a simulated world.
+/// Executes a plan in a simulated world.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RunQuestion {
@@ -172,16 +171,16 @@ pub struct RunQuestion {
     pub domain: Text,
     /// The problem, in PDDL.
     pub problem: Text,
-    /// The plan to begin with, with fixed times; without one, one is made.
+    /// The first plan, with fixed times; without it, the planner makes one.
     #[serde(default)]
     pub plan: Option<Text>,
-    /// The world (`docs/formats/world.md`); without one, everything goes as planned.
+    /// The world (`docs/formats/world.md`); without it, all actions go as planned.
     #[serde(default)]
     pub world: Option<Text>,
     /// Probabilities for the executors that use them (`docs/formats/likelihoods.md`).
     #[serde(default)]
     pub likelihoods: Option<Text>,
-    /// The executor; `live` if there is none.
+    /// The executor; `live` by default.
     #[serde(default)]
     pub executor: Option<String>,
     /// The seed of the world's random numbers.
@@ -193,7 +192,7 @@ pub struct RunQuestion {
     /// As for an [envelope](EnvelopeQuestion::timeout).
     #[serde(default)]
     pub timeout: Option<String>,
-    /// How many new plans may be made.
+    /// Maximum number of new plans.
     #[serde(default)]
     pub max_replans: Option<usize>,
     /// As for a [check](CheckQuestion::epsilon).
@@ -209,26 +208,26 @@ pub enum Method {
     Irr,
     /// The largest box.
     Best,
-    /// No box, but the whole region.
+    /// The whole region instead of a box.
     Exact,
 }
 
 impl Method {
-    /// The method of the search for a box.
+    /// Returns the method of the search for a box.
     pub fn of_boxes(self) -> envelope::Method {
         match self {
-            // The whole region is found without looking for a box.
+            // The whole region is computed without a box.
             Self::Irr | Self::Exact => envelope::Method::Irr,
             Self::Best => envelope::Method::Best,
         }
     }
 }
 
-/// Asks for the page about an answer or a trace.
+/// Renders the page of an answer or a trace.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PageQuestion {
-    /// The answer, as a [reply](crate::Reply::document) has it, or the trace.
+    /// The answer, as in [`Reply::document`](crate::Reply::document), or the trace.
     pub of: Text,
 }
 

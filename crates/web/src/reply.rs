@@ -1,4 +1,4 @@
-//! What is replied.
+//! Replies and failures.
 
 use std::fmt::Display;
 
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 /// The reply to a question.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Reply {
-    /// The exit code with which the command would end: `docs/exit-codes.md`.
+    /// Exit code of the command: `docs/exit-codes.md`.
     pub exit: u8,
     /// The document that the command prints with `--json`; empty for a page.
     pub document: String,
@@ -24,7 +24,7 @@ pub struct Reply {
     pub page: Option<String>,
 }
 
-/// Why there is no answer.
+/// Reason why there is no answer.
 #[derive(Clone, Debug)]
 pub(crate) struct Failure {
     message: String,
@@ -69,7 +69,7 @@ impl From<Failure> for Reply {
     }
 }
 
-/// An answer as the command prints it, with the warnings about the texts that it is about.
+/// Formats an answer like the command, with the warnings about its input texts.
 pub(crate) fn document(
     answer: &impl Serialize,
     warnings: &[Diagnostic],

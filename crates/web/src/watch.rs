@@ -1,11 +1,11 @@
-//! Time limits, by the clock that the caller brings.
+//! Time limits, based on the caller's clock.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 use elbowroom::answers::{Halt, Watcher};
 
-/// Ends the work at a time limit, if there is one.
+/// Watcher that ends the work at a time limit, if there is one.
 pub(crate) struct Watch<'a> {
     clock: &'a mut (dyn FnMut() -> Duration + Send),
     begun: Duration,
@@ -13,7 +13,7 @@ pub(crate) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Begins to watch now.
+    /// Creates a watcher whose time limit starts now.
     pub(crate) fn start(
         clock: &'a mut (dyn FnMut() -> Duration + Send),
         limit: Option<Duration>,

@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom compare`.
+//! Arguments of `elbowroom compare`.
 
 use std::path::PathBuf;
 

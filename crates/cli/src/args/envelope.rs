@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom envelope`.
+//! Arguments of `elbowroom envelope`.
 
 use std::path::PathBuf;
 
@@ -133,10 +133,10 @@ impl EnvelopeArgs {
         RoundingRule::with_tolerance(self.tolerance.clone())
     }
 
-    /// Refuses what has nothing to do with repairs.
+    /// Rejects options that do not apply to repairs.
     ///
     /// # Errors
-    /// When something of that kind is asked for.
+    /// If such an option is given.
     pub(crate) fn check_repair(&self) -> Result<(), Failure> {
         let others = [
             ("--method", self.method.is_some()),
@@ -172,10 +172,11 @@ impl EnvelopeArgs {
         Ok(())
     }
 
-    /// Whether the whole region is asked for, and not a box.
+    /// Returns `true` if the exact region is requested instead of a box.
     ///
     /// # Errors
-    /// When something else is asked for that only boxes have.
+    /// If an option does not apply to the requested kind of envelope, or contradicts another
+    /// option.
     pub(crate) fn is_exact(&self) -> Result<bool, Failure> {
         if self.method != Some(Method::Exact) {
             let only_regions = [
@@ -231,16 +232,16 @@ impl EnvelopeArgs {
         }
     }
 
-    /// Up to which multiple of the nominal value ends count that nothing bounds.
+    /// Returns the multiple of the nominal value at which unbounded ends are capped.
     pub(crate) fn most(&self) -> Rational {
         let default = library::BestSettings::default().most;
         self.cap.clone().unwrap_or(default)
     }
 
-    /// The algorithm, and what it is asked for.
+    /// Returns the algorithm and its settings.
     ///
     /// # Errors
-    /// When IRR is asked for something that only the largest box has.
+    /// If an option that only the largest box supports is combined with IRR.
     pub(crate) fn method(
         &self,
     ) -> Result<(Option<library::Method>, library::BestSettings), Failure> {

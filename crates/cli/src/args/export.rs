@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom export`.
+//! Arguments of `elbowroom export`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -97,7 +97,7 @@ pub(crate) enum Bound {
     Upper,
 }
 
-/// What becomes of a run in a dead end.
+/// Rule for runs in a dead end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct DeadEndRule(pub(crate) DeadEnds);
 

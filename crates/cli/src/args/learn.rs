@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom learn`.
+//! Arguments of `elbowroom learn`.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom network`.
+//! Arguments of `elbowroom network`.
 
 use std::path::PathBuf;
 

@@ -30,7 +30,7 @@ pub(super) fn count(text: &str) -> Result<usize, String> {
 
 pub(super) fn factor(text: &str) -> Result<Rational, String> {
     let value = number(text)?;
-    // Beyond that, a world stands still for years, or there is no clock to speak of.
+    // Beyond these limits, the world would take years, or its clock would have no resolution left.
     if value < Rational::new(1, 1_000_000) || value > Rational::from(1_000_000_000) {
         return Err("it must lie between 0.000001 and 1000000000".to_owned());
     }

@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom odds`.
+//! Arguments of `elbowroom odds`.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom plan`.
+//! Arguments of `elbowroom plan`.
 
 use std::path::PathBuf;
 
@@ -68,7 +68,7 @@ pub(crate) struct PlanArgs {
     pub(crate) json: bool,
 }
 
-/// What plans can be made for.
+/// Objective of planning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PlanObjectiveChoice {
     /// The relative deviation that all its durations may have

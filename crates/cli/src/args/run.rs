@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom run`.
+//! Arguments of `elbowroom run`.
 
 use std::path::PathBuf;
 
@@ -85,7 +85,8 @@ pub(crate) struct RunArgs {
     pub(crate) believed: Option<PathBuf>,
     /// The box from which the spoiler chooses durations, as in `envelope --contains`; by default
     /// the plan's envelope
-    // What a given argument conflicts with, clap does not ask for: the conflict has to be named here, too.
+    // clap does not require an argument that conflicts with a given one, so each conflict is
+    // repeated here.
     #[arg(
         long,
         value_name = "BOX",
@@ -243,7 +244,7 @@ impl RunArgs {
         self.first_plan.as_ref().or(self.plan.as_ref())
     }
 
-    /// Whether the world is the spoiler.
+    /// Returns `true` if the world is the spoiler.
     pub(crate) fn is_spoiled(&self) -> bool {
         self.world.as_deref() == Some(std::path::Path::new("spoiler"))
     }

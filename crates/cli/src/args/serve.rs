@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom serve` and `elbowroom ctl`.
+//! Arguments of `elbowroom serve` and `elbowroom ctl`.
 
 use std::path::PathBuf;
 

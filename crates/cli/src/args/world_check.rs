@@ -1,4 +1,4 @@
-//! What can be said to `elbowroom world-check`.
+//! Arguments of `elbowroom world-check`.
 
 use std::path::PathBuf;
 

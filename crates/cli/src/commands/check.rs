@@ -1,4 +1,4 @@
-//! `elbowroom check`: is the plan valid?
+//! `elbowroom check`: validation of a plan.
 
 use std::fmt::Write as _;
 
@@ -20,14 +20,14 @@ use crate::output::Output;
 use crate::{input, number, output};
 use elbowroom_executive::messages::counted;
 
-/// The advice for who gives a network.
+/// Advice if the given plan is an STN plan.
 const FOR_NETWORKS: &str = "`elbowroom envelope` says whether all of them work; `check` judges a plan with \
                             fixed times";
 
-/// Only the tightest margins are shown to people; `--json` has all.
+/// Maximum number of margins printed, the tightest ones; `--json` has all.
 const MARGINS_SHOWN: usize = 8;
 
-/// Checks a problem, or a plan for it.
+/// Checks a problem, or validates a plan for it.
 pub(crate) fn run(arguments: &CheckArgs, output: &mut Output) -> Answer {
     let answer = judge(arguments, output);
     if arguments.diagnostics == DiagnosticsForm::Lines {
@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: &CheckArgs, output: &mut Output) -> Answer {
     answer
 }
 
-/// A finding on one line, in the form that VAL's parser made usual.
+/// Formats a finding as one line in the style of VAL's parser.
 fn line(finding: &Record) -> String {
     let severity = match finding.severity {
         Severity::Error => "Error",
@@ -51,7 +51,7 @@ fn line(finding: &Record) -> String {
     if let Some(advice) = &finding.advice {
         let _ = write!(line, " ({advice})");
     }
-    // Names in a message may have line feeds.
+    // Names in a message may contain line feeds.
     line.replace(['\n', '\r'], " ") + "\n"
 }
 
@@ -143,7 +143,7 @@ fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
     }
 }
 
-/// Says that domain and problem can be read.
+/// Reports that domain and problem are readable.
 fn readable(task: &Task, read: &ProblemRead) -> String {
     let problem = task.problem();
     format!(
@@ -159,7 +159,7 @@ fn readable(task: &Task, read: &ProblemRead) -> String {
     )
 }
 
-/// The fluents that the plan's actions change.
+/// Appends the fluents that the plan's actions change.
 fn push_values(text: &mut String, values: &[FluentValue]) {
     let mut changed = values.iter().filter(|value| value.is_changed).peekable();
     if changed.peek().is_some() {
@@ -170,7 +170,7 @@ fn push_values(text: &mut String, values: &[FluentValue]) {
     }
 }
 
-/// What the plan violates of the preferences.
+/// Appends the preferences that the plan violates.
 fn push_preferences(text: &mut String, preferences: &[PreferenceAnswer], look: Look) {
     if !preferences.is_empty() {
         let _ = write!(text, "\n{}\n", styled(STRONG, "Violated preferences"));
@@ -194,7 +194,7 @@ fn push_preferences(text: &mut String, preferences: &[PreferenceAnswer], look: L
     }
 }
 
-/// The tightest margins.
+/// Appends the tightest margins.
 fn push_margins(text: &mut String, margins: &[MarginAnswer], look: Look) {
     let mut margins: Vec<&MarginAnswer> = margins.iter().collect();
     margins.sort_by(|a, b| a.margin.cmp(&b.margin));

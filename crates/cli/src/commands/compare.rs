@@ -1,4 +1,4 @@
-//! `elbowroom compare`: executors in many runs, side by side.
+//! `elbowroom compare`: comparison of executors over many runs.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -22,14 +22,14 @@ use crate::stopwatch::Stopwatch;
 use crate::{input, output};
 use elbowroom_executive::messages::plain;
 
-/// Where traces of failed trials go, beside the results.
+/// Folder for the traces of failed trials, inside the folder of the results.
 pub(crate) const FAILURES: &str = "failures";
-/// So many kinds of failure of one executor in one world have a trace.
+/// Maximum number of kinds of failure, for each executor and world, whose trace is written.
 const MOST_OF_A_CELL: usize = 3;
-/// So many traces are written at most.
+/// Maximum number of traces written in total.
 const MOST_FAILURES: usize = 60;
 
-/// Makes an experiment, or a part of it, or puts parts together.
+/// Runs an experiment or a part of it, or merges parts.
 pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     let text = input::source(&arguments.experiment, "experiment")?;
     let folder = arguments
@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
         fs::read_to_string(&path)
             .map_err(|error| format!("cannot read {}: {}", path.display(), plain(&error)))
     };
-    // Who cannot write there learns it before hours of trials, not after.
+    // An unwritable folder is reported before the trials, not after hours of them.
     if let Some(folder) = &arguments.output {
         make_folder(folder)?;
     }
@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
         merged(&arguments.merge, &experiment)?
     };
     let table = answer.table(&experiment)?;
-    // What was computed is shown, whatever becomes of the files.
+    // The results are printed even if the files cannot be written.
     let written = match &arguments.output {
         Some(folder) => write(folder, &answer, &table, records)
             .and_then(|()| write_failures(folder, &experiment, &answer)),
@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     } else {
         output::print(&table.within(Look::of_stdout().width))?;
     }
-    // What was ended early is shown and kept, but is not what was asked for.
+    // The results of an interrupted experiment are printed and written, but the exit code is not 0.
     written.map(|()| {
         let invalid = answer.invalid_notes();
         if !invalid.is_empty() {
@@ -106,7 +106,7 @@ fn make(
     Ok(answer?)
 }
 
-/// Shows how many trials have been made, and ends them when the user asks to.
+/// Watcher that shows the number of trials made, and ends them on request.
 struct Watch {
     line: Progress,
     stopwatch: Stopwatch,
@@ -165,8 +165,8 @@ fn write(
     Ok(())
 }
 
-/// Writes traces of failed trials to a folder of its own: the first of each frequent kind, named by
-/// row, column and kind. What an earlier experiment left there goes.
+/// Writes traces of failed trials to their own folder: the first of each frequent kind, named by
+/// row, column and kind. Traces of an earlier experiment are removed.
 fn write_failures(
     folder: &Path,
     experiment: &AnyExperiment,
@@ -181,7 +181,7 @@ fn write_failures(
             })?;
         }
     }
-    // Who has ended the experiment does not wait for more trials.
+    // After an interrupt, no further trials are run.
     let mut failed = if answer.is_interrupted() {
         Vec::new()
     } else {
@@ -199,7 +199,7 @@ fn write_failures(
     Ok(())
 }
 
-/// The traces of failed trials in a folder that an experiment was written to: row, column and kind of
+/// Returns the traces of failed trials in the folder of an experiment: row, column and kind of
 /// each, and its file.
 pub(crate) fn traces(folder: &Path) -> Result<Vec<(FailurePlace, PathBuf)>, Failure> {
     let wrong = |error: &io::Error| {

@@ -1,4 +1,4 @@
-//! `elbowroom ctl`: asks an executive, `docs/serve.md`.
+//! `elbowroom ctl`: client of an executive, `docs/serve.md`.
 
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind};
@@ -25,7 +25,7 @@ use elbowroom::num::work::Stop;
 use elbowroom_executive::http::{self, AccessControl};
 use elbowroom_executive::messages::{counted, escape_control, plain};
 
-/// Asks, and prints the answer.
+/// Sends the request and prints the answer.
 pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
     let client = Client { arguments };
     match &arguments.what {
@@ -108,10 +108,10 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
     }
 }
 
-/// Interval between two questions about the goal for which `ctl goal --wait` waits.
+/// Interval between queries for the goal of `ctl goal --wait`.
 const GOAL_POLL_INTERVAL: Duration = Duration::from_millis(200);
 
-/// No body.
+/// A request without a body.
 const NOTHING: Option<&NewFact> = None;
 
 /// A client of an executive.
@@ -150,7 +150,7 @@ impl Client<'_> {
         answer.map_err(|error| self.unreachable(&error))
     }
 
-    /// Asks something; the answer, and the same as it came.
+    /// Sends a request. Returns the answer, parsed and as received.
     fn ask<T: DeserializeOwned>(
         &self,
         what: (&str, &str),
@@ -168,7 +168,7 @@ impl Client<'_> {
         Ok((document, value))
     }
 
-    /// Why the executive does not do what it is asked, in its own words.
+    /// Converts the executive's refusal to a failure with the same message and advice.
     fn refused(&self, status: u16, text: &str) -> Failure {
         match serde_json::from_str::<Refusal>(text) {
             Ok(refusal) => Failure::new(
@@ -230,7 +230,7 @@ impl Client<'_> {
         Ok(Exit::Yes)
     }
 
-    /// Gives a goal, and waits until it is closed or the executive rests without a plan for it.
+    /// Submits a goal, and waits until it is closed or the executive is idle without a plan for it.
     fn give_and_wait(&self, output: &mut Output, new: &NewGoal) -> Answer {
         let (before, _) = self.ask::<State>(("GET", "/v1/state"), None)?;
         let body = serde_json::to_string(new).ok();
@@ -242,7 +242,7 @@ impl Client<'_> {
                 let is_later = |given: &Exact| given.0 >= before.now.0;
                 goal.name == name && goal.given.as_ref().is_some_and(is_later)
             };
-            // The newest one of this name is the last one.
+            // Of several goals with this name, the last one is the newest.
             let Some(goal) = all.goals.into_iter().rev().find(is_it) else {
                 std::thread::sleep(GOAL_POLL_INTERVAL);
                 continue;
@@ -265,7 +265,7 @@ impl Client<'_> {
         }
     }
 
-    /// Prints each line as it comes.
+    /// Prints each line of the trace as it is received.
     fn events(&self, after: Option<usize>) -> Answer {
         let path = after.map_or("/v1/events".to_owned(), |after| {
             format!("/v1/events?after={after}")

@@ -1,4 +1,4 @@
-//! `elbowroom envelope`: how far may each quantity deviate?
+//! `elbowroom envelope`: tolerated deviations of quantities.
 
 mod exact;
 mod repair;
@@ -19,7 +19,7 @@ use crate::output::Output;
 use crate::{input, output};
 use watch::Watch;
 
-/// Computes an envelope, or says whether a box is inside.
+/// Computes an envelope, or checks if a box is inside.
 pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     if arguments.repair {
         return repair::run(arguments, output);
@@ -66,7 +66,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         ..EnvelopeRequest::new(&Arc::new(task), plan)
     };
     let request = Arc::new(request);
-    // The line on the terminal goes before the answer comes.
+    // The progress line is removed before the answer is printed.
     let outcome = watch.answer(&request).map_err(failure)?;
     if arguments.json {
         output.document(&outcome.answer)?;

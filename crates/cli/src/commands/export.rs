@@ -1,4 +1,4 @@
-//! `elbowroom export`: what other programs can check.
+//! `elbowroom export`: input for other programs.
 
 mod prism;
 
@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         (_, None) => export::region(&task, &plan),
     };
     let text = match written {
-        // That the box is not inside is an answer.
+        // A box that is not inside is a valid answer.
         Err(error @ ExportError::NoSchedule) => {
             output::tell(&format!("{}: {error}", styled(BAD, "outside")));
             return Ok(Exit::No);
@@ -144,7 +144,7 @@ fn refuse_what_networks_do_not_have(arguments: &ExportArgs) -> Result<(), Failur
     }
 }
 
-/// The box and the guarantee asked about; `None` for the region.
+/// Returns the requested box and guarantee; `None` for the region.
 fn asked(
     arguments: &ExportArgs,
     plan: &ParametrizedPlan,
@@ -190,7 +190,7 @@ fn asked(
     )))
 }
 
-/// The network in the format that the name of the file asks for.
+/// Writes the network in the format of the file's extension.
 fn network(path: Option<&Path>, file: &NetworkFile) -> Result<String, Failure> {
     let ending = path.and_then(Path::extension);
     let has_ending = |wanted: &str| ending.is_some_and(|own| own.eq_ignore_ascii_case(wanted));

@@ -1,4 +1,4 @@
-//! `elbowroom learn`: what logs say about the world.
+//! `elbowroom learn`: estimation of a world model from logs.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
 use elbowroom_executive::messages::counted;
 
-/// Reads the logs, and says what they tell.
+/// Reads the logs and prints the learnt model.
 pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
     let is_on_stdout = arguments
         .output
@@ -142,7 +142,7 @@ fn text(request: &LearnRequest, answer: &LearnAnswer, look: Look) -> String {
     text
 }
 
-/// The rows of an action: one, or one for each ground action that is described apart.
+/// Returns the rows of an action: one, or one for each ground action with a separate distribution.
 fn rows(request: &LearnRequest, action: &ActionLearnt) -> Vec<Vec<String>> {
     let records = request.logs.iter().flat_map(|log| &log.records);
     let records: Vec<_> = records.cloned().collect();
@@ -188,7 +188,7 @@ fn rows(request: &LearnRequest, action: &ActionLearnt) -> Vec<Vec<String>> {
     }
 }
 
-/// Adds a table of predictions beside observations.
+/// Appends a table of predictions and observations.
 fn predictions(text: &mut String, answer: &LearnAnswer, look: Look) {
     let row = |action: &ActionLearnt| {
         let prediction = action.prediction.filter(|it| it.ended > 0)?;
@@ -234,12 +234,12 @@ fn predictions(text: &mut String, answer: &LearnAnswer, look: Look) {
     text.push_str(table.within(look.width).trim_start_matches('\n'));
 }
 
-/// Adds a table of the changes that no action and no timed initial makes.
+/// Appends a table of the changes that no action and no timed initial makes.
 fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
     if answer.changes.is_empty() {
         return;
     }
-    // Expectation beside reality, where a world was expected.
+    // Expected rates are shown if a world file was given for comparison.
     let is_expected = answer.changes.iter().any(|it| it.all.expected.is_some());
     let row = |name: &str, becomes: bool, rate: &RateLearnt| {
         let (lower, upper) = rate.interval.unwrap_or((0.0, f64::INFINITY));
@@ -294,7 +294,7 @@ fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
     }
 }
 
-/// Whether the rate that was expected lies outside the 95 % interval of what was seen.
+/// Returns `true` if the expected rate lies outside the 95 % interval of the observations.
 fn is_surprising(rate: &RateLearnt) -> bool {
     let Some((expected, (lower, upper))) = rate.expected.zip(rate.interval) else {
         return false;
@@ -303,7 +303,7 @@ fn is_surprising(rate: &RateLearnt) -> bool {
     expected < lower || expected > upper
 }
 
-/// Rates are small numbers: four digits behind the point.
+/// Formats a rate with four decimal digits, because rates are small.
 fn rate_words(rate: f64) -> String {
     format!("{rate:.4}")
 }
@@ -425,7 +425,7 @@ fn conformal(text: &mut String, inside: &ConformalBox, look: Look) {
     text.push_str(table.within(look.width).trim_start_matches('\n'));
 }
 
-/// Three significant digits or so.
+/// Formats a number with about three significant digits.
 fn short(value: f64) -> String {
     let digits = match value.abs() {
         value if value >= 100.0 => 0,

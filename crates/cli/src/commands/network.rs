@@ -1,4 +1,5 @@
-//! `elbowroom network`: what can be promised about a temporal network of the field.
+//! `elbowroom network`: consistency and controllability of a temporal network in an exchange
+//! format.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -17,10 +18,10 @@ use crate::look::{BAD, FAINT, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
 use elbowroom_executive::messages::counted;
 
-/// Bounds of a reason that people get to see; `--json` has all.
+/// Maximum number of bounds printed of a reason; `--json` has all.
 const STEPS_SHOWN: usize = 12;
 
-/// Reads a network, answers, and writes what else was asked for.
+/// Reads a network, decides its properties, and writes the requested files.
 pub(crate) fn run(arguments: &NetworkArgs, output: &mut Output) -> Answer {
     let outputs = [&arguments.minimal, &arguments.dispatchable];
     let on_stdout = outputs
@@ -80,7 +81,7 @@ fn document(file: &Path, found: &Found) -> Result<Value, Failure> {
     Ok(document)
 }
 
-/// Writes the minimal and the dispatchable network, where there is one.
+/// Writes the minimal and the dispatchable network, if they exist.
 fn write_forms(arguments: &NetworkArgs, file: &NetworkFile) -> Result<(), Failure> {
     if let Some(path) = &arguments.minimal {
         match file.minimal() {
@@ -105,7 +106,7 @@ fn not_written(path: &Path, why: &str) {
     ));
 }
 
-/// In the format that the name of the file asks for.
+/// Writes a network in the format of the file's extension.
 fn write_network(path: &Path, file: &NetworkFile) -> Result<(), Failure> {
     let ending = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
     let ending = ending.as_ref().and_then(|ending| ending.to_str());
@@ -122,7 +123,7 @@ fn write_network(path: &Path, file: &NetworkFile) -> Result<(), Failure> {
     output::write_file(path, &text)
 }
 
-/// The answer for people.
+/// Renders the answer as text.
 fn report(name: &str, found: &Found, look: Look) -> String {
     let mut text = String::new();
     let mut parts = vec![
@@ -157,8 +158,8 @@ fn report(name: &str, found: &Found, look: Look) -> String {
     text
 }
 
-/// Why the promises that cannot be made cannot: the first of them for sure, the others where they
-/// have reasons of their own.
+/// Appends the reasons why properties do not hold. After a reason why the network is not consistent
+/// or not weakly controllable, further reasons are omitted.
 fn push_reasons(text: &mut String, promises: &[(&str, Option<&Promise>)], look: Look) {
     let mut is_explained = false;
     for (what, promise) in promises {
@@ -174,7 +175,7 @@ fn push_reasons(text: &mut String, promises: &[(&str, Option<&Promise>)], look: 
         let Some(reason) = &promise.reason else {
             continue;
         };
-        // What has no schedule at all needs no further reason.
+        // A network without any schedule needs no further reason.
         if is_explained {
             continue;
         }
@@ -202,7 +203,7 @@ fn push_reason(text: &mut String, what: &str, reason: &Reason, look: Look) {
         };
         let _ = writeln!(text, "  {}", styled(FAINT, &more));
     }
-    // The other steps say at which end they take a link.
+    // Other steps state the used end of a link themselves.
     let are_fixed = reason.steps.iter().any(|step| step.given == "duration");
     if are_fixed && !reason.durations.is_empty() {
         let ends = reason.durations.iter().map(|link| {

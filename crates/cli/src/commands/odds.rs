@@ -1,4 +1,4 @@
-//! `elbowroom odds`: how likely a plan is to succeed.
+//! `elbowroom odds`: success probability of a plan.
 
 mod text;
 
@@ -16,7 +16,7 @@ use crate::look::Look;
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 
-/// Says how likely a plan is to succeed.
+/// Computes the success probability of a plan.
 pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     let settings = settings(arguments)?;
     let task = Arc::new(input::task(&arguments.problem, &arguments.epsilon, output)?);
@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
             None => {}
         }
     }
-    // What was computed is shown, whatever becomes of the picture.
+    // The answer is printed even if the picture cannot be written.
     if arguments.json {
         output.document(&answer)?;
     } else {
@@ -109,7 +109,7 @@ fn settings(arguments: &OddsArgs) -> Result<OddsSettings, Failure> {
     Ok(settings)
 }
 
-/// The likelihoods, in either format.
+/// Reads likelihoods in either format.
 fn read_likelihoods(
     text: &elbowroom::text::Source,
     task: &elbowroom::model::Task,

@@ -1,4 +1,4 @@
-//! `elbowroom plan`: find a plan, or have another planner find one.
+//! `elbowroom plan`: planning with the embedded planner or another one.
 
 mod reading;
 mod text;
@@ -28,12 +28,12 @@ use crate::output::Output;
 use crate::{input, output};
 use watch::Watch;
 
-/// For how many problems like the given one plans are compared without a time limit.
+/// Number of variants of the problem for which plans are compared without a time limit.
 const SEARCHES: usize = 40;
 
-/// Plans.
+/// Searches for a plan and prints it.
 pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
-    // A misspelt planner is told before files are read.
+    // Reports a misspelt planner before any file is read.
     let planner = if arguments.planner.eq_ignore_ascii_case(EMBEDDED) {
         None
     } else {
@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     let mut outcome = match &planner {
         None => plan(&mut request, &mut watch).map_err(unsupported)?,
         Some(planner) => {
-            // It keeps them itself.
+            // This planner enforces the limits itself.
             let limit = watch.hand_over_the_limits();
             let sources = [&domain, &problem];
             plan_with(planner, &mut request, sources, limit, &mut watch).map_err(text::failure)?
@@ -81,12 +81,12 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     };
     outcome.answer.name_files([domain.name(), problem.name()]);
     write_exactly(arguments, &task, &mut outcome);
-    // The line on the terminal goes before the answer comes.
+    // The progress line is removed before the answer is printed.
     drop(watch);
     print(arguments, &outcome, calendar.as_ref(), output)
 }
 
-/// Writes the plan's numbers exactly, if that is asked for.
+/// Writes the plan with exact numbers, if that was requested.
 fn write_exactly(arguments: &PlanArgs, task: &Task, outcome: &mut PlanOutcome) {
     let finding = &mut outcome.answer.finding;
     if let (true, PlanFinding::Plan { plan: text, .. }, Some(plan)) =
@@ -96,7 +96,7 @@ fn write_exactly(arguments: &PlanArgs, task: &Task, outcome: &mut PlanOutcome) {
     }
 }
 
-/// The plan that is best by an objective.
+/// Searches for the best plan by an objective and prints it.
 fn best(
     arguments: &PlanArgs,
     objective: PlanObjectiveChoice,
@@ -150,7 +150,7 @@ fn best(
     print(arguments, &outcome, read.calendar.as_ref(), output)
 }
 
-/// The planner that the command line asks for.
+/// Returns the planner of the arguments.
 fn named(arguments: &PlanArgs) -> Result<Planner, Failure> {
     Planner::named(&arguments.planner).map_err(|error| {
         Failure::new(

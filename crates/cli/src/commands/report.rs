@@ -1,4 +1,4 @@
-//! `elbowroom report`: a page to look at, and a run for another viewer.
+//! `elbowroom report`: a page for a browser, or a run for another viewer.
 
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -8,10 +8,10 @@ use crate::commands::compare::{FAILURES, traces};
 use crate::exit::{Answer, Exit, Failure};
 use crate::{input, output};
 
-/// The file that `compare -o DIR` writes its results to.
+/// File with the results of `compare -o DIR`.
 const RESULTS: &str = "results.json";
 
-/// Writes what is asked for.
+/// Writes the page, or the run for other viewers.
 pub(crate) fn run(arguments: &ReportArgs) -> Answer {
     let path = if arguments.input.is_dir() {
         arguments.input.join(RESULTS)
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &ReportArgs) -> Answer {
     Ok(Exit::Yes)
 }
 
-/// The input's name with another ending.
+/// Returns the input's name with another extension.
 fn suggested(input: &Path) -> PathBuf {
     let stem = input.file_stem().filter(|stem| *stem != "-");
     Path::new(stem.unwrap_or_else(|| "report".as_ref())).with_extension("html")

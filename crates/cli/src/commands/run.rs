@@ -1,4 +1,4 @@
-//! `elbowroom run`: execute a plan in a world.
+//! `elbowroom run`: execution of a plan in a world.
 
 mod page;
 mod progress_line;
@@ -49,7 +49,7 @@ use spec::contradiction;
 use trace_file::TraceFile;
 use viewers::Viewers;
 
-/// Executes a plan, or plays a stored run back.
+/// Executes a plan, or replays a stored run.
 pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     if let Some(path) = &arguments.replay {
         return replay::run(path, arguments.json, output);
@@ -142,8 +142,8 @@ pub(super) fn access(
         .transpose()
 }
 
-/// The problem of a specification, and the plan to begin with. What is wrong with a file is told
-/// before anything is done.
+/// Reads the problem of a specification, and the first plan if one is given. Errors in files are
+/// reported before the run starts.
 pub(super) fn checked(
     arguments: &RunArgs,
     spec: &mut RunSpec,
@@ -213,7 +213,7 @@ pub(super) fn conclude(
         let journal = asked.0.journal.as_ref().or(asked.0.resume.as_ref());
         return exit(&outcome, journal.map(|path| path.display().to_string()));
     };
-    // Nobody has asked it to end.
+    // This verdict results from the failure of the journal. No stop was requested.
     let has_lost = *outcome.verdict() == Verdict::Interrupted;
     if has_lost {
         outcome.answer.report.why = Some(format!("the journal cannot be written: {why}"));
@@ -230,7 +230,7 @@ pub(super) fn conclude(
     ))
 }
 
-/// The problem of a specification, with its warnings told.
+/// Reads the problem of a specification and prints its warnings.
 pub(super) fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure> {
     let (domain, problem) = (spec.domain.source(), spec.problem.source());
     let read = elbowroom::pddl::read_problem(&domain, &problem);
@@ -314,18 +314,18 @@ impl RunHost for CommandHost<'_> {
     }
 }
 
-/// Everything that a run needs but the world.
+/// Everything that a run needs except the world.
 pub(super) struct Job<'a> {
     pub(super) spec: &'a RunSpec,
     pub(super) task: &'a Arc<Task>,
     pub(super) first: Option<TimeTriggeredPlan>,
     pub(super) interrupt: &'a Interrupt,
     pub(super) operator: &'a OperatorInterface,
-    /// The journal, which is empty, if the run has one.
+    /// The journal, still empty, if the run has one.
     pub(super) journal: Option<JournalFile>,
     /// Called when execution begins. The first record is on the disk if there is a journal.
     pub(super) started: &'a dyn Fn(),
-    /// Runs from time 0, if that is a date; otherwise time 0 is the start of the run.
+    /// Clock that started at time 0, if that is a date; otherwise time 0 is the start of the run.
     pub(super) since: Option<Clock>,
 }
 
@@ -380,7 +380,7 @@ impl Job<'_> {
         let trace = (!is_valid).then(|| file.of_invalid_run()).flatten();
         let trouble = file.close();
         let shown = show((arguments, spec), &outcome, false, output);
-        // The run is complete, even if its record is not.
+        // The run is complete, although its record is not.
         if let Some(trouble) = trouble {
             output::warn(&trouble);
         }
@@ -389,7 +389,7 @@ impl Job<'_> {
     }
 }
 
-/// The exit code of a run. `trace` is the file that has its record.
+/// Returns the exit code of a run. `trace` is the file with its record.
 fn exit(outcome: &RunOutcome, trace: Option<String>) -> Answer {
     let invalid = &outcome.answer.invalid;
     if !invalid.is_empty() {

@@ -23,17 +23,17 @@ use elbowroom_executive::journal::Segments;
 use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::{Error, make_persistent};
 
-/// The length of a journal from which on it is begun anew, in bytes.
+/// Default length of a journal at which it is rotated, in bytes.
 const LONG: u64 = 10_000_000;
 
-/// The name of a problem that a client gives.
+/// The name of a problem submitted by a client.
 const GIVEN: &str = "the problem that was given";
 
-/// Executes what is asked for, until it is asked to end.
+/// Runs the executive until it is stopped.
 pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     check(arguments)?;
     let interrupt = Interrupt::listen_with_world();
-    // A token that cannot be read is told before anything is done.
+    // Reports an unreadable token before anything is started.
     access(&arguments.run, &interrupt)?;
     if let Some(journal) = &arguments.run.resume {
         let server = Server {
@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         let of = (&mut spec, worlds.as_slice());
         let Some(((task, first), at, client)) = await_problem(&router, arguments, of, output)
         else {
-            // It was asked to end before there was a problem.
+            // The executive was stopped before it received a problem.
             router.close();
             return Ok(Exit::Yes);
         };
@@ -124,11 +124,11 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     in_order(answer)
 }
 
-/// A problem, and the plan to begin with.
+/// A problem, and its first plan if one is given.
 type Begun = (Arc<Task>, Option<TimeTriggeredPlan>);
 
-/// Waits for a problem that can be executed; whoever gives another one is told why it cannot. `None` if
-/// the executive is asked to end before.
+/// Waits for a problem that can be executed. Rejects other problems with the reason. Returns `None`
+/// if the executive is stopped before.
 fn await_problem(
     router: &ApiRouter,
     arguments: &ServeArgs,
@@ -155,7 +155,7 @@ fn await_problem(
     }
 }
 
-/// A failure as it is told to a client.
+/// Converts a failure to an error response.
 fn refusal(status: u16, failure: &Failure) -> ApiError {
     let help = failure
         .advice()
@@ -163,10 +163,11 @@ fn refusal(status: u16, failure: &Failure) -> ApiError {
     ApiError::new(status, failure.sentence(), help)
 }
 
-/// What a specification is of an executive, which stays.
+/// Adapts a specification for an executive.
 fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) {
     spec.is_lasting = true;
-    // Whoever asks for another first plan is told why there is none.
+    // An explicitly requested first plan is kept, so that an error is reported if it is not
+    // available.
     if arguments.run.first_plan_by.is_none() {
         spec.first_plan = spec.usual_first_plan();
     }
@@ -179,8 +180,8 @@ fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) {
     make_persistent(spec);
 }
 
-/// Refuses a domain with errors, or whose problems cannot be executed, before a problem is given. Warnings are printed
-/// with the problem.
+/// Rejects a domain with errors, or one whose problems cannot be executed, before a problem is
+/// given. Warnings are printed with the problem.
 fn check_domain(domain: &NamedText) -> Result<(), Failure> {
     let mut words = domain.text.split(['(', ')', ' ', '\t', '\r', '\n']);
     let words = &mut words.by_ref().filter(|word| !word.is_empty());
@@ -195,7 +196,7 @@ fn check_domain(domain: &NamedText) -> Result<(), Failure> {
     }
 }
 
-/// Who runs until told to end has done what was asked when it ends in order.
+/// Maps an interrupt to success: an executive normally ends by a request to stop.
 fn in_order(answer: Answer) -> Answer {
     answer.map(|exit| match exit {
         Exit::Interrupted => Exit::Yes,
@@ -203,7 +204,7 @@ fn in_order(answer: Answer) -> Answer {
     })
 }
 
-/// What belongs to `elbowroom run` alone.
+/// Rejects options that only `elbowroom run` supports.
 fn check(arguments: &ServeArgs) -> Result<(), Failure> {
     let run = &arguments.run;
     let (is_replayed, is_shown) = (run.replay.is_some(), run.serve.is_some());
@@ -247,7 +248,7 @@ fn open(
     )
 }
 
-/// Prints where the executive listens. If it has a problem, it accepts requests about it by then.
+/// Prints the address of the executive. If it has a problem, it already accepts requests about it.
 fn announce(arguments: &ServeArgs, router: &ApiRouter) {
     let with_token = match &arguments.run.token {
         Some(_) => "",
@@ -267,7 +268,7 @@ fn segments(arguments: &ServeArgs) -> Segments {
     }
 }
 
-/// Attends a run that goes on after a crash.
+/// Host of a run that is resumed after a crash.
 struct Server<'a> {
     arguments: &'a ServeArgs,
     router: OnceCell<Arc<ApiRouter>>,

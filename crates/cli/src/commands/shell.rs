@@ -1,4 +1,4 @@
-//! What a shell and a reader of manuals want to know of the command.
+//! Shell completions and manual pages.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::output;
 use elbowroom_executive::messages::plain;
 
-/// `elbowroom completions`: a script for a shell.
+/// `elbowroom completions`: prints a completion script for a shell.
 pub(crate) fn completions(arguments: &CompletionsArgs) -> Answer {
     let mut script = Vec::new();
     clap_complete::generate(
@@ -22,7 +22,7 @@ pub(crate) fn completions(arguments: &CompletionsArgs) -> Answer {
     Ok(Exit::Yes)
 }
 
-/// `elbowroom man`: the page of the command, or the pages of all commands.
+/// `elbowroom man`: prints the page of the command, or writes the pages of all commands.
 pub(crate) fn man(arguments: &ManArgs) -> Answer {
     let command = CommandLine::command();
     if let Some(folder) = &arguments.folder {

@@ -1,4 +1,4 @@
-//! `elbowroom stn`: the plan without its needless times and orderings.
+//! `elbowroom stn`: relaxation of a plan to an STN.
 
 use elbowroom::RoundingRule;
 use elbowroom::answers::stn::{StnFinding, StnOutcome, StnRequest, stn};
@@ -13,7 +13,7 @@ use crate::look::{BAD, Look, styled};
 use crate::output::Output;
 use crate::{input, output};
 
-/// Writes the STN plan, and what else was asked for.
+/// Writes the STN plan and the other requested output.
 pub(crate) fn run(arguments: &StnArgs, output: &mut Output) -> Answer {
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let rule = RoundingRule::with_tolerance(arguments.tolerance.clone());
@@ -51,7 +51,8 @@ fn network(
     Ok(Exit::Yes)
 }
 
-/// A plan that is not valid has no room. Standard output is for the network alone.
+/// Reports that the plan is invalid and has no network. Standard output is reserved for the
+/// network.
 fn invalid(arguments: &StnArgs, outcome: &StnOutcome, output: &mut Output) -> Answer {
     let file = arguments.plan.display();
     if arguments.json {

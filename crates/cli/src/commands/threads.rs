@@ -1,11 +1,11 @@
-//! `--jobs`: how many threads the embedded planner uses for one plan.
+//! `--jobs`: number of threads of the embedded planner.
 
 use crate::exit::Failure;
 
-/// As many as there are processors.
+/// Value of `jobs` that requests one thread per processor.
 pub(super) const EVERY_PROCESSOR: usize = 0;
 
-/// As many as were asked for, or as usual.
+/// Returns the requested number of threads, or else `usual`.
 pub(super) fn of(jobs: Option<usize>, usual: usize, is_embedded: bool) -> Result<usize, Failure> {
     if jobs.is_some() && !is_embedded {
         return Err(Failure::new(

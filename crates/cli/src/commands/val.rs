@@ -1,4 +1,4 @@
-//! `elbowroom val`: the verdicts of `check` in VAL's words, for programs that know those.
+//! `elbowroom val`: the verdicts of `check` in the output format of VAL.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -15,13 +15,13 @@ use crate::look::{HINT, styled};
 use crate::output::Output;
 use crate::{input, output};
 
-/// The advice for who gives a network.
+/// Advice if the given plan is an STN plan.
 const FOR_NETWORKS: &str = "`elbowroom envelope` says whether all of them work";
 
-/// Digits after the point; times with so many are told apart by whoever reads them.
+/// Number of decimal digits printed for times.
 const DIGITS: u32 = 6;
 
-/// Judges all plans, as VAL's `Validate` does.
+/// Validates all plans, like VAL's `Validate`.
 pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
     let task = match input::task(&arguments.problem, &Task::default_epsilon(), output) {
         Ok(task) => task,
@@ -32,7 +32,7 @@ pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
     };
     let settings = Settings::like_val(arguments.tolerance.clone());
     let mut tally = Tally::default();
-    // VAL has rules of its own about rounded numbers.
+    // VAL has its own rules about rounded numbers.
     let as_printed = RoundingRule::with_tolerance(Some(Rational::ZERO));
     for path in &arguments.plans {
         let plan = match input::time_triggered(&task, path, &as_printed, FOR_NETWORKS, output) {
@@ -76,10 +76,10 @@ pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
 /// The results of the plans so far.
 #[derive(Default)]
 struct Tally {
-    /// Value and name.
+    /// Plan value and file name.
     valid: Vec<(String, String)>,
     failed: Vec<String>,
-    /// Those that cannot be read.
+    /// Unreadable plans.
     bad: Vec<String>,
 }
 
@@ -108,7 +108,7 @@ impl Tally {
                 self.valid.push((value, name));
             }
             CheckFinding::Invalid { violation } => {
-                // The action to blame is found by its start.
+                // The failed action is identified by its start.
                 let step = violation.step.and_then(|step| plan.steps.get(step));
                 let time = step.map_or(&violation.time, |step| &step.start);
                 if is_verbose {
@@ -121,7 +121,7 @@ impl Tally {
                     }
                 });
                 let _ = write!(text, "\nPlan Repair Advice:\n\n{}\n\n", violation.message);
-                // What follows the advice ends with these words; the list is complete at the end.
+                // VAL ends the advice with these words; the complete list follows at the end.
                 let _ = writeln!(text, "Failed plans:\n {name} ");
                 self.failed.push(name);
             }
@@ -168,7 +168,7 @@ fn push_plan(text: &mut String, name: &str, plan: &TimeTriggeredPlan) {
     text.push_str("\nPlan Validation details\n-----------------------\n\n");
 }
 
-/// The times at which something happens.
+/// Returns the times of all happenings.
 fn times(task: &Task, plan: &TimeTriggeredPlan) -> BTreeSet<Rational> {
     let mut times: BTreeSet<Rational> = task.timed().iter().map(|it| it.time.clone()).collect();
     for step in &plan.steps {
@@ -178,7 +178,7 @@ fn times(task: &Task, plan: &TimeTriggeredPlan) -> BTreeSet<Rational> {
     times
 }
 
-/// The first two different times that count as equal at the tolerance.
+/// Returns the first two different times that count as equal at the tolerance.
 fn equal_times(settings: &Settings, times: &BTreeSet<Rational>) -> Option<[Rational; 2]> {
     let mut first: Option<&Rational> = None;
     for time in times {
@@ -192,7 +192,7 @@ fn equal_times(settings: &Settings, times: &BTreeSet<Rational>) -> Option<[Ratio
     None
 }
 
-/// Says on standard error that the verdict is about a plan with these times made equal.
+/// Warns that the verdict applies to the plan with these times made equal.
 fn warn_about_equal_times(plan: &str, first: &Rational, later: &Rational, tolerance: &Rational) {
     // The group width is a tenth of the tolerance.
     let finer = later - first;
@@ -209,7 +209,7 @@ fn warn_about_equal_times(plan: &str, first: &Rational, later: &Rational, tolera
     ));
 }
 
-/// The times at which something happens, up to that one.
+/// Appends the times of the happenings up to `until`.
 fn push_happenings(
     text: &mut String,
     task: &Task,
@@ -221,7 +221,7 @@ fn push_happenings(
         .filter(|time| until.is_none_or(|until| *time <= until))
     {
         let mut time = time.to_decimal(DIGITS);
-        // A point is looked for.
+        // Programs that parse this line expect a decimal point.
         if !time.contains('.') {
             time.push_str(".0");
         }

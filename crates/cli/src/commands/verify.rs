@@ -1,5 +1,5 @@
-//! `elbowroom verify`: is that box really inside the envelope, and the largest there? Is there really
-//! no plan?
+//! `elbowroom verify`: check of a certificate that a box is inside the envelope and the largest one
+//! there, or that no plan exists.
 
 mod no_plan;
 
@@ -23,7 +23,7 @@ use crate::look::{BAD, GOOD, Look, styled};
 use crate::output::{self, Output};
 use crate::{input, number};
 
-/// Checks an answer, and says what that proves.
+/// Checks an answer and prints the proved claims.
 pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
     let source = input::source(&arguments.answer, "answer")?;
     let name = source.name();
@@ -116,7 +116,7 @@ fn files(arguments: &VerifyArgs) -> Result<Option<(ProblemArgs, &Path)>, Failure
     }
 }
 
-/// The verdict as a document.
+/// Converts the verdict to a document.
 fn document(verdict: Result<&Verified, &AnswerError>, is_derived: bool) -> Value {
     let exact = |value: &elbowroom::num::Rational| json!({ "exact": value.to_string(), "decimal": value.to_f64() });
     let mut document = json!({ "format": "elbowroom-verified", "version": 1 });
@@ -214,7 +214,7 @@ fn proven(name: &str, verified: &Verified, is_derived: bool, look: Look) -> Stri
     text
 }
 
-/// What is proved of the box being inside the envelope.
+/// Describes the proof that the box is inside the envelope.
 fn inside(inside: Option<Inside>) -> String {
     let Some(inside) = inside else {
         return "That the box is inside is not part of the certificate: `elbowroom envelope ... \

@@ -1,4 +1,4 @@
-//! `elbowroom world-check`: does a program keep to the protocol of worlds?
+//! `elbowroom world-check`: conformance test of a program with the world protocol.
 
 mod player;
 mod resumed;
@@ -26,7 +26,7 @@ use player::{Gone, Player};
 use resumed::resumed;
 use table::{Check, Findings, Outcome, Row};
 
-/// What a world is told to do when there is no plan.
+/// Default domain, for checks without a plan.
 const DOMAIN: &str = "(define (domain world-check) (:requirements :durative-actions)
     (:predicates (waited))
     (:durative-action wait-a-second :parameters () :duration (= ?duration 1)
@@ -35,13 +35,13 @@ const PROBLEM: &str =
     "(define (problem world-check) (:domain world-check) (:init) (:goal (waited)))";
 const ACTION: &str = "(wait-a-second)";
 
-/// Three times as long as planned, and this many seconds more, an action may take here.
+/// Maximum time of an action beyond three times its planned duration, in seconds of the world.
 const PATIENCE: i64 = 10;
 
-/// How long a cancelled action may take to stop, in seconds of the world.
+/// Maximum time from a cancel to the end of the action, in seconds of the world.
 const OBEDIENCE: i64 = 5;
 
-/// Plays through the protocol, and says what is wrong.
+/// Runs the protocol with the world and prints the violations.
 pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
     let (task, actions) = script(arguments, output)?;
     let program = launch(&arguments.command).map_err(|why| {
@@ -98,7 +98,7 @@ fn cut_short(findings: Findings) -> Vec<Row> {
     findings.rows(Some("the conversation had come to its end"))
 }
 
-/// The problem, and the actions to start, with their durations.
+/// Returns the problem, and the actions to start, with their durations.
 fn script(
     arguments: &WorldCheckArgs,
     output: &mut Output,
@@ -137,7 +137,7 @@ fn script(
 }
 
 fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Result<(), Gone> {
-    // Nothing has been told, so time passes.
+    // Time must pass although no action was started.
     pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
     if player.can(Capability::Beliefs) {
         let faults = player.findings.faults();
@@ -154,7 +154,7 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
     let long = longest(duration).max(longest(other_duration));
     let step = (duration / Rational::from(10)).max(Rational::ONE);
 
-    // One action, to its end.
+    // One action until its end.
     player.start(0, name, Some(duration))?;
     until_begun(player, &[0], &long, &step)?;
     until_ended(player, &[0], &long, &step)?;
@@ -168,14 +168,14 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
         return player.look();
     }
 
-    // What is over, or was never heard of.
+    // Messages about a finished start and about unknown ones.
     player.findings.look_at(Check::IgnoresTheUnknown);
     player.cancel(0)?;
     player.mumble()?;
     player.look()?;
     pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
 
-    // Two at a time. A plan with one action has it twice.
+    // Two actions at a time. If the plan has only one action, it is started twice.
     player.start(1, name, Some(duration))?;
     player.start(2, other, Some(other_duration))?;
     until_begun(player, &[1, 2], &long, &step)?;
@@ -186,7 +186,7 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
     }
     until_ended(player, &[1, 2], &long, &step)?;
 
-    // One that is stopped.
+    // An action that is cancelled.
     if player.can_cancel() {
         player.start(3, name, Some(duration))?;
         until_begun(player, &[3], &long, &step)?;
@@ -199,13 +199,13 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
             player.findings.wrong(Check::Cancels, why);
         }
     }
-    // Whatever is said twice is said soon.
+    // Repeated reports would arrive within this time.
     pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
     player.findings.look_at(Check::EndsOnce);
     Ok(())
 }
 
-/// Tells what is so at the beginning, that a value is not known any more, and that it is known again.
+/// Sends the initial beliefs, then that a value is unknown, then that it is known again.
 fn beliefs(player: &mut Player, task: &Task) -> Result<(), Gone> {
     let initial = task.initial();
     let values = || initial.values.iter();
@@ -225,7 +225,7 @@ fn longest(duration: &Rational) -> Rational {
     duration * Rational::from(3) + Rational::from(PATIENCE)
 }
 
-/// Waits until something was heard of the start of each.
+/// Waits until the start or the refusal of each action is reported.
 fn until_begun(
     player: &mut Player,
     tickets: &[u64],
@@ -248,7 +248,7 @@ fn until_begun(
     Ok(())
 }
 
-/// Waits until each has ended.
+/// Waits until each action has ended.
 fn until_ended(
     player: &mut Player,
     tickets: &[u64],
@@ -272,7 +272,7 @@ fn until_ended(
     Ok(())
 }
 
-/// Lets time pass, at most `long`, in steps, until it is enough.
+/// Lets time pass in steps until `is_enough`, at most for `long`.
 fn pass(
     player: &mut Player,
     long: &Rational,
@@ -280,7 +280,8 @@ fn pass(
     is_enough: impl Fn(&Player) -> bool,
 ) -> Result<(), Gone> {
     let last = &player.now + long;
-    // With time unchanged, as many answers as there can be reports, and some more.
+    // Answers without progress of the clock are limited, because each of them should contain a
+    // report.
     let mut idle = 0;
     while !is_enough(player) && player.now < last {
         let before = player.now.clone();
@@ -299,7 +300,7 @@ fn pass(
     Ok(())
 }
 
-/// So many answers in a row may leave the time unchanged.
+/// Maximum number of consecutive answers that leave the time unchanged.
 const MOST_IDLE: usize = 100;
 
 fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {

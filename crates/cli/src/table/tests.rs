@@ -26,7 +26,7 @@ fn row(name: &str, quantity: &str, nominal: &str, lower: &str, upper: &str) -> R
     }
 }
 
-/// The table without escape sequences.
+/// Renders the table without escape sequences.
 fn shown(rows: &[Row], look: Look) -> String {
     let text = anstream::adapter::strip_str(&render(rows, look)).to_string();
     for line in text.lines() {

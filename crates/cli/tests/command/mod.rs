@@ -1,4 +1,4 @@
-//! The command, run from the root of the project.
+//! Runs of the command in the root of the project.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -8,7 +8,7 @@ pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// What the command answers to these arguments.
+/// Runs the command with these arguments and returns its output.
 pub(crate) fn elbowroom(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .current_dir(root())

@@ -1,4 +1,4 @@
-//! The world of the scenarios: actions take as long as they were planned to, but for its faults.
+//! World of the scenarios: actions take their planned durations, except for injected faults.
 
 use std::sync::{Arc, Mutex};
 
@@ -11,7 +11,7 @@ use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 
-/// Two robots that fetch things, in ten seconds each.
+/// Domain with two robots that fetch items. Each errand takes 10 s.
 pub(crate) const ERRANDS: &str =
     "(define (domain errands) (:requirements :durative-actions :typing)
     (:types robot item)
@@ -34,22 +34,22 @@ pub(crate) fn task(domain: &str, problem: &str) -> Arc<Task> {
     Arc::new(Task::new(read.expect("a correct test").0))
 }
 
-/// A world in which actions take as long as they were planned to, but for its faults.
+/// World whose actions take their planned durations, except for injected faults.
 #[derive(Default)]
 pub(crate) struct Toy {
     pub(crate) now: Rational,
     pub(crate) coming: Vec<Observation>,
-    /// What is reported of a start, by its number: nothing, a failure, …
+    /// Fault of each start, by its number.
     pub(crate) fault: Option<Faults>,
-    /// What is seen when an action has ended.
+    /// Events reported when an action has ended.
     pub(crate) seen: Vec<Event>,
-    /// What was told to start and has not ended.
+    /// Started actions that have not ended.
     pub(crate) open: Vec<Ticket>,
-    /// How many seconds it takes until something that is cancelled has stopped.
+    /// Time from a cancel to the end of the action, in seconds.
     pub(crate) slides: i64,
 }
 
-/// What goes wrong with a start, by its number.
+/// Function from the number of a start to its fault.
 pub(crate) type Faults = fn(u64) -> Fault;
 
 pub(crate) enum Fault {
@@ -57,7 +57,7 @@ pub(crate) enum Fault {
     Silent,
     Fails,
     Lasts(i64),
-    /// It starts so many milliseconds late, and lasts so many seconds.
+    /// Starts late by this number of milliseconds, and takes this number of seconds.
     StartsLate(i64, i64),
 }
 
@@ -144,7 +144,7 @@ pub(crate) fn run(task: &Arc<Task>, world: &mut Toy) -> Report {
         .run_in(world)
 }
 
-/// The actions that were warned of, and until when the plan can bear each.
+/// Recorded warnings: actions, each with the latest end for which the plan remains feasible.
 #[derive(Clone, Default)]
 pub(crate) struct Warnings(pub(crate) Arc<Mutex<Vec<(String, Rational)>>>);
 

@@ -1,4 +1,4 @@
-//! What an executive says of itself, and what it makes of what it is told.
+//! State and explanations that an executive reports, and its handling of new information.
 
 use std::fs;
 use std::net::TcpListener;
@@ -9,7 +9,7 @@ use super::client::{Executive, folder};
 use super::skipped::skipped;
 use super::{command, ctl, exact, lines, python_is_there, signal, simulated, with_robot};
 
-/// A program that hangs is named, and no request is said to wait for a plan because of it.
+/// A hanging program is named, and requests are not reported as waiting for a plan.
 #[test]
 fn a_world_that_stands_still_is_named() {
     if !python_is_there() {
@@ -60,7 +60,7 @@ fn a_world_that_stands_still_is_named() {
     assert_eq!(begun.len(), 6, "{begun:?}");
 }
 
-/// The time goes on where nothing happens.
+/// Time advances although nothing happens.
 #[test]
 fn who_asks_is_told_what_time_it_is() {
     let own = simulated("time");
@@ -78,7 +78,7 @@ fn the_guarantee_says_what_its_quantities_are() {
     for parameter in parameters {
         let meaning = parameter["meaning"].as_str().expect("words");
         assert!(meaning.starts_with("duration of (do "), "{meaning}");
-        // Nothing limits these durations from above.
+        // These durations have no upper limit.
         assert_eq!(parameter["most"]["exact"], "inf", "{guarantee}");
     }
     let told = ctl(&["--to", &own.address(), "guarantee"]);
@@ -86,7 +86,8 @@ fn the_guarantee_says_what_its_quantities_are() {
     assert!(told.contains("duration of (do "), "{told}");
 }
 
-/// A number that is told counts in the next plan: where more has to stay in the battery, it is charged first.
+/// A reported number is used in the next plan: if the battery needs a larger reserve, it is charged
+/// first.
 #[test]
 fn a_number_is_taken_in_and_planned_with() {
     let battery = ["domain", "problem"].map(|it| format!("cases/battery/{it}.pddl"));
@@ -125,11 +126,11 @@ fn a_number_is_taken_in_and_planned_with() {
         charges.count()
     };
     assert_eq!(run("as-it-was", None), 0);
-    // Of 80, the survey uses 40.
+    // The survey uses 40 of 80.
     assert!(run("told", Some("50")) > 0);
 }
 
-/// Without `--http`, only this machine is listened to.
+/// By default, only this machine can connect.
 #[test]
 fn only_this_machine_reaches_an_executive() {
     let own = simulated("local");
@@ -150,7 +151,7 @@ fn only_this_machine_reaches_an_executive() {
         .filter(|it| it.ends_with(&format!(":{port:04X}")))
         .collect();
     assert!(!listening.is_empty(), "{text}");
-    // 127.0.0.1, its bytes in the order of the machine.
+    // 127.0.0.1 in the machine's byte order.
     assert!(
         listening
             .iter()
@@ -159,7 +160,7 @@ fn only_this_machine_reaches_an_executive() {
     );
 }
 
-/// Whether a value is as a schema says, and has nothing of which that says nothing.
+/// Checks that a value conforms to a schema and has no members that the schema does not define.
 fn conforms(value: &Value, schema: &Value, all: &Value) -> Result<(), String> {
     let wrong = |why: &str| Err(format!("{why}: {value} for {schema}"));
     if let Some(name) = schema["$ref"].as_str() {
@@ -227,7 +228,7 @@ fn answers_are_as_the_interface_says() {
     let (status, refusal) = own.post("/v1/goals", &json!({"goal": "(nonsense)"}));
     assert_eq!(status, 422);
     is_right(&refusal, "/v1/goals", "post", "default");
-    // It tells right from wrong.
+    // `conforms` detects wrong values.
     let mut state = own.get("/v1/state").1;
     state["plans"] = json!("many");
     assert!(conforms(&state, &all["State"], all).is_err());
@@ -237,7 +238,7 @@ fn answers_are_as_the_interface_says() {
     assert!(conforms(&state, &all["State"], all).is_err());
 }
 
-/// Who is stopped still has his port.
+/// A suspended process keeps its port open.
 #[test]
 fn an_executive_that_does_not_answer_is_told_apart_from_one_that_is_not_there() {
     let stopped = TcpListener::bind("127.0.0.1:0").expect("a port");

@@ -1,4 +1,4 @@
-//! An executive that was started, and a client that knows nothing of the command.
+//! A running executive, and a client that is independent of the command.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read, Write};
@@ -16,7 +16,7 @@ use crate::command::root;
 
 pub(crate) const TOKEN: &str = "a-token-of-some-length";
 
-/// How often it is looked whether something has happened, and how many times at most: a minute.
+/// Polling interval. With [`MOST_GLANCES`], polling ends after one minute.
 const GLANCE: Duration = Duration::from_millis(20);
 const MOST_GLANCES: usize = 3000;
 
@@ -41,7 +41,7 @@ pub(crate) fn write_token(folder: &Path) -> String {
 /// An executive.
 pub(crate) struct Executive {
     child: Option<Child>,
-    /// What else it has said.
+    /// Reader of the rest of standard error.
     errors: Option<JoinHandle<String>>,
     folder: PathBuf,
     port: u16,
@@ -54,12 +54,12 @@ impl Drop for Executive {
 }
 
 impl Executive {
-    /// One whose token, socket and trace are in `folder`.
+    /// Starts an executive with token, socket and trace in `folder`.
     pub(crate) fn start(folder: &Path, line: &[&str]) -> Self {
         Self::with_token(folder, line, None)
     }
 
-    /// The same, which can write no file that is longer than so many kilobytes.
+    /// Starts an executive that cannot write files longer than `kilobytes`.
     pub(crate) fn confined(folder: &Path, line: &[&str], kilobytes: u32) -> Self {
         Self::with_token(folder, line, Some(kilobytes))
     }
@@ -91,7 +91,7 @@ impl Executive {
     fn spawn(folder: &Path, line: &[&str], most_blocks: Option<u32>) -> Self {
         let mut command = Command::new("env");
         if let Some(most) = most_blocks {
-            // The signal that would end the program is ignored, and writing fails.
+            // Writing fails without the signal, which would end the program.
             let script = format!("trap '' XFSZ; ulimit -f {most}; exec \"$@\"");
             command.args(["bash", "-c", &script, "bash"]);
         }
@@ -115,7 +115,7 @@ impl Executive {
                 break port.parse().expect("a port");
             }
         };
-        // Whatever else it says must not fill the pipe.
+        // Drains standard error, so that the pipe does not fill up.
         let errors = std::thread::spawn(move || {
             let mut rest = String::new();
             let _ = said.read_to_string(&mut rest);
@@ -148,12 +148,12 @@ impl Executive {
         }
     }
 
-    /// The number of its process.
+    /// Returns the process number.
     pub(crate) fn process(&self) -> u32 {
         self.child.as_ref().expect("it runs").id()
     }
 
-    /// Waits for its end.
+    /// Waits for the end of the process.
     pub(crate) fn end(&mut self) -> Output {
         let mut child = self.child.take().expect("it runs");
         let mut is_over = || child.try_wait().expect("it can be asked").is_some();
@@ -203,7 +203,8 @@ impl Executive {
         talk(stream, verb, path, token, body)
     }
 
-    /// The same of one that may be killed meanwhile: then there is no answer.
+    /// The same for an executive that may be killed in the meantime. Returns `None` without an
+    /// answer.
     pub(crate) fn ask_if_there(
         &self,
         verb: &str,
@@ -225,13 +226,13 @@ impl Executive {
         Some((status, serde_json::from_str(text).ok()?))
     }
 
-    /// What is there in place of the page at this moment, with its status.
+    /// Returns the current response at the address of the page, with its status.
     pub(crate) fn page_now(&self) -> (u16, String) {
         let stream = TcpStream::connect(self.address()).expect("it listens");
         said(stream, "GET", "/", None, "")
     }
 
-    /// The page, which is there as soon as the problem is taken up.
+    /// Waits for the page, which exists once the executive has accepted the problem.
     pub(crate) fn page(&self) -> String {
         let mut last = String::new();
         for _ in 0..MOST_GLANCES {
@@ -246,7 +247,7 @@ impl Executive {
         panic!("there is no page: {last}");
     }
 
-    /// Waits until things stand like that.
+    /// Waits for a state with this property.
     #[track_caller]
     pub(crate) fn await_state(&self, is_so: impl Fn(&Value) -> bool) -> Value {
         let mut last = Value::Null;

@@ -1,4 +1,4 @@
-//! Ends that nobody wants: signals, disks that are full, files that are none.
+//! Abnormal ends: signals, full disks, and paths that are not regular files.
 
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -14,7 +14,7 @@ use super::command::root;
 use super::skipped::skipped;
 use super::{DOMAIN, PROBLEM, ctl, python_is_there, signal, with_robot};
 
-/// An executive that goes on after a crash ends in order, as one that has just begun does.
+/// A resumed executive shuts down in order, like a new one.
 #[test]
 fn signals_end_an_executive_that_goes_on_after_a_crash() {
     if !python_is_there() {
@@ -43,8 +43,8 @@ fn signals_end_an_executive_that_goes_on_after_a_crash() {
     }
 }
 
-/// The client whose request meets the full disk is told so, and the report does not say that somebody has
-/// asked for the end.
+/// The client whose request fails because of the full disk receives that reason. The report does
+/// not claim that a stop was requested.
 #[test]
 fn when_the_disk_is_full_the_client_and_the_report_say_so() {
     if !python_is_there() || Command::new("bash").arg("--version").output().is_err() {
@@ -53,7 +53,7 @@ fn when_the_disk_is_full_the_client_and_the_report_say_so() {
     }
     let place = folder("full-disk");
     let journal = place.join("journal").display().to_string();
-    // It rests at once, so that hardly anything but requests is recorded.
+    // The executive becomes idle at once, so that almost only requests are recorded.
     let text = fs::read_to_string(root().join(PROBLEM)).expect("a problem");
     let problem = place.join("problem.pddl");
     let text = text.replace("(:goal (and (done a3) (done b3)))", "(:goal (and))");
@@ -62,11 +62,12 @@ fn when_the_disk_is_full_the_client_and_the_report_say_so() {
     let mut line = with_robot(&place, &journal);
     line[1].clone_from(&problem);
     let line: Vec<&str> = line.iter().map(String::as_str).collect();
-    // The first goal fits, and the first of the second one's two records does not: that is before it is taken in.
+    // The first goal fits into the file. The first of the second goal's two records does not, so
+    // the goal is never accepted.
     let mut own = Executive::confined(&place, &line, 30);
     own.await_state(|state| state["activity"] == "resting");
     assert_eq!(own.post("/v1/pause", &Value::Null).0, 200);
-    // Each is recorded twice, and longer than everything else.
+    // Each goal is recorded twice, and is longer than all other records.
     let goal = format!("(and {})", "(done a1) ".repeat(1000));
     let answers = (0..10).map(|number| {
         let asked = json!({"goal": goal, "name": format!("goal-{number}")});
@@ -90,7 +91,7 @@ fn when_the_disk_is_full_the_client_and_the_report_say_so() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// Whoever opens a named pipe waits until somebody writes into it.
+/// Opening a named pipe blocks until another process writes to it.
 #[test]
 fn what_is_no_file_is_no_journal_and_is_not_waited_for() {
     let place = folder("no-file");
@@ -110,7 +111,7 @@ fn what_is_no_file_is_no_journal_and_is_not_waited_for() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// How the command ends, in a minute at most, and what it says.
+/// Returns the exit code and standard error of the command, which must end within a minute.
 fn ended(line: &[&str]) -> (Option<i32>, String) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .current_dir(root())
@@ -133,7 +134,7 @@ fn ended(line: &[&str]) -> (Option<i32>, String) {
     (output.status.code(), said)
 }
 
-/// A client is told why it does not get the lines that it asks for, in the executive's own words.
+/// The client receives the executive's reason if its request for trace lines is refused.
 #[test]
 fn ctl_events_says_why_it_is_refused() {
     let refusal =

@@ -1,4 +1,4 @@
-//! The first problem of an executive that was started without one.
+//! First problem of an executive that was started without one.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -16,7 +16,7 @@ fn problem() -> Value {
     json!({ "problem": text })
 }
 
-/// What is wrong with the command line is told as where there is a problem: nobody gives one in vain.
+/// Errors in the command line are reported at the start, before a client sends a problem.
 #[test]
 fn what_is_wrong_is_told_before_it_listens_for_a_problem() {
     let place = folder("told-early");
@@ -72,7 +72,7 @@ fn what_is_wrong_is_told_before_it_listens_for_a_problem() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// Who is told that a problem is taken need not give it again, whatever happens then.
+/// An accepted problem survives any crash and need not be sent again.
 #[test]
 fn a_first_problem_that_is_taken_survives_kill_9() {
     if !python_is_there() {
@@ -97,7 +97,7 @@ fn a_first_problem_that_is_taken_survives_kill_9() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// A problem that can be read, and not executed as the command line has it.
+/// A readable problem that cannot be executed with this command line.
 #[test]
 fn a_first_problem_that_cannot_be_executed_is_refused_and_another_one_is_taken() {
     let vary = ["--vary", "deadline (open nothing)"];
@@ -118,7 +118,7 @@ fn a_first_problem_that_cannot_be_executed_is_refused_and_another_one_is_taken()
     assert_eq!(own.end().status.code(), Some(0));
 }
 
-/// There is such a program, and it cannot be started: nobody can know that before.
+/// The program exists but cannot be started. This cannot be detected in advance.
 #[test]
 fn who_gives_a_first_problem_that_is_not_begun_is_told_why() {
     let place = folder("first-not-begun");
@@ -143,8 +143,8 @@ fn an_executive_without_a_problem_ends_when_it_is_told_to() {
     assert_eq!(own.end().status.code(), Some(0));
 }
 
-/// The calendar of the command line is about the problem that a client gives; its windows stay when a further
-/// problem comes.
+/// The calendar of the command line applies to the client's problem. Its windows are kept for
+/// further problems.
 #[test]
 fn calendar_is_applied_to_first_problem_and_kept_for_further_ones() {
     let place = folder("first-dated");

@@ -1,11 +1,11 @@
-//! Several goals at once, clients that wait for one, and requests about single actions.
+//! Several goals at once, clients that wait for a goal, and requests about single actions.
 
 use serde_json::{Value, json};
 
 use super::client::{Executive, folder};
 use super::{ctl, simulated};
 
-/// Gives a goal with `ctl goal --wait`. Returns the exit code and the state of the goal.
+/// Submits a goal with `ctl goal --wait`. Returns the exit code and the state of the goal.
 fn wait_for(own: &Executive, name: &str, goal: &str) -> (Option<i32>, Value) {
     let (token, address) = (own.token(), own.address());
     let executive = ["--token", &token, "--to", &address, "--json"];

@@ -1,4 +1,6 @@
-//! Clients that mean no good: they neither lock out those with the token nor ask anything for a page from elsewhere.
+//! Malicious clients do not lock out clients with the token, and web pages of other origins cannot
+//! send requests. @@ crates/cli/tests/executive/hostile.rs Opens `count` connections over TCP, or
+//! over the socket in every fifth case, that send incomplete requests or never read the answer.
 
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -10,8 +12,8 @@ use serde_json::Value;
 use super::client::{Executive, folder};
 use super::{DOMAIN, PROBLEM, TOKEN, ctl};
 
-/// Connects as often as given, over TCP and in every fifth case over the socket, and says something without end or
-/// without listening.
+/// Opens `count` connections over TCP, or over the socket in every fifth case, that send incomplete
+/// requests or never read the answer.
 fn crowd(own: &Executive, count: usize) -> (Vec<TcpStream>, Vec<UnixStream>) {
     let words: [&[u8]; 5] = [
         b"",
@@ -53,7 +55,7 @@ fn five_hundred_hostile_clients_lock_nobody_out_who_has_the_token() {
         drop(more);
     }
     drop(held);
-    // Those that have left make room for others.
+    // Closed connections free their places.
     own.await_state(|state| state["activity"] != "paused");
     let (held, stopped) = (crowd(&own, 500), own.post("/v1/stop", &Value::Null));
     assert_eq!(stopped.0, 200, "{}", stopped.1);

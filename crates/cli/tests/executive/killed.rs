@@ -1,8 +1,9 @@
-//! Executives that are killed at any moment while goals come and go, journals that begin anew included.
+//! Executives that are killed at random moments while goals are added and cancelled, also while
+//! their journals are rotated.
 //!
-//! `ELBOWROOM_SERVE_KILLS=100 cargo test --workspace --test executive whenever -- --nocapture` makes a
-//! hundred of them. The number of one is the seed of what is asked, and of the moments at which it is
-//! killed.
+//! `ELBOWROOM_SERVE_KILLS=100 cargo test --workspace --test executive whenever -- --nocapture` runs
+//! a hundred of them. The number of an executive is the seed of the requests and of the moments at
+//! which it is killed.
 
 #![allow(
     clippy::print_stdout,
@@ -21,10 +22,10 @@ use super::command;
 use super::{lines, python_is_there, with_robot};
 
 const DONE: [&str; 6] = ["a1", "a2", "a3", "b1", "b2", "b3"];
-/// A journal begins anew after every few actions, and none of it is lost.
+/// Options that rotate the journal after every few actions and keep all segments.
 const SEGMENTS: [&str; 4] = ["--journal-size", "30K", "--journal-segments", "1000"];
 
-/// Numbers that look random.
+/// Pseudo-random numbers.
 struct Dice(u64);
 
 impl Dice {
@@ -37,16 +38,16 @@ impl Dice {
     }
 }
 
-/// What was asked of an executive, and what it has said to that.
+/// Requests sent to an executive, and its answers.
 #[derive(Default)]
 struct Asked {
     goals: u64,
-    /// Goals that it said it had taken in, and whether they may have been cancelled since.
+    /// Accepted goals, with `true` if they may have been cancelled since.
     taken: BTreeMap<String, bool>,
 }
 
 impl Asked {
-    /// Asks something; `None` when nobody is there any more.
+    /// Sends a random request. Returns `None` if the executive is gone.
     fn ask(&mut self, own: &Executive, dice: &mut Dice) -> Option<()> {
         let job = DONE[usize::try_from(dice.below(6)).expect("small")];
         if dice.below(5) == 0 {
@@ -60,14 +61,14 @@ impl Asked {
             }
             return Some(());
         }
-        // It has come undone, and is to be done again.
+        // The errand is undone and has to be repeated.
         let undone = json!({"fact": format!("(done {job})"), "becomes": false});
         own.ask_if_there("POST", "/v1/facts", &undone)?;
         self.goals += 1;
         let name = format!("g{}", self.goals);
         let goal = json!({"name": name, "goal": format!("(done {job})")});
         let (status, answer) = own.ask_if_there("POST", "/v1/goals", &goal)?;
-        // It listens a moment before it knows its run again.
+        // A resumed executive listens before it has replayed its journal.
         assert!([200, 202, 409].contains(&status), "{answer}");
         if answer["taken"] == true {
             self.taken.insert(name, false);
@@ -76,7 +77,7 @@ impl Asked {
     }
 }
 
-/// Has a process killed in so many milliseconds, whatever happens meanwhile.
+/// Starts a shell that kills a process after a delay.
 fn kill_later(process: u32, milliseconds: u64) -> std::process::Child {
     let seconds = format!("{}.{:03}", milliseconds / 1000, milliseconds % 1000);
     Command::new("sh")
@@ -95,16 +96,16 @@ fn segments(journal: &str) -> Vec<String> {
     all
 }
 
-/// The names of the goals that some segment says were reached.
+/// Returns the names of the goals that were reached according to any segment.
 fn reached(journal: &str) -> BTreeSet<String> {
     let mut reached = BTreeSet::new();
     for segment in segments(journal) {
-        // While the segments get their next numbers, one is not where it was.
+        // A segment may be missing while the segments are renumbered.
         let text = fs::read_to_string(&segment).unwrap_or_default();
         let is_about_goals =
             |line: &&str| line.contains("\"resting\"") || line.contains("\"event\":\"goal\"");
         for line in text.lines().filter(is_about_goals) {
-            // The last line may be in the writing.
+            // The last line may be incomplete.
             let Ok(line) = serde_json::from_str::<Value>(&line[9..]) else {
                 continue;
             };
@@ -119,17 +120,18 @@ fn reached(journal: &str) -> BTreeSet<String> {
     reached
 }
 
-/// How often an executive was killed, and its journal begun anew: at rest, and while it took up a plan.
+/// Number of kills, and of new journal segments: those written when idle (`at_rest`), and those
+/// written on the adoption of a plan (`amid`).
 #[derive(Clone, Copy, Debug, Default)]
 struct Killed {
     kills: u64,
     at_rest: usize,
     amid: usize,
-    /// Of these, while something was under way.
+    /// Rotations while actions were running.
     under_way: usize,
 }
 
-/// Kills an executive some times.
+/// Kills an executive several times.
 fn killed(number: u64) -> Killed {
     let (place, mut dice) = (folder(&format!("serve-kill-{number}")), Dice(number));
     dice.below(2);
@@ -153,7 +155,7 @@ fn killed(number: u64) -> Killed {
     }
     let what = format!("executive {number} after {kills} kills");
     let mut own = launched(&place, &journal, &beginning);
-    // It takes in nothing before it has gone through its journal. All that are still open can be reached.
+    // Goals are only accepted after the replay of the journal. All open goals can be reached.
     let last = json!({"name": "last", "goal": "(done a1)"});
     while own.post("/v1/goals", &last).0 != 200 {
         std::thread::sleep(std::time::Duration::from_millis(100));
@@ -222,7 +224,7 @@ fn killed(number: u64) -> Killed {
 }
 
 fn launched(place: &Path, journal: &str, beginning: &[String]) -> Executive {
-    // A journal without a first record is that of an executive that never began.
+    // Without a first record, the executive never began.
     let has_begun = fs::read(journal).is_ok_and(|text| text.contains(&b'\n'));
     let line: Vec<&str> = if has_begun {
         vec!["--resume", journal]
@@ -233,8 +235,8 @@ fn launched(place: &Path, journal: &str, beginning: &[String]) -> Executive {
     Executive::start(place, &[&line[..], &SEGMENTS].concat())
 }
 
-/// No goal that was taken in is lost, nothing is started twice, and every segment of the journal can be
-/// played back.
+/// No accepted goal is lost, nothing is started twice, and every segment of the journal can be
+/// replayed.
 #[test]
 fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
     if !python_is_there() {
@@ -263,8 +265,8 @@ fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
     assert!(amid > 0, "no journal was begun anew amid a run");
 }
 
-/// Wherever a program is killed while it begins its journal anew, the next one goes on: from the old
-/// segment as long as the new one has not its name.
+/// The run can be resumed wherever the program is killed during a rotation: from the old segment
+/// until the new one is renamed.
 #[test]
 fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
     if !python_is_there() {
@@ -285,12 +287,12 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
         let written = [0, text.len() / 2, text.len(), text.len(), text.len()][step];
         fs::write(&new, &text[..written]).expect("written");
         if step == 3 {
-            // The old segment has its second name already.
+            // The old segment already has its second name.
             let _ = fs::remove_file(&earlier);
             fs::hard_link(&journal, &earlier).expect("a second name");
         }
         if step == 4 {
-            // The earlier segments have their next numbers already, and the old segment has none.
+            // The earlier segments are already renumbered, and the old segment has no number.
             let all = segments(&journal).len() - 1;
             for number in (1..=all).rev() {
                 let to = format!("{journal}.{}", number + 1);
@@ -309,7 +311,7 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
             let second = text.lines().nth(1).map(str::to_owned);
             second.is_some_and(|it| it.contains("\"snapshot\""))
         };
-        // A goal that was taken in is not among the goals at once.
+        // An accepted goal appears among the goals with a delay.
         own.await_state(|_| begins_with_snapshot() && reached(&journal).contains(&name));
         own.kill();
         for segment in segments(&journal) {
@@ -321,7 +323,7 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
     own.post("/v1/stop", &Value::Null);
     assert_eq!(own.end().status.code(), Some(0));
     assert!(!new.exists(), "half a segment is left");
-    // What was there before may have been in the segment that was removed above.
+    // Earlier goals may have been recorded in the segment that was removed above.
     let reached = reached(&journal);
     for name in ["step-3", "step-4"] {
         assert!(reached.contains(name), "{name} was lost: {reached:?}");
@@ -342,7 +344,8 @@ fn passed(journal: &str) -> Vec<Value> {
         .collect()
 }
 
-/// The time while no executive is there counts also, for a world on the real clock that has forgotten it.
+/// Time also passes while no executive runs, for a world on the real clock that does not remember
+/// it.
 #[test]
 fn time_passes_between_kill_and_resume() {
     if !python_is_there() {
@@ -372,7 +375,7 @@ fn time_passes_between_kill_and_resume() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// An executive that was idle since its beginning has no report of its world in the journal.
+/// The journal of an executive that was always idle contains no report of its world.
 #[test]
 fn time_passes_while_an_executive_is_idle_from_its_beginning() {
     if !python_is_there() {
@@ -395,7 +398,7 @@ fn time_passes_while_an_executive_is_idle_from_its_beginning() {
     assert_eq!(passed(&journal), Vec::<Value>::new());
     std::thread::sleep(pause);
     let mut again = Executive::start(&place, &["--resume", &journal]);
-    // The world is started after the journal was replayed.
+    // The world is started after the replay of the journal.
     let state = again.await_state(|state| super::exact(&state["now"]) > 0.0);
     assert!(
         super::exact(&state["now"]) >= 2.0 * pause.as_secs_f64(),

@@ -1,4 +1,4 @@
-//! Models of the world that executives learn from their journals and believe.
+//! World models that executives learn from their journals and use as their beliefs.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,7 @@ fn roads(file: &str) -> String {
     format!("{ROADS}/{file}")
 }
 
-/// Executes the problem of a file in the world of the two roads, with `options`.
+/// Executes a problem file in the world with the two roads, with `options`.
 fn run(problem: &str, options: &[&str]) -> Output {
     let (domain, problem) = (roads("domain.pddl"), roads(problem));
     let world = format!("python3 {}", roads("world.py"));
@@ -27,7 +27,7 @@ fn text(output: &[u8]) -> String {
     String::from_utf8_lossy(output).into_owned()
 }
 
-/// Takes both roads five times, with a plan of its own, and learns from the journals.
+/// Uses both roads five times, with a fixed plan, and learns from the journals.
 fn learn(folder: &Path, experience: &str) {
     let plan = folder.join("both.plan");
     let steps = "0: (long-road) [5]\n6: (back) [1]\n8: (short-road) [2]\n11: (sign) [1]\n";
@@ -57,7 +57,7 @@ fn executors_believe_what_was_learnt_from_journals() {
     let folder = folder("believed");
     let experience = folder.join("experience").display().to_string();
     let believing = ["--executor", "policy", "--believed", &experience, "--json"];
-    // Before the first day there is no model, and all is believed to go as planned.
+    // Without a model, all actions are expected to go as planned.
     let learning = ["--learn", &experience, "--journal"];
     let unused = folder.join("unused.journal").display().to_string();
     let before = run(
@@ -87,7 +87,7 @@ fn executors_believe_what_was_learnt_from_journals() {
     assert_eq!(replay.status.code(), Some(0), "{replay:?}");
     let page = command::elbowroom(&["report", &trace]);
     assert!(text(&page.stdout).contains("Predictions of the believed world"));
-    // A problem need not have all that the model is about.
+    // The model may contain sections that do not apply to the problem.
     let mut more = fs::read_to_string(&model).expect("a model");
     more.push_str("\n[[duration]]\naction = \"(fly home)\"\nconstant = 3\n");
     fs::write(&model, more).expect("written");
@@ -97,7 +97,7 @@ fn executors_believe_what_was_learnt_from_journals() {
         text(&other.stderr).contains("1 section left out"),
         "{other:?}"
     );
-    // Predictions stand beside observations.
+    // The answer contains predictions and observations.
     let journal = folder.join("4.journal").display().to_string();
     let expected = folder.join("expected.toml").display().to_string();
     let told = command::elbowroom(&["learn", &journal, "-o", &expected]);
@@ -115,7 +115,7 @@ fn executors_that_try_plans_out_pursue_changing_goals() {
     let slow = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"short-road\"\nconstant = 12\n";
     fs::write(&world, slow).expect("written");
     let world = world.display().to_string();
-    // `lookahead` believes no durations.
+    // `lookahead` does not use durations of the model.
     for (executor, problem) in [
         ("policy", "closing.pddl"),
         ("live:5", "closing.pddl"),
@@ -148,7 +148,7 @@ fn stopped_executives_learn_from_the_whole_journal() {
     }
     let folder = folder("learning");
     let experience = folder.join("experience").display().to_string();
-    // In the folder itself, a journal counts once.
+    // A journal inside the folder is counted once.
     fs::create_dir(&experience).expect("a folder");
     let journal = folder.join("experience/run.journal").display().to_string();
     let world = format!("python3 {}", roads("world.py"));

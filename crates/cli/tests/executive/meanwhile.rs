@@ -1,5 +1,5 @@
-//! What an executive does while a plan is made. The planner waits for a file, so that a search lasts as
-//! long as a test wants it to.
+//! Behaviour of an executive during planning. The planner waits for a file, so tests control the
+//! duration of the search.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::client::{Executive, folder};
 use super::{DOMAIN, PROBLEM};
 
-/// An executive whose planner waits for the file `go` in that folder.
+/// Starts an executive whose planner waits for the file `go` in that folder.
 fn with_a_slow_planner(place: &Path) -> Executive {
     with_a_slow_planner_for(place, PROBLEM)
 }
@@ -21,7 +21,7 @@ fn with_a_slow_planner_for(place: &Path, problem: &str) -> Executive {
         place.join("once"),
     );
     let own = env!("CARGO_BIN_EXE_elbowroom");
-    // With the file `once`, each `go` is for one plan.
+    // With the file `once`, each `go` permits one plan.
     let program = format!(
         "while ! test -e '{go}'; do sleep 0.05; done\nif test -e '{once}'; then rm '{go}'; fi\n\
          exec '{own}' plan \"$1\" \"$2\"\n",
@@ -71,8 +71,8 @@ fn requests_are_taken_in_and_answered_while_the_first_plan_is_made() {
     assert_eq!(own.end().status.code(), Some(0));
 }
 
-/// Another chain of errands, of which the problem's own goal needs nothing, so that a plan has to be
-/// made for them.
+/// Adds another chain of errands. The problem's own goal does not need them, so a new plan is
+/// required for them.
 fn with_another_chain(place: &Path) -> String {
     let text = fs::read_to_string(super::command::root().join(PROBLEM)).expect("a problem");
     let text = text
@@ -87,7 +87,7 @@ fn with_another_chain(place: &Path) -> String {
     problem.display().to_string()
 }
 
-/// The lines of the trace so far; the last one may be in the writing.
+/// Returns the lines of the trace so far, without an incomplete last one.
 fn trace(place: &Path) -> Vec<Value> {
     let text = fs::read_to_string(place.join("trace.jsonl")).unwrap_or_default();
     let lines = text.lines().map(serde_json::from_str);
@@ -102,17 +102,17 @@ fn is_start(line: &Value) -> bool {
     is_event(line, "command") && line["command"]["type"] == "start"
 }
 
-/// The lines since the last plan was asked for, if it is still in the making.
+/// Returns the lines since the last request for a plan, if the search is still running.
 fn of_the_search(lines: &[Value]) -> Option<&[Value]> {
     let asked = lines.iter().rposition(|it| is_event(it, "planning"))?;
     let since = &lines[asked..];
     (!since.iter().any(|it| is_event(it, "planned"))).then_some(since)
 }
 
-/// A goal is given that the running plan does not reach, so that another one has to be made: one that it
-/// reaches as well would be kept for. Its planner is slow: the running plan is dispatched all the same, and
-/// requests are answered. The goal is given before there is a plan, so that nothing of that plan has been
-/// started when the search for the next one begins, however slow this machine is.
+/// The new goal is not reached by the running plan, so another plan is needed (a goal that it
+/// reaches would not cause a search). While the slow planner searches, the running plan is
+/// dispatched and requests are answered. The goal is added before there is a plan, so that no
+/// action of that plan has started when the next search begins, even on a slow machine.
 #[test]
 fn the_running_plan_is_dispatched_while_a_slow_planner_plans() {
     let place = folder("dispatched-meanwhile");
@@ -124,7 +124,7 @@ fn the_running_plan_is_dispatched_while_a_slow_planner_plans() {
     let goal = json!({"goal": "(done c2)", "name": "more"});
     assert_eq!(own.post("/v1/goals", &goal).0, 200);
     fs::write(&go, "").expect("written");
-    // What is started is started by the plan that was there before.
+    // All starts belong to the earlier plan.
     let state = own.await_state(|state| {
         let lines = trace(&place);
         let plans = lines.iter().filter(|it| is_event(it, "plan")).count();
@@ -154,7 +154,7 @@ fn the_running_plan_is_dispatched_while_a_slow_planner_plans() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// A domain of which nothing can be executed is refused before anybody is asked for a problem.
+/// A domain that cannot be executed is refused before the executive listens for a problem.
 #[test]
 fn a_domain_that_cannot_be_executed_is_refused_before_it_listens() {
     let place = folder("plus");

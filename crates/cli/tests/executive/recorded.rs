@@ -1,5 +1,5 @@
-//! The journal of an executive that planned and prepared plans in the background, as it was written on 28 November
-//! 2026. Its run is the same to this day: it is resumed wherever it is cut.
+//! A journal with background planning and preparation, recorded on 28 November 2026. Its replay
+//! still makes the same decisions, and it can be resumed wherever it is cut.
 
 use std::fs;
 
@@ -11,8 +11,8 @@ use super::python_is_there;
 
 const JOURNAL: &str = "crates/cli/tests/files/golden/executive.journal";
 
-/// The numbers of lines after which the executive may have died: the planner was asked, its plan was there, or that
-/// plan was ready.
+/// Returns numbers of lines after which the executive may have died: after the request for a plan,
+/// after its arrival, and after its preparation.
 fn cuts(lines: &[&str]) -> Vec<usize> {
     let kinds = [
         "{\"event\":\"planning\"",
@@ -46,12 +46,13 @@ fn recorded_journal_plays_back_wherever_it_is_cut() {
         assert_eq!(replay.status.code(), Some(0), "{cut}: {replay:?}");
         let document: Value = serde_json::from_slice(&replay.stdout).expect("a document");
         assert_eq!(document["agrees"], true, "{cut}: {document}");
-        // All lines but the header are entries.
+        // All lines except the header are entries.
         assert_eq!(document["entries"], cut - 1, "{cut}: {document}");
     }
 }
 
-/// A resumed executive obeys a stop only when its journal has led to the same decisions; otherwise it fails.
+/// A resumed executive ends with success on a stop request only if the replay made the same
+/// decisions.
 #[test]
 fn recorded_journal_is_resumed_wherever_it_is_cut() {
     if !python_is_there() {

@@ -1,4 +1,4 @@
-//! Interface of a run that ends with its goal: that of an executive, without further goals.
+//! HTTP interface of a run that ends with its goal: that of an executive, without further goals.
 
 use serde_json::{Value, json};
 

@@ -6,7 +6,7 @@ import sys
 
 fault = sys.argv[1]
 now, ends, starts, news, held, known = 0.0, {}, 0, [], [], {}
-# Those that say that they know what was under way when they were killed.
+# Worlds that claim to know the actions that were running when they were killed.
 REMEMBER = ["right", "forgets", "does not say what became of it", "begins again", "invents a start",
             "never ends what was under way", "does not start again", "loses its time", "forgets what is over",
             "claims it only once"]

@@ -12,7 +12,8 @@ use super::command::root;
 use super::skipped::skipped;
 use super::{awaited, beginning, folder, judge, lines, python_is_there, started};
 
-/// What was on the disk before the disk was full can be gone on with; nothing else was started.
+/// A run can be resumed from the records written before the disk was full. Nothing was started
+/// without a record.
 #[test]
 fn a_journal_that_cannot_be_written_starts_nothing() {
     if !Path::new("/dev/full").exists() {
@@ -34,7 +35,7 @@ fn a_journal_that_cannot_be_written_starts_nothing() {
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
-/// A limit on the size of files stands for a disk that fills up while the run is under way.
+/// A limit on the file size simulates a disk that fills up during the run.
 #[test]
 fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
     if !python_is_there() {
@@ -43,8 +44,8 @@ fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
     let folder = folder("fills");
     let journal = folder.join("journal").display().to_string();
     let program = env!("CARGO_BIN_EXE_elbowroom");
-    // In the shell's units, so that the first record fits and not all of them do. The signal that
-    // would end the program is ignored, and writing fails.
+    // In the shell's units, so that the first record fits and the rest does not. The signal that
+    // would end the program is ignored, so that writing fails.
     let line = beginning(&folder, &journal, false)
         .iter()
         .map(|word| format!("'{word}'"))
@@ -72,10 +73,10 @@ fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
-/// A file system that cannot be written is said so before anything is started.
+/// A read-only file system is reported before anything is started.
 #[test]
 fn a_journal_on_a_disk_that_is_read_only_starts_nothing() {
-    // Nobody makes files there, not even root.
+    // No user can create files there, not even root.
     let journal = "/proc/self/journal";
     if !Path::new("/proc/self").exists() {
         skipped("there is no /proc");
@@ -95,7 +96,7 @@ fn a_journal_on_a_disk_that_is_read_only_starts_nothing() {
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
-/// A disk of a few pages fills up and grows again. As root, in name spaces of their own.
+/// A disk of a few pages fills up and is enlarged. Needs root, and uses its own name spaces.
 #[test]
 fn a_run_goes_on_from_a_small_disk_that_was_full_when_there_is_room_again() {
     let can_mount = Command::new("unshare").args(["-m", "true"]).output();
@@ -110,7 +111,7 @@ fn a_run_goes_on_from_a_small_disk_that_was_full_when_there_is_room_again() {
     let program = env!("CARGO_BIN_EXE_elbowroom");
     let words = beginning(&folder, &journal, false);
     let words: Vec<_> = words.iter().map(|word| format!("'{word}'")).collect();
-    // The mount is gone with the last process of its name space: both runs are in one.
+    // The mount disappears with the last process of its name space, so both runs share one.
     let script = format!(
         "mount -t tmpfs -o size=8k tmpfs '{disk}' || exit 77
          '{program}' {words} 2> '{folder}/first'; echo $? > '{folder}/code'; cp '{folder}/begun' '{folder}/half'
@@ -142,7 +143,8 @@ fn a_run_goes_on_from_a_small_disk_that_was_full_when_there_is_room_again() {
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
-/// A disk that is slow: each record that must be on it waits until this test lets it. Until then nothing is told.
+/// Slow disk: each record that must be synced waits until this test releases it. Until then no
+/// command is sent.
 #[test]
 fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk() {
     if !python_is_there() {
@@ -160,7 +162,7 @@ fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk()
         .env("LD_PRELOAD", &shim)
         .env("ASKED", folder.join("asked"))
         .env("GO", folder.join("go"))
-        // So that one starts while the other one is under way.
+        // Uneven durations, so that one action starts while another one is running.
         .env("UNEVEN", "1")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -177,18 +179,19 @@ fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk()
         if heard.recv_timeout(Duration::from_millis(50)).is_err() {
             continue;
         }
-        // It waits for its disk. Nothing can be told any more, so that what the robot has begun by now was on it.
+        // The executive waits for the sync and can send nothing. The starts that the robot has
+        // received by now must be on the disk.
         let told = told_to_start(&journal);
-        // All that one decision starts waits together.
+        // All starts of one decision are synced together.
         let (before, held) = told.split_at(released);
         if held.is_empty() {
-            // A cancel; what is late may be told to stop.
+            // The record is a cancel. Late actions may be cancelled.
             (&go).write_all(b"g").expect("it waits for that");
             continue;
         }
         let done = lines(&folder, "done").len();
         if done < before.len() {
-            // As slow as the rest of what is under way.
+            // This sync is held until one of the running actions has ended.
             held_for_long += 1;
             while lines(&folder, "done").len() == done {
                 assert!(
@@ -216,7 +219,8 @@ fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk()
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
-/// What makes the disk slow; `None`, with the reason told, where it cannot be made.
+/// Compiles the library that slows down syncs. Returns `None`, and reports the test as skipped, if
+/// it cannot be compiled.
 fn compiled(folder: &Path) -> Option<PathBuf> {
     let shim = folder.join("slow_sync.so");
     let source = root().join("crates/cli/tests/files/slow_sync.c");
@@ -233,7 +237,7 @@ fn compiled(folder: &Path) -> Option<PathBuf> {
     Some(shim)
 }
 
-/// A named pipe. Whoever opens it for both does not wait for others.
+/// Creates a named pipe, opened for reading and writing so that opening does not block.
 fn pipe(path: &Path) -> fs::File {
     let made = Command::new("mkfifo").arg(path).status();
     assert!(made.is_ok_and(|it| it.success()), "{}", path.display());
@@ -242,7 +246,7 @@ fn pipe(path: &Path) -> fs::File {
     options.open(path).expect("it was made")
 }
 
-/// The starts that the journal has, as the robot writes them down.
+/// Returns the starts in the journal, in the format of the robot's records.
 fn told_to_start(journal: &str) -> Vec<String> {
     let text = fs::read_to_string(journal).expect("there is a journal");
     let records = text.lines().filter_map(|line| {

@@ -18,19 +18,20 @@ use super::super::clock::Clock;
 use super::{Ended, Ending, Limits, Stream, Watcher};
 use crate::processes::{MARK, Processes, Usage};
 
-/// How often limits are looked at.
+/// Interval between checks of the limits.
 const TICK: Duration = Duration::from_millis(20);
-/// How often memory and processor time are measured: reading `/proc` costs a few milliseconds.
+/// Interval between measurements of memory and processor time; reading `/proc` costs a few
+/// milliseconds.
 const MEASURE: Duration = Duration::from_millis(60);
-/// How often the end is looked at when nothing is printed any more.
+/// Interval between checks for the end of the process once its output is closed.
 const NEAR_END: Duration = Duration::from_millis(2);
-/// The time that killed processes have to end.
+/// Maximum time to wait for the end of killed processes.
 const LAST_WAIT: Duration = Duration::from_secs(2);
-/// How long children that go on having children are hunted.
+/// Maximum time spent on killing children that keep forking.
 const HUNT: Duration = Duration::from_millis(500);
 #[cfg(target_os = "linux")]
 const MEGABYTE: u64 = 1 << 20;
-/// How much of the output that is left in the pipes at the end is read.
+/// Maximum length of the output read from the pipes after the end.
 const LEFT_OVER: usize = 4 << 20;
 
 pub(super) fn supervise(
@@ -47,8 +48,8 @@ pub(super) fn supervise(
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
-        // A signal to the group reaches its children too, and Ctrl-C on the terminal does not
-        // reach it: we end it ourselves, with what it found so far.
+        // A signal to the group also reaches the children. Ctrl-C on the terminal does not reach
+        // the group: the supervisor ends it and keeps its last plan.
         .process_group(0)
         .spawn()?;
     let mut run = Run::of(child, &mark, limits, clock);
@@ -64,7 +65,7 @@ pub(super) fn supervise(
     })
 }
 
-/// A word that no other run has.
+/// Returns a mark that no other run has.
 fn mark() -> String {
     use std::sync::atomic::AtomicU64;
     static COUNT: AtomicU64 = AtomicU64::new(0);
@@ -85,7 +86,7 @@ struct Run {
     processes: Processes,
     is_output_open: bool,
     is_error_open: bool,
-    /// Whether another thread waits for its end.
+    /// `true` if another thread waits for the end of the process.
     is_left: bool,
 }
 
@@ -110,8 +111,8 @@ impl Run {
             is_left: false,
             child,
         };
-        // Should this fail, reads may wait for more output; the limits still end them, because
-        // killing the process closes the pipes.
+        // If this fails, reads may block. The limits still end them, because killing the process
+        // closes the pipes.
         if let Some(output) = &run.child.stdout {
             let _ = without_waiting(output);
         }
@@ -121,8 +122,8 @@ impl Run {
         run
     }
 
-    /// Limits that hold even if we should be killed ourselves, or are too slow. They stand well
-    /// above those that we watch.
+    /// Sets limits of the operating system, in case the supervisor is killed or too slow. They are
+    /// well above the supervised ones.
     fn restrict(&self) {
         #[cfg(target_os = "linux")]
         {
@@ -132,7 +133,8 @@ impl Run {
                     current: Some(limit),
                     maximum: Some(limit),
                 };
-                // It may have ended already; and these limits are a second line of defence.
+                // An error is ignored: the process may have ended, and these limits are only a
+                // second line of defence.
                 let _ = prlimit(Some(self.pid), resource, limit);
             };
             set(Resource::Core, 0);
@@ -153,8 +155,8 @@ impl Run {
         }
     }
 
-    /// Reads its output and watches its limits. Says why it must be ended; `None` if it has ended
-    /// by itself.
+    /// Reads the output and checks the limits. Returns the reason why the process must be ended, or
+    /// `None` if it has ended by itself.
     fn watch(&mut self, stop: &AtomicBool, watcher: &mut dyn Watcher) -> Option<Ending> {
         let mut buffer = vec![0; 64 << 10];
         loop {
@@ -169,7 +171,7 @@ impl Run {
             if left == Some(Duration::ZERO) {
                 return Some(Ending::TimeLimit);
             }
-            // So short before the end, measuring would only delay it.
+            // Shortly before the limit, a measurement would only delay the end.
             if left.is_none_or(|left| left > TICK) {
                 self.measure(elapsed);
             }
@@ -189,14 +191,14 @@ impl Run {
 
     fn has_exited(&self) -> bool {
         let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
-        // Not reaped yet, so its number, which is that of the group, stays ours.
+        // The process is not reaped, so its number, which is also the group's, cannot be reused.
         matches!(waitid(WaitId::Pid(self.pid), options), Ok(Some(_)))
     }
 
     #[cfg(target_os = "linux")]
     fn measure(&mut self, elapsed: Duration) {
         let is_due = |last: Duration| elapsed.saturating_sub(last) >= MEASURE;
-        // Programs that end at once are not worth it.
+        // Very short runs are not measured.
         if elapsed >= TICK / 2 && self.measured.is_none_or(is_due) {
             self.measured = Some(elapsed);
             self.usage = self.processes.usage();
@@ -222,12 +224,12 @@ impl Run {
             return;
         }
         let timeout = Timespec::try_from(patience).ok();
-        // Interrupted or not, the next round looks again.
+        // An interrupted poll is repeated by the caller's loop.
         let _ = poll(&mut watched, timeout.as_ref());
     }
 
-    /// Reads what there is, but no more than a few buffers full, so that who prints without end
-    /// does not keep us from looking at the clock. Says whether there was anything.
+    /// Reads available output, at most a few buffers, so that a process that prints without end
+    /// does not delay the checks of the limits. Returns the number of bytes read.
     fn read(&mut self, buffer: &mut [u8], watcher: &mut dyn Watcher) -> usize {
         let mut total = 0;
         for _ in 0..8 {
@@ -250,7 +252,7 @@ impl Run {
         total
     }
 
-    /// Reads what the processes left behind.
+    /// Reads the remaining output.
     fn drain(&mut self, watcher: &mut dyn Watcher) {
         let mut buffer = vec![0; 64 << 10];
         let mut total = 0;
@@ -262,9 +264,9 @@ impl Run {
         }
     }
 
-    /// Kills the group, and whoever else belongs to the run.
+    /// Kills the group and all other processes of the run.
     fn end_all(&mut self) {
-        // An error means that the group is gone, which is what we want.
+        // An error means that the group is already gone.
         let _ = kill_process_group(self.pid, Signal::KILL);
         #[cfg(target_os = "linux")]
         {
@@ -276,7 +278,7 @@ impl Run {
         }
     }
 
-    /// Removes the process from the system's table, and says how it ended.
+    /// Reaps the process and returns its end.
     fn reap(&mut self) -> Ending {
         use std::os::unix::process::ExitStatusExt;
         let clock = Clock::start();
@@ -289,8 +291,8 @@ impl Run {
                     };
                 }
                 Ok(None) if clock.elapsed() < LAST_WAIT => thread::sleep(NEAR_END / 4),
-                // It is killed, but the system is slow to let go of it. Nobody need wait for that,
-                // but somebody has to, or it stays in the system's table.
+                // The process is killed but has not ended yet. Another thread waits for it, so that
+                // it is reaped.
                 Ok(None) => {
                     let pid = self.pid;
                     thread::spawn(move || waitpid(Some(pid), WaitOptions::empty()));
@@ -303,7 +305,7 @@ impl Run {
     }
 }
 
-/// Should the watcher panic, nothing is left running all the same.
+/// Ends the process even if the watcher panics.
 impl Drop for Run {
     fn drop(&mut self) {
         if !self.is_left
@@ -321,7 +323,7 @@ fn without_waiting(stream: impl AsFd) -> io::Result<()> {
     Ok(())
 }
 
-/// Reads once. Says whether the stream is still open.
+/// Reads once. Returns `true` if the stream is still open.
 fn read_some(
     stream: &mut impl Read,
     buffer: &mut [u8],

@@ -7,7 +7,7 @@ fn drawn(distribution: impl rand_distr::Distribution<f64>, count: usize) -> Vec<
     (0..count).map(|_| distribution.sample(&mut rng)).collect()
 }
 
-/// The best point of a fine grid, looked at one by one.
+/// Returns the best point of a fine grid, by exhaustive search.
 fn by_grid(samples: &[Sample], around: (f64, f64)) -> (f64, f64) {
     let mut best = (f64::NEG_INFINITY, (0.0, 0.0));
     for i in 0..=200 {
@@ -73,7 +73,7 @@ fn what_is_cut_off_counts() {
         .collect();
     let fit = best(&samples, 0.001).expect("a fit");
     assert!((fit.mean - 12.0).abs() < 0.6, "{fit:?}");
-    // Leaving out what was cut off would make all actions look quick.
+    // Without the censored samples, the estimated durations would be too short.
     let kept: Vec<Sample> = samples.iter().filter(|s| !s.is_censored).copied().collect();
     let naive = best(&kept, 0.001).expect("a fit");
     assert!(naive.mean < 10.5, "{naive:?}");
@@ -101,7 +101,7 @@ fn the_family_is_found_again() {
         Distribution::Uniform { .. }
     ));
     assert_eq!(of(vec![5.0; 10]), Distribution::Constant(5.0));
-    // Two heaps: no family of ours.
+    // Two clusters, which no family fits.
     let heaps = (0..60).map(|i| {
         if i % 2 == 0 {
             3.0 + f64::from(i) / 1e3

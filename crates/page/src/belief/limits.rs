@@ -1,4 +1,4 @@
-//! Which numbers the conditions of actions allowed, and when.
+//! Limits of numbers over time, from the conditions of actions.
 
 use std::collections::BTreeMap;
 
@@ -10,16 +10,15 @@ use elbowroom::report::short::nearest;
 
 use crate::document::Limit;
 
-/// More limits of one number than can be told apart.
+/// Maximum number of limits shown for each number.
 const MOST_LIMITS: usize = 2_000;
 
 /// The limits of numbers during a run.
 #[derive(Default)]
 pub(super) struct Limits {
-    /// By number, as far as they are over.
+    /// Limits whose time has passed, by number.
     of: BTreeMap<FluentId, Vec<Allowed>>,
-    /// The actions under way: their names, since when, and what has to hold all through and at
-    /// the end.
+    /// Running actions: name, start time, over-all bounds, and condition at the end.
     running: BTreeMap<Ticket, Running>,
 }
 
@@ -30,7 +29,7 @@ struct Running {
     at_end: Condition,
 }
 
-/// What was allowed, from when to when.
+/// Limit of a number during an interval.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Allowed {
     from: Rational,
@@ -38,12 +37,12 @@ pub(super) struct Allowed {
     bound: Bound,
     /// `during (drive rover depot shelf)`.
     when: String,
-    /// What the number was, at a moment; it may change at that moment.
+    /// Value of the number, for a limit at one moment; the number may jump at that moment.
     value: Option<Rational>,
 }
 
-/// Time and value of a number, in order of time; it changes evenly between them, and at once where
-/// two have the same time.
+/// Time and value of a number, ordered by time. The number changes linearly between two points, and
+/// jumps if they have the same time.
 type Points = [(Rational, Rational)];
 
 /// A bound of a number.
@@ -54,7 +53,7 @@ struct Bound {
 }
 
 impl Limits {
-    /// An action starts, in this state.
+    /// Records the limits that the start of an action imposes in this state.
     pub(super) fn started(
         &mut self,
         ticket: Ticket,
@@ -87,7 +86,7 @@ impl Limits {
         );
     }
 
-    /// An action has ended in this state, with success or without.
+    /// Records the limits of an action that has ended in this state.
     pub(super) fn ended(&mut self, ticket: Ticket, has_succeeded: bool, state: &Progression) {
         let Some(running) = self.running.remove(&ticket) else {
             return;
@@ -109,7 +108,7 @@ impl Limits {
         }
     }
 
-    /// All limits by number; of what is under way, until now.
+    /// Returns all limits by number. Limits of running actions extend to the present.
     pub(super) fn finish(mut self, state: &Progression) -> BTreeMap<FluentId, Vec<Allowed>> {
         let tickets: Vec<Ticket> = self.running.keys().copied().collect();
         for ticket in tickets {
@@ -146,7 +145,7 @@ impl Limits {
 }
 
 impl Allowed {
-    /// For drawing.
+    /// Converts the limit for drawing.
     pub(super) fn limit(&self) -> Limit {
         Limit {
             from: self.from.to_f64(),
@@ -162,7 +161,8 @@ impl Allowed {
         format!("{symbol} {} {}", nearest(&self.bound.value), self.when)
     }
 
-    /// How far the number is from the limit where it is closest, and when.
+    /// Returns the smallest distance of the number from the limit, and its time. The distance is
+    /// negative if the limit is violated.
     fn room(&self, points: &Points) -> Option<(Rational, Rational)> {
         let room = |value: &Rational| match self.bound.side() {
             0 => None,
@@ -172,7 +172,8 @@ impl Allowed {
         if let Some(value) = &self.value {
             return Some((room(value)?, self.from.clone()));
         }
-        // Just after its beginning, just before its end, and wherever it turns in between.
+        // The extremes of a piecewise linear function: just after the start, just before the end,
+        // and at the points in between.
         let after = points.partition_point(|(time, _)| *time <= self.from);
         let before = points.partition_point(|(time, _)| *time < self.to);
         let mut values = Vec::new();
@@ -188,7 +189,7 @@ impl Allowed {
     }
 }
 
-/// The value at a time between the points before this position and from it on.
+/// Returns the value at `time`, interpolated between the points before and at `position`.
 fn between(points: &Points, position: usize, time: &Rational) -> Option<Rational> {
     let before = position
         .checked_sub(1)
@@ -202,7 +203,7 @@ fn between(points: &Points, position: usize, time: &Rational) -> Option<Rational
     Some(low + (high - low) * share.unwrap_or_default())
 }
 
-/// Where a number comes closest to a limit, in words.
+/// Describes the point at which a number is closest to a limit.
 pub(super) fn closest(limits: &[Allowed], points: &Points) -> Option<String> {
     let rooms = limits
         .iter()
@@ -223,7 +224,7 @@ pub(super) fn closest(limits: &[Allowed], points: &Points) -> Option<String> {
 }
 
 impl Bound {
-    /// -1: a least value; 1: a greatest one; 0: the only one.
+    /// Returns -1 for a lower bound, 1 for an upper bound, and 0 for equality.
     fn side(&self) -> i8 {
         match self.comparison {
             Comparison::AtLeast | Comparison::Greater => -1,
@@ -233,9 +234,9 @@ impl Bound {
     }
 }
 
-/// What a condition says of each number, the others having their present values. Comparisons in
-/// which the number occurs otherwise than once and linearly are left out, and so is what need not
-/// hold because something else may.
+/// Returns the bounds that a condition imposes on each number while the others have their present
+/// values. Ignores comparisons that do not contain the number exactly once and linearly, and
+/// conditions that are part of a disjunction.
 fn bounds(
     condition: &Condition,
     duration: Option<&Rational>,
@@ -318,7 +319,7 @@ mod tests {
 
     #[test]
     fn a_number_is_closest_to_a_limit_where_it_turns_or_where_the_limit_begins_or_ends() {
-        // It falls from 10 to 4 until 3, is filled up to 12 at once, and falls to 0 until 9.
+        // The number falls from 10 to 4 until time 3, jumps to 12, and falls to 0 until time 9.
         let points = [(0, 10), (3, 4), (3, 12), (9, 0)].map(|(a, b)| (number(a), number(b)));
         let room = |limit: Allowed| limit.room(&points).expect("a room");
         let least = |from, to| allowed(from, to, Comparison::AtLeast, 2);

@@ -1,4 +1,4 @@
-//! Quantities to change on the page of an envelope, or of a region.
+//! Sliders for the quantities of an envelope or a region.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use elbowroom::num::Rational;
 use super::tables::ends;
 use crate::document::{Slider, Sliders};
 
-/// More sliders than anybody would look through.
+/// Maximum number of sliders.
 const MOST: usize = 100;
 
-/// A quantity, as far as it may go, and that in words. An interval without ends has no words.
+/// A quantity with its interval, also as text. The text is empty if the interval is unbounded.
 pub(crate) struct Reach<'a> {
     pub(crate) quantity: &'a Quantity,
     pub(crate) lower: Option<&'a Rational>,
@@ -21,7 +21,7 @@ pub(crate) struct Reach<'a> {
 }
 
 impl<'a> Reach<'a> {
-    /// Its interval in the envelope.
+    /// Returns the quantity's interval in the envelope.
     pub(super) fn of(range: &'a Range) -> Self {
         let (lower, upper) = ends(range);
         Self {
@@ -33,7 +33,7 @@ impl<'a> Reach<'a> {
     }
 }
 
-/// Sliders for the quantities of a plan; `None` if there are none, or too many.
+/// Returns sliders for the quantities of a plan; `None` if there are none or too many.
 pub(crate) fn sliders(
     timeline: &Timeline,
     reaches: &[Reach<'_>],
@@ -69,8 +69,8 @@ pub(crate) fn sliders(
     })
 }
 
-/// From half to five times the nominal value or, if the envelope reaches further, a bit further
-/// than that.
+/// Returns a slider from half to five times the nominal value, or slightly beyond the envelope if
+/// that is larger.
 fn slider(reach: &Reach<'_>) -> Slider {
     let nominal = &reach.quantity.nominal;
     let half = Rational::new(1, 2);
@@ -98,7 +98,7 @@ fn slider(reach: &Reach<'_>) -> Slider {
         _ => to,
     };
     let step = step(&((&to - &from) * Rational::new(1, 500)));
-    // Whole steps from zero, so that what is read is what is checked.
+    // Whole steps from zero, so that the displayed value is the checked one.
     let down = |value: &Rational| (value / &step).floor() * &step;
     Slider {
         name: reach.quantity.name.clone(),
@@ -111,7 +111,7 @@ fn slider(reach: &Reach<'_>) -> Slider {
     }
 }
 
-/// The greatest of 1, 2 and 5 times a power of ten that is no greater, but not below a millionth.
+/// Returns the greatest step that is at most `most`: 1, 2 or 5 times a power of ten, at least 10⁻⁶.
 fn step(most: &Rational) -> Rational {
     let ten = Rational::from(10);
     let mut power = Rational::new(1, 1_000_000);
@@ -123,7 +123,7 @@ fn step(most: &Rational) -> Rational {
     fitting.unwrap_or(power)
 }
 
-/// A multiple of a millionth.
+/// Formats a multiple of 10⁻⁶.
 fn decimal(value: &Rational) -> String {
     value.to_decimal(6)
 }

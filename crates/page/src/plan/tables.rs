@@ -1,4 +1,4 @@
-//! The tables about a plan.
+//! Tables of a plan.
 
 use elbowroom::answers::envelope::timeline::{TimedAction, Timeline, WindowAnswer};
 use elbowroom::answers::envelope::{Quantity, Range, Room};
@@ -8,7 +8,7 @@ use elbowroom::report::short::{Rounding, between, nearest};
 use super::window_words;
 use crate::document::{Table, Text, Texts};
 
-/// Both ends of an interval, rounded inwards.
+/// Formats both ends of an interval, rounded inwards.
 pub(super) fn ends(range: &Range) -> (String, String) {
     let nominal = &range.quantity.nominal;
     let end = |end: &End, infinite: &str, rounding| match end.value() {
@@ -28,7 +28,7 @@ fn columns(names: &[(&str, bool)]) -> Vec<(String, bool)> {
         .collect()
 }
 
-/// The table of the envelope.
+/// Builds the table of the envelope.
 pub(super) fn rooms(rooms: &[Room], texts: &mut Texts) -> Table {
     let mut limit = |limit: &Option<String>| match limit {
         Some(limit) => texts.share(limit),
@@ -66,7 +66,7 @@ pub(super) fn rooms(rooms: &[Room], texts: &mut Texts) -> Table {
     }
 }
 
-/// The time-out of the action, if the quantity is its duration.
+/// Formats the time-out of the action, if the quantity is its duration.
 fn timeout(range: &Range) -> String {
     range.timeout.as_ref().map(nearest).unwrap_or_default()
 }
@@ -113,7 +113,7 @@ pub(crate) fn quantities(quantities: &[Quantity]) -> Table {
     }
 }
 
-/// The actions with their times; `values` says for which values the windows hold.
+/// Builds the table of actions and times; `values` describes the values for which the windows hold.
 pub(crate) fn times(timeline: &Timeline, values: &str) -> Table {
     let has_windows = timeline
         .actions

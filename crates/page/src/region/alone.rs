@@ -1,4 +1,4 @@
-//! How far one quantity may go alone.
+//! Interval of one quantity while the others have their planned values.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,8 @@ use elbowroom::report::short::{Rounding, between};
 
 use crate::plan::Reach;
 
-/// How far a quantity may go while the others are as planned: each end with whether it is excluded.
+/// Interval of a quantity while the others have their planned values: each end with `true` if it is
+/// excluded.
 #[derive(Default)]
 pub(super) struct Alone {
     lower: Option<(Rational, bool)>,
@@ -17,7 +18,8 @@ pub(super) struct Alone {
 }
 
 impl Alone {
-    /// In the piece with the planned values; nothing is known where there is none.
+    /// Returns the interval in the piece that contains the planned values, unbounded if there is
+    /// none.
     pub(super) fn of(parameters: &[Quantity], pieces: &[PieceAnswer], place: usize) -> Self {
         let nominal: BTreeMap<&str, &Rational> = parameters
             .iter()
@@ -83,7 +85,7 @@ impl Alone {
     }
 }
 
-/// The same for a slider.
+/// Converts the interval for a slider.
 pub(super) fn reach<'a>((alone, quantity): (&'a Alone, &'a Quantity)) -> Reach<'a> {
     Reach {
         quantity,

@@ -1,4 +1,4 @@
-//! Plans and what was done, action by action.
+//! Plans and executed actions, action by action.
 
 mod drawn;
 
@@ -17,21 +17,21 @@ use super::windows::Windows;
 /// The plans and starts read so far.
 #[derive(Default)]
 pub(super) struct Bars {
-    /// When each plan was taken up.
+    /// Adoption time of each plan.
     plans: Vec<Rational>,
     /// The steps of all plans.
     steps: Vec<Step>,
-    /// The orderings of the plans: steps, the one that comes first, and the other.
+    /// The orderings of the plans: the earlier and the later step.
     orderings: Vec<(usize, usize)>,
-    /// The actions that run while a plan is made: the first steps of the plan.
+    /// Actions that run on the adoption of a plan. They are the first steps of the plan.
     running: Vec<String>,
-    /// Where the steps of the present plan begin.
+    /// Position of the first step of the current plan.
     first: usize,
     /// The steps that the last decision starts, in order.
     ordered: VecDeque<usize>,
     /// Starts, by ticket.
     starts: BTreeMap<u64, Start>,
-    /// The moments when a plan was given up, and why.
+    /// Times at which plans were abandoned, with the reasons.
     given_up: Vec<(Rational, String)>,
 }
 
@@ -46,7 +46,7 @@ struct Step {
     is_ordered: bool,
 }
 
-/// An action that the world was told to start.
+/// An action that was commanded to start.
 struct Start {
     action: String,
     step: Option<usize>,
@@ -61,7 +61,7 @@ struct Start {
 }
 
 impl Bars {
-    /// Takes in a line of the trace.
+    /// Processes a line of the trace.
     pub(super) fn read(&mut self, line: &Line) {
         match line {
             Line::Plan(plan) => self.plan(plan),
@@ -132,7 +132,7 @@ impl Bars {
         }
     }
 
-    /// What was started before the record began anew, and is under way or has not ended long ago.
+    /// Adds the starts from a snapshot at a rotation: running and recently ended actions.
     pub(super) fn known(&mut self, snapshot: &SnapshotLine) {
         let time = |it: &Option<Exact>| it.as_ref().map(|it| it.0.clone());
         for known in &snapshot.starts {
@@ -155,8 +155,7 @@ impl Bars {
         self.running = names.map(str::to_owned).collect();
     }
 
-    /// The executed steps of the run's report, which decides where observations contradict each
-    /// other.
+    /// Adds the executed steps of the run's report, which overrides contradictory observations.
     pub(super) fn executed(&mut self, executed: &[ExecutedLine]) {
         for done in executed {
             let begun = done.start.0.clone();
@@ -182,7 +181,7 @@ impl Bars {
         }
     }
 
-    /// The start that is reported: its ticket, its action, and how long it was told to last.
+    /// Returns the reported start: ticket, action, and planned duration.
     pub(super) fn command_of(
         &self,
         observation: &ObservationLine,
@@ -194,12 +193,12 @@ impl Bars {
         Some((*ticket, start.action.clone(), start.planned.clone()))
     }
 
-    /// The action that was started under that number.
+    /// Returns the action with this ticket.
     pub(super) fn action(&self, ticket: u64) -> Option<&str> {
         self.starts.get(&ticket).map(|start| start.action.as_str())
     }
 
-    /// The actions of these steps of the present plan.
+    /// Returns the actions of these steps of the current plan.
     pub(super) fn step_names(&self, steps: &[u32]) -> Vec<&str> {
         let steps = steps
             .iter()
@@ -207,7 +206,7 @@ impl Bars {
         steps.map(|step| step.action.as_str()).collect()
     }
 
-    /// The number of plans taken up so far.
+    /// Returns the number of plans adopted so far.
     pub(super) fn plan_count(&self) -> usize {
         self.plans.len()
     }
@@ -246,13 +245,13 @@ impl Bars {
                 start,
                 start_window,
                 end_window,
-                // What goes on is no new start.
+                // A continued action is not started again.
                 is_ordered: continued.get(index) == Some(&step.action),
             });
         }
     }
 
-    /// Notes which steps of the plan its network puts in order.
+    /// Records the orderings of steps in the plan's network.
     fn orderings(&mut self, line: &PlanLine) {
         let instances = line.network.instances.iter().enumerate();
         let positions: BTreeMap<&str, usize> = instances
@@ -284,7 +283,7 @@ impl Bars {
         }
     }
 
-    /// The step that a command carries out: commands come in the order of their decision.
+    /// Returns the step of a start command. Commands come in the order of their decision.
     fn next_ordered(&mut self, action: &str) -> Option<usize> {
         let position = self
             .ordered
@@ -296,7 +295,7 @@ impl Bars {
     }
 }
 
-/// A window of the trace as one of an answer.
+/// Converts a window of a trace to one of an answer.
 pub(super) fn answer(window: &WindowLine) -> WindowAnswer {
     WindowAnswer {
         earliest: window.earliest.clone(),

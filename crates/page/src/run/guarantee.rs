@@ -1,4 +1,4 @@
-//! What was guaranteed during a run: kept, kept in part, or lost, since when and why.
+//! Guarantee over the time of a run, with the reasons for its changes.
 
 use elbowroom::report::line::{DecisionLine, ObservationLine, WindowLine};
 use elbowroom::report::short::nearest;
@@ -11,12 +11,12 @@ use crate::document::Segment;
 #[derive(Default)]
 pub(super) struct Guarantees {
     segments: Vec<Segment>,
-    /// The last observation outside the window in which it was planned.
+    /// The last observation outside its planned window.
     deviation: Option<String>,
 }
 
 impl Guarantees {
-    /// Takes in a line of the trace.
+    /// Processes a line of the trace.
     pub(super) fn read(&mut self, line: &Line, bars: &Bars) {
         match line {
             Line::Observed(observed) => {
@@ -69,7 +69,8 @@ impl Guarantees {
         }
     }
 
-    /// All of them, the last one until the end of the run; none if none was ever given.
+    /// Returns all segments. The last one extends to the end of the run. Empty if no guarantee was
+    /// ever given.
     pub(super) fn finish(mut self, end: f64) -> Vec<Segment> {
         if self.segments.iter().all(|segment| segment.level < 0) {
             return Vec::new();
@@ -91,7 +92,7 @@ impl Guarantees {
         let is_worse = self.segments.last().is_some_and(|last| level < last.level);
         let because = match deviation {
             Some(deviation) if is_worse && level >= 0 => format!("; {deviation}"),
-            // Time alone has passed: what is waited for says how.
+            // No deviation was observed: the reason is the passage of time.
             None if is_worse && level >= 0 => format!("; meanwhile, {reason}"),
             _ => String::new(),
         };
@@ -104,7 +105,7 @@ impl Guarantees {
     }
 }
 
-/// How good a promise is, and what it means.
+/// Returns the level and the meaning of a guarantee.
 fn meaning(promise: &str) -> (i8, &'static str) {
     match promise {
         "envelope" => (
@@ -124,7 +125,7 @@ fn meaning(promise: &str) -> (i8, &'static str) {
     }
 }
 
-/// The window in words, if the time is outside.
+/// Describes the window if the time is outside.
 fn missed(window: &WindowLine, time: &elbowroom::num::Rational) -> Option<String> {
     match (&window.earliest, &window.latest) {
         (Some(earliest), _) if *time < earliest.0 => {

@@ -1,4 +1,4 @@
-//! Everything that a trace has, line by line, in words.
+//! Log of a trace: each line as text.
 
 use elbowroom::num::Rational;
 use elbowroom::report::line::{DecisionLine, GivenLine, ObservationLine, WindowLine};
@@ -27,7 +27,7 @@ struct Row {
 }
 
 impl Log {
-    /// Takes in a line of the trace, after `bars` has.
+    /// Processes a line of the trace, after `bars`.
     pub(super) fn read(&mut self, line: &Line, bars: &Bars) {
         match line {
             Line::Plan(plan) => {
@@ -113,7 +113,7 @@ impl Log {
                 let what = report.verdict.replace('-', " ");
                 self.add(&report.time, "end", what, String::new(), why);
             }
-            // What was reported meanwhile has lines of its own.
+            // Observations in between have their own lines.
             Line::Passed(passed) => self.passed(&passed.now.0),
             Line::Looked(looked) => self.passed(&looked.now.0),
             _ => {}
@@ -128,7 +128,7 @@ impl Log {
 
     fn add(&mut self, time: &Rational, kind: &'static str, what: String, due: String, why: String) {
         self.passed(time);
-        // Rows stay in order, also where something was reported late.
+        // Keeps rows in order even if something was reported late.
         let last = self.rows.last().map_or(f64::NEG_INFINITY, |row| row.at);
         self.rows.push(Row {
             at: time.to_f64().max(last),
@@ -140,7 +140,7 @@ impl Log {
         });
     }
 
-    /// The decisions with their reasons.
+    /// Returns the decisions with their reasons.
     pub(super) fn decisions(&self) -> Vec<DecisionAt> {
         let decisions = self.rows.iter().filter(|row| row.kind == "decision");
         decisions
@@ -155,7 +155,7 @@ impl Log {
             .collect()
     }
 
-    /// As a table.
+    /// Converts the log to a table.
     pub(super) fn table(self, texts: &mut Texts) -> Table {
         let columns = [
             ("time", true),

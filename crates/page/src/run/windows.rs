@@ -1,4 +1,4 @@
-//! When the happenings of a plan in a trace may come.
+//! Time windows of the happenings of a plan in a trace.
 
 use std::collections::BTreeMap;
 
@@ -8,14 +8,14 @@ use elbowroom::num::Rational;
 use elbowroom::report::line::{BoundLine, NetworkLine, ParameterLine};
 use elbowroom::stn::{ConsistentNetwork, Constraint, Network, NodeId};
 
-/// The times of a plan's nodes, anywhere in its envelope.
+/// Time windows of a plan's nodes, over all values in its envelope.
 pub(super) struct Windows<'a> {
     nodes: BTreeMap<&'a str, NodeId>,
     windows: elbowroom::stn::Windows,
 }
 
 impl<'a> Windows<'a> {
-    /// `None` if the plan has no schedule.
+    /// Computes the windows; `None` if the plan has no schedule.
     pub(super) fn of(network: &'a NetworkLine, parameters: &[ParameterLine]) -> Option<Self> {
         let mut nodes: BTreeMap<&str, NodeId> = BTreeMap::from([(".zero", NodeId(0))]);
         for constraint in &network.constraints {
@@ -62,7 +62,7 @@ impl<'a> Windows<'a> {
         Some(Self { nodes, windows })
     }
 
-    /// In the world's time.
+    /// Returns the window of a node, in the world's time.
     pub(super) fn at(&self, node: &str, origin: &Rational) -> WindowAnswer {
         let Some(&node) = self.nodes.get(node) else {
             return WindowAnswer::default();

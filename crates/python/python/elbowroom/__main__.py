@@ -10,7 +10,7 @@ from . import _native
 
 def main() -> int:
     """Runs the command with this program's arguments; the exit code."""
-    # Python only takes note of Ctrl-C, and looks at the note when native code has ended.
+    # By default, Python handles Ctrl-C only after native code has returned.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     program, *arguments = sys.argv
     if program.endswith("__main__.py"):

@@ -150,7 +150,7 @@ class BackgroundRun:
         try:
             self.stop()
         except BaseException:
-            # The first exception counts.
+            # The first exception is raised.
             if error is None:
                 raise
 

@@ -183,7 +183,7 @@ class Lifecycle:
         self._is_clock_new = False
         reported = {fields.get("ticket") for fields in passed["observations"]}
         for ticket in known.keys() - reported:
-            # It has failed.
+            # The start has failed.
             del self._open[ticket]
         self._note(passed["observations"])
         return json.dumps(passed)
@@ -304,7 +304,7 @@ class Lifecycle:
             return self._outcome(future)
         except Exception as error:
             if was_ending:
-                # Raised after the run, when the other actions are cancelled, too.
+                # Raised after the run, once the other actions are cancelled as well.
                 self._failure = self._failure or error
                 return None
             self.begin_end()

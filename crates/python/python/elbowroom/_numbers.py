@@ -33,7 +33,7 @@ def exact(number: Number) -> Exact:
         return Fraction(text)
     if isinstance(number, (int, Fraction, Decimal)):
         return Fraction(number)
-    # unified-planning, numpy and others have numbers of their own.
+    # unified-planning, numpy and others have their own number types.
     return Fraction(str(number))
 
 

@@ -77,7 +77,7 @@ class Problem(Executable):
         return f"<Problem {self.name} of domain {self.domain_name}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Problems travel to other processes as their texts.
+        # Problems are pickled as their texts.
         domain, problem = self._native.texts()
         return _read_again, (domain, problem, self._epsilon)
 

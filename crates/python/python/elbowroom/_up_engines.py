@@ -111,7 +111,7 @@ class ElbowroomPlanner(
         **unknown: Any,
     ) -> None:
         if not isinstance(problem, (AbstractProblem, type(None))):
-            # Only replanners are made for a problem.
+            # Only replanners are created for a problem.
             unknown = {"problem": problem, **unknown}
         _refuse_unknown(unknown, "elbowroom", ("plan", "jobs", "memory", "seed", "time_limit"))
         Engine.__init__(self)
@@ -163,7 +163,7 @@ class ElbowroomPlanner(
     ) -> PlanGenerationResult:
         if heuristic is not None:
             warnings.warn("elbowroom has its own heuristic; the one given is not used", stacklevel=3)
-        # Without a limit the first plan is enough; with one, the time is there to be used.
+        # Without a limit the first plan is enough; with one, the search uses all of it.
         timeout = self._limit(timeout)
         return self._result(problem, timeout, first=timeout is None)
 
@@ -196,7 +196,7 @@ class ElbowroomPlanner(
             yield self._unsupported(error)
             return
         finally:
-            # Also where the caller wants no more.
+            # Also if the caller stops the iteration.
             plans.close()
         if last is not None:
             yield last
@@ -287,7 +287,7 @@ class ElbowroomPlanner(
         elif hasattr(plan, "actions"):
             used = plan.actions
         else:
-            # All schedules of an STN plan would have to be judged; a new one is found sooner.
+            # All schedules of an STN plan would have to be validated; a new search is faster.
             return False
         if any(known.get(it.action.name) != it.action for it in used):
             return False
@@ -353,7 +353,7 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
     @staticmethod
     def supported_kind() -> ProblemKind:
         kind = _common_kind()
-        # Metrics say which plan is best, not which is valid.
+        # Metrics rank plans and do not affect their validity.
         for feature in ("OVERSUBSCRIPTION", "TEMPORAL_OVERSUBSCRIPTION"):
             kind.set_quality_metrics(feature)
         for feature in ("INT_NUMBERS_IN_OVERSUBSCRIPTION", "REAL_NUMBERS_IN_OVERSUBSCRIPTION"):

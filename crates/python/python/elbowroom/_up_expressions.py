@@ -12,7 +12,7 @@ from unified_planning.model.walkers.identitydag import IdentityDagWalker
 
 from ._errors import UnsupportedError
 
-# Words that may not be names of anything.
+# Reserved words.
 _TAKEN = frozenset(
     "define domain problem requirements types constants predicates functions action process event "
     "durative-action derived parameters precondition condition effect duration vars init goal "

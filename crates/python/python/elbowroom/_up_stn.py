@@ -48,7 +48,7 @@ def stn_plan(translated: Translation, plan: Any) -> STNPlan:
         if isinstance(lower, str) or isinstance(upper, str):
             continue
         source, target = row.from_, row.to
-        # Absolute times are folded onto the plan's start.
+        # Absolute times are expressed relative to the start of the plan.
         if source in fixed and target in kept:
             lower, upper = lower + fixed[source], upper + fixed[source]
         elif target in fixed and source in kept:
@@ -58,7 +58,7 @@ def stn_plan(translated: Translation, plan: Any) -> STNPlan:
             continue
         first = kept.get(source, start)
         constraints.append((first, _finite(lower), _finite(upper), kept[target]))
-    # An STN plan has the nodes of its constraints alone.
+    # An STN plan contains only the nodes of its constraints.
     mentioned = {node for first, _, _, second in constraints for node in (first, second)}
     for node in kept.values():
         if node not in mentioned:
@@ -96,7 +96,7 @@ def stn_text(translated: Translation, plan: STNPlan) -> str:
     for first, found in plan.get_constraints().items():
         for lower, upper, second in found:
             if lower is None and upper is None:
-                # unified-planning mentions nodes in this way.
+                # This is unified-planning's way to mention nodes.
                 if second.kind != TimepointKind.GLOBAL_END:
                     node(second)
                 continue

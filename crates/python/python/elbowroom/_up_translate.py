@@ -256,7 +256,7 @@ class Translation:
             return f"minimize {self._say.condition(metric.expression)}"
         if metric.is_maximize_expression_on_final_state():
             return f"maximize {self._say.condition(metric.expression)}"
-        # The others say which plan is best, not which is one.
+        # The others rank plans and do not affect their validity.
         return None
 
     # Plans.
@@ -268,7 +268,7 @@ class Translation:
             UnsupportedError: if it is no sequential or time-triggered plan.
         """
         if isinstance(plan, SequentialPlan):
-            # One after the other, further apart than any ε.
+            # One after the other, at distances greater than any ε.
             gap = max(Fraction(1), 2 * Fraction(self.original.epsilon or 0))
             steps = [(gap * (i + 1), self.name_of(it), None) for i, it in enumerate(plan.actions)]
             return [*steps, *self._timed_steps()]

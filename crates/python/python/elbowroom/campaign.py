@@ -279,8 +279,8 @@ class _Parts:
         if self.folder is not None:
             path = self.path(shard)
             _keep(path, results)
-            # As `sha256sum` writes and checks it. It comes last: a part that was left with an older
-            # sum is made again.
+            # In the format of `sha256sum`. The sum is written last: a part with an older sum is
+            # made again.
             _keep(_sum_of(path), f"{hashlib.sha256(results.encode()).hexdigest()}  {path.name}\n")
 
     def missing(self) -> list[int]:

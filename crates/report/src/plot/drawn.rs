@@ -1,4 +1,4 @@
-//! The drawing, with `plotters`.
+//! Drawing of plots with `plotters`.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -6,12 +6,12 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::IntervalPlot;
 
-/// A plot that cannot be drawn.
+/// Error of the drawing library.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the plot cannot be drawn: {0}")]
 pub struct PlotError(String);
 
-/// Colours that people who see few colours can tell apart (Okabe & Ito 2008).
+/// Colours that colour-blind readers can distinguish (Okabe & Ito 2008).
 const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -23,14 +23,14 @@ const COLOURS: [RGBColor; 6] = [
 
 const INK: RGBColor = RGBColor(60, 60, 60);
 const HEIGHT: u32 = 420;
-/// Room above the axes, for title and legend.
+/// Height of the area for title and legend.
 const HEAD: u32 = 64;
 
 impl IntervalPlot {
-    /// The plot as an SVG document.
+    /// Renders the plot as an SVG document.
     ///
     /// # Errors
-    /// When the drawing library refuses.
+    /// As the drawing library.
     pub fn svg(&self) -> Result<String, PlotError> {
         let mut svg = String::new();
         let columns = u32::try_from(self.groups.len())
@@ -104,7 +104,7 @@ impl IntervalPlot {
         Ok(())
     }
 
-    /// Title and legend.
+    /// Draws title and legend.
     fn draw_head(&self, root: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), String> {
         root.draw(&Text::new(self.title.clone(), (16, 12), font(16)))
             .map_err(text)?;
@@ -124,7 +124,7 @@ impl IntervalPlot {
         Ok(())
     }
 
-    /// Room for title and legend.
+    /// Returns the width of the legend.
     fn legend_width(&self) -> u32 {
         let series = self.series.iter();
         let names = series.map(|series| 10 + name_width(&series.name));
@@ -135,7 +135,7 @@ impl IntervalPlot {
         u32::try_from(legend.max(title)).unwrap_or(u32::MAX)
     }
 
-    /// A round number above everything.
+    /// Returns a round number above all values.
     fn top(&self) -> f64 {
         let series = self.series.iter().chain(&self.reference);
         let points = series.flat_map(|series| series.points.iter().flatten());
@@ -149,7 +149,7 @@ impl IntervalPlot {
     }
 }
 
-/// Writes a name of the legend; where the next entry begins.
+/// Writes a name of the legend. Returns the start of the next entry.
 fn legend_name(
     root: &DrawingArea<SVGBackend<'_>, Shift>,
     name: &str,
@@ -160,8 +160,8 @@ fn legend_name(
     Ok(x.saturating_add(name_width(name)))
 }
 
-/// How wide a name is, with the space after it. Letters of 13 pixels' height are at most about 8
-/// wide on average.
+/// Returns the estimated width of a name and the space after it. Letters 13 pixels high are on
+/// average at most about 8 pixels wide.
 fn name_width(name: &str) -> i32 {
     let length = i32::try_from(name.chars().count()).unwrap_or(i32::MAX);
     length.saturating_mul(8).saturating_add(22)

@@ -1,4 +1,4 @@
-//! From the entries of a run's record to the lines of a trace.
+//! Conversion of the entries of a run's record to the lines of a trace.
 
 use elbowroom_execution::run::{ExecutedStep, Report, Verdict};
 use elbowroom_execution::{
@@ -21,7 +21,7 @@ use super::line::{
 use crate::exact::Exact;
 
 impl Line {
-    /// The line of an entry; `task` names facts and fluents.
+    /// Converts an entry to a line; `task` names facts and fluents.
     #[allow(clippy::too_many_lines, reason = "one arm for each entry")]
     pub fn of(task: &Task, entry: &Entry<'_>) -> Self {
         let line = |it: &Observation| ObservationLine::of(task, it);
@@ -151,7 +151,7 @@ impl Line {
 }
 
 impl ReportLine {
-    /// The report of a run, as a line.
+    /// Converts the report of a run to a line.
     pub fn of(report: &Report) -> Self {
         Self {
             verdict: report.verdict.name().to_owned(),
@@ -167,7 +167,7 @@ impl ReportLine {
 }
 
 impl ReasonLine {
-    /// A reason as a line.
+    /// Converts a reason to a line.
     pub fn of(reason: &Reason) -> Self {
         Self {
             cause: reason.cause.name().to_owned(),
@@ -185,7 +185,7 @@ impl ReasonLine {
 }
 
 impl GivenLine {
-    /// A command as a line.
+    /// Converts a command to a line.
     pub fn of(command: &Command) -> Self {
         match command {
             Command::Start {
@@ -203,7 +203,7 @@ impl GivenLine {
 }
 
 impl ObservationLine {
-    /// An observation as a line.
+    /// Converts an observation to a line.
     pub fn of(task: &Task, observation: &Observation) -> Self {
         let time = exact(&observation.time);
         let amounts = |measured: &[Measured]| {
@@ -289,8 +289,8 @@ impl ObservationLine {
         }
     }
 
-    /// What no world could report, and when, if it is that: what was asked of the run, or that a
-    /// plan is there or ready.
+    /// Returns the event and its time if the line is an event of the run itself and not of a world:
+    /// a request, or the completion or preparation of a background plan.
     pub fn of_the_run(&self) -> Option<(Event, &Rational)> {
         if let Self::PlanMade { time } = self {
             return Some((Event::PlanMade, &time.0));
@@ -432,7 +432,7 @@ fn parameters(mission: &Mission) -> Vec<ParameterLine> {
     parameters.collect()
 }
 
-/// An interval: its ends, `None` where infinite.
+/// Returns the ends of an interval, `None` if infinite.
 fn interval(interval: &Interval) -> IntervalLine {
     (
         optional(interval.lower.value()),
@@ -452,7 +452,7 @@ pub(super) fn steps(plan: &TimeTriggeredPlan) -> Vec<StepLine> {
 }
 
 fn situation_line(task: &Task, situation: &Situation) -> SituationLine {
-    // By name: numbers of facts depend on what the task was used for before.
+    // Sorted by name, because the numbers of facts depend on earlier uses of the task.
     let facts = situation.state.facts.iter();
     let mut facts: Vec<String> = facts.map(|&fact| task.fact_name(fact)).collect();
     facts.sort_unstable();

@@ -1,4 +1,4 @@
-//! Playing a stored trace back.
+//! Replay of a stored trace.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -20,26 +20,26 @@ use super::line::{
 use super::{FORMAT, SNAPSHOT, SnapshotLine, VERSION};
 use crate::wire::read_observation;
 
-/// A trace that cannot be played back.
+/// Error: a trace cannot be replayed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {message}")]
 pub struct TraceError {
-    /// The line, from 1 on.
+    /// The line number, from 1.
     pub line: usize,
     /// The error.
     pub message: String,
 }
 
-/// A trace that was read.
+/// A parsed trace.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stored {
     /// The first line.
     header: Map<String, Value>,
-    /// How the run stood, if the record does not begin at the beginning of the run.
+    /// State of the run at the start of the record, if that is not the start of the run.
     snapshot: Option<Map<String, Value>>,
-    /// The other lines. A last one that was cut off is left out.
+    /// The other lines, except a truncated last one.
     pub lines: Vec<Line>,
-    /// Whether the last line was cut off.
+    /// `true` if the last line was truncated.
     pub is_cut_off: bool,
 }
 
@@ -50,7 +50,7 @@ impl Stored {
     /// Reads a trace.
     ///
     /// # Errors
-    /// When it is none, or damaged elsewhere than at its very end.
+    /// If the text is not a trace, or damaged elsewhere than at its very end.
     pub fn read(text: &str) -> Result<Self, TraceError> {
         let wrong = |line: usize, message: String| TraceError {
             line: line + 1,
@@ -94,7 +94,7 @@ impl Stored {
         for (index, line) in rest.iter().enumerate() {
             match serde_json::from_str(line) {
                 Ok(line) => read.push(line),
-                // What was cut off ends in the middle of its JSON.
+                // A truncated line ends in the middle of its JSON.
                 Err(error) if error.is_eof() && index + 1 == rest.len() => is_cut_off = true,
                 Err(error) => {
                     let what = if error.is_data() {
@@ -114,10 +114,12 @@ impl Stored {
         })
     }
 
-    /// What was run: the first line, without what it says about the trace itself.
+    /// Returns the specification of the run: the first line, without the members about the trace
+    /// itself.
     ///
     /// # Errors
-    /// When it is of another kind, such as that of another version of this program.
+    /// If the specification has another format, for example that of another version of this
+    /// program.
     pub fn header<T: DeserializeOwned>(&self) -> Result<T, TraceError> {
         let header = Value::Object(self.header.clone());
         serde_json::from_value(header).map_err(|error| TraceError {
@@ -126,17 +128,17 @@ impl Stored {
         })
     }
 
-    /// Whether the trace has the end of the run.
+    /// Returns `true` if the trace contains the end of the run.
     pub fn is_complete(&self) -> bool {
         matches!(self.lines.last(), Some(Line::Over(_)))
     }
 
-    /// The number of the first of its [lines](Stored::lines) in the file.
+    /// Returns the number in the file of the first of the [lines](Stored::lines).
     pub fn first_number(&self) -> usize {
         2 + usize::from(self.snapshot.is_some())
     }
 
-    /// How many times the run was over, and was gone on with.
+    /// Returns how many times the run was resumed after its end.
     pub fn reopened(&self) -> usize {
         let is_over = |line: &&Line| matches!(line, Line::Over(_));
         let over = self.lines.iter().filter(is_over).count();
@@ -149,20 +151,20 @@ impl Stored {
         self.lines.iter().any(is_failure)
     }
 
-    /// The lines by their number in the file.
+    /// Returns the lines with their numbers in the file.
     fn numbered(&self) -> impl Iterator<Item = (usize, &Line)> {
         (self.first_number()..).zip(&self.lines)
     }
 
-    /// Whether the record does not begin at the beginning of the run.
+    /// Returns `true` if the record begins with a snapshot instead of the start of the run.
     pub fn has_snapshot(&self) -> bool {
         self.snapshot.is_some()
     }
 
-    /// How the run stood, if the record does not begin at the beginning of the run, as a line.
+    /// Returns the snapshot at the start of the record, if there is one.
     ///
     /// # Errors
-    /// When it is of another kind.
+    /// If the snapshot has another format.
     pub fn snapshot(&self) -> Result<Option<SnapshotLine>, TraceError> {
         let line = self.snapshot.clone().map(Value::Object);
         let read = line.map(serde_json::from_value).transpose();
@@ -172,16 +174,16 @@ impl Stored {
         })
     }
 
-    /// Returns `true` if the run ended before it began, because its given plan was refused. The trace does not
-    /// have that plan.
+    /// Returns `true` if the run ended before it began, because its given plan was refused. The
+    /// trace does not contain that plan.
     pub fn has_refused_plan(&self) -> bool {
         self.snapshot.is_none() && matches!(self.lines.first(), Some(Line::Over(_)))
     }
 
-    /// The plan that the run began with, if it was given one: `start`, `(action …)`, duration.
+    /// Returns the plan that was given to the run at its start, if any.
     ///
     /// # Errors
-    /// When its actions are none of the task.
+    /// If an action does not exist in the task.
     pub fn first_plan(&self, task: &Task) -> Result<Option<TimeTriggeredPlan>, TraceError> {
         match self.lines.first() {
             Some(Line::Plan(plan)) if self.snapshot.is_none() => {
@@ -192,7 +194,7 @@ impl Stored {
     }
 }
 
-/// World that reports what a trace has from its world, and fails where that failed.
+/// World that repeats the reports and failures of the world in a trace.
 pub struct ReplayWorld {
     task: Arc<Task>,
     answers: VecDeque<Played>,
@@ -211,7 +213,7 @@ enum Played {
 }
 
 impl ReplayWorld {
-    /// The world of a trace.
+    /// Creates the world of a trace.
     pub fn new(stored: &Stored, task: &Arc<Task>) -> Self {
         let mut answers = VecDeque::new();
         for (index, (number, line)) in stored.numbered().enumerate() {
@@ -311,16 +313,16 @@ impl World for ReplayWorld {
     }
 }
 
-/// A planner that makes the plans that a trace says it made.
+/// Planner that returns the plans in a trace.
 pub struct ReplayPlanner {
-    /// For each request in the trace, in order: its line, and the answer if it was taken in.
+    /// For each request in the trace, in order: its line, and the answer if it was accepted.
     requests: VecDeque<(usize, Option<PlannedLine>)>,
     /// The request that is answered in the background.
     open: Option<(usize, Option<PlannedLine>)>,
 }
 
 impl ReplayPlanner {
-    /// The planner of a trace.
+    /// Creates the planner of a trace.
     pub fn new(stored: &Stored) -> Self {
         let mut requests = VecDeque::new();
         for (number, line) in stored.numbered() {
@@ -340,7 +342,7 @@ impl ReplayPlanner {
         }
     }
 
-    /// The answer to a request of the trace.
+    /// Returns the answer to a request of the trace.
     fn answer(
         request: Option<(usize, Option<PlannedLine>)>,
         task: &Task,
@@ -399,8 +401,8 @@ impl Planner for ReplayPlanner {
     }
 }
 
-/// A preparer of a run that is played back: where plans were made ready beside the run, the trace says
-/// when they were ready.
+/// Preparer of a replayed run. If plans were prepared in the background, the trace contains the
+/// times of their completion.
 #[derive(Clone, Debug)]
 pub struct ReplayPreparer<P>(pub P);
 
@@ -464,7 +466,7 @@ pub(super) fn instantiate(
 /// The first difference between a replay and its trace.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// The line of the trace, from 1 on.
+    /// The line number in the trace, from 1.
     pub line: usize,
     /// The line of the trace.
     pub stored: Line,
@@ -476,7 +478,7 @@ pub struct Difference {
 pub struct Replay {
     task: Arc<Task>,
     stored: VecDeque<Line>,
-    /// The number of the next line in the file.
+    /// The number in the file of the next line.
     line: usize,
     first: usize,
     difference: Option<Difference>,
@@ -484,7 +486,7 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Nothing has been compared.
+    /// Creates a comparison with `stored`.
     pub fn new(stored: &Stored, task: Arc<Task>) -> Self {
         Self {
             task,
@@ -497,7 +499,8 @@ impl Replay {
         .looking_ahead()
     }
 
-    /// Whether the run was asked to end at the point that the replay has reached.
+    /// Returns the flag that is set when the replay reaches the point at which the run was
+    /// interrupted.
     pub fn interruption(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.is_to_end)
     }
@@ -512,7 +515,7 @@ impl Replay {
         self.is_to_end.store(is_to_end, Ordering::SeqCst);
     }
 
-    /// How many entries agreed, and the first difference, if there is one.
+    /// Returns the number of equal entries, and the first difference, if any.
     pub fn outcome(self) -> (usize, Option<Difference>) {
         (self.line - self.first, self.difference)
     }
@@ -523,7 +526,7 @@ impl Recorder for Replay {
         if self.difference.is_some() {
             return;
         }
-        // Beyond the end of a trace that was cut off, there is nothing to compare.
+        // A truncated trace provides nothing more to compare.
         let Some(stored) = self.stored.pop_front() else {
             return;
         };

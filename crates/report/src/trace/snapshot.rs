@@ -1,4 +1,4 @@
-//! Where a record begins anew: how a run stands, as a line.
+//! Snapshot of a run at the rotation of its record, as a line.
 
 mod starts;
 mod taken_up;
@@ -19,68 +19,69 @@ use crate::exact::Exact;
 pub use starts::{StartLine, UnderWayLine};
 pub use taken_up::{GoalLine, NewsLine, SituatedLine, TakenUpLine, TurnLine};
 
-/// The second line of a record that begins where a lasting run rested or took up a plan, in place of all
-/// that was recorded before: `docs/formats/journal.md`.
+/// The second line of a rotated record, which replaces all earlier records. Rotation happens when a
+/// persistent run is idle or adopts a plan: `docs/formats/journal.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SnapshotLine {
     /// The time.
     pub now: Exact,
-    /// Since when the run rests, if it does.
+    /// Time since which the run has been idle, if it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub since: Option<Exact>,
-    /// `true` if it rests because no plan reaches the open goals from there.
+    /// `true` if the run is idle because no plan reaches the open goals from there.
     #[serde(default, skip_serializing_if = "is_false")]
     pub unsolvable: bool,
-    /// How many actions were started.
+    /// Number of started actions.
     pub started: usize,
-    /// How long making a plan is expected to take.
+    /// Expected duration of planning.
     pub allowance: Exact,
-    /// How many answers of the world there were since then, for a clock that stands still.
+    /// Number of answers of the world since `answers_since`, to detect a clock that does not
+    /// advance.
     pub answers: usize,
-    /// See `answers`.
+    /// Start of the count in `answers`.
     pub answers_since: Exact,
-    /// How many timed initials have happened.
+    /// Number of timed initials that have happened.
     pub timed: usize,
-    /// The time of what happened last.
+    /// Time of the last happening group.
     pub group: Exact,
-    /// All facts that were ever mentioned, in this order, and whether they are true.
+    /// Truth values of all facts mentioned so far, in order of their first mention.
     pub facts: IndexMap<String, bool>,
-    /// All numbers that were ever mentioned, in this order, and their values.
+    /// Values of all numbers mentioned so far, in order of their first mention.
     pub numbers: IndexMap<String, Option<Exact>>,
-    /// What the facts were that have changed at the time of what happened last.
+    /// Previous truth values of the facts changed by the last happening group.
     pub facts_before: IndexMap<String, bool>,
-    /// The numbers, likewise.
+    /// Previous values of the numbers changed by the last happening group.
     pub numbers_before: IndexMap<String, Option<Exact>>,
-    /// Facts that are in doubt; `facts` has their truth before.
+    /// Facts that are in doubt; `facts` has their earlier truth values.
     pub doubtful_facts: Vec<DoubtLine>,
     /// Numbers that are in doubt.
     pub doubtful_numbers: Vec<DoubtLine>,
     /// The open goals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub goals: Vec<GoalLine>,
-    /// Whether the goals have never been other than those of the problem.
+    /// `true` if the goals have always been those of the problem.
     #[serde(default, skip_serializing_if = "is_false")]
     pub problem_goals: bool,
-    /// Whether nothing is to be started.
+    /// `true` if the run is paused.
     #[serde(default, skip_serializing_if = "is_false")]
     pub paused: bool,
-    /// How many new plans were made since the run last rested.
+    /// Number of new plans since the run was last idle.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub replans: usize,
-    /// What the world has refused since anything else has happened, and how often.
+    /// Number of refusals by the world, by action, since the last other event.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub refused: IndexMap<String, u32>,
-    /// Until when no plan is asked for because of that.
+    /// Time before which no plan is requested because of these refusals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refused_until: Option<Exact>,
-    /// What was started and is under way, or has not ended long ago.
+    /// Started actions that are running or have ended recently.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub starts: Vec<StartLine>,
-    /// What is believed to be under way.
+    /// Actions that are believed to be running.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub under_way: Vec<UnderWayLine>,
-    /// The plan that is taken up, if the run does not rest.
+    /// The adopted plan, if the run is not idle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plan: Option<TakenUpLine>,
 }
@@ -91,11 +92,11 @@ pub struct SnapshotLine {
 pub struct DoubtLine {
     /// Its name.
     pub name: String,
-    /// Since when.
+    /// Start of the doubt.
     pub since: Exact,
-    /// The start of the action that may or may not have come to its end.
+    /// Ticket of the action whose end was not reported.
     pub ticket: u64,
-    /// That action.
+    /// The name of that action.
     pub action: String,
 }
 
@@ -122,7 +123,8 @@ fn is_zero(number: &usize) -> bool {
 }
 
 impl SnapshotLine {
-    /// The line of a run of this task. `None` if it has a plan that a line cannot have.
+    /// Creates the line of a run of this task. Returns `None` if its plan cannot be written as a
+    /// line.
     pub fn of(task: &Task, stand: &Stand) -> Option<Self> {
         let parts = stand.belief.parts();
         let plan = match &stand.doing {
@@ -196,11 +198,12 @@ impl SnapshotLine {
         })
     }
 
-    /// How the run stands. Its facts and numbers get the same places in the table of the task that they
-    /// had, so that whatever goes by their order is decided as it would have been.
+    /// Returns the state of the run. Facts and numbers get their former positions in the table of
+    /// the task, so that decisions that depend on their order stay the same.
     ///
     /// # Errors
-    /// In words, when the task has no such facts, numbers or actions, or has others first.
+    /// A message if the task lacks some of these facts, numbers or actions, or has others before
+    /// them.
     pub fn stand(&self, task: &Arc<Task>) -> Result<Stand, String> {
         for (index, name) in self.facts.keys().enumerate() {
             if fact(task, name)? != FactId(narrow(index)) {

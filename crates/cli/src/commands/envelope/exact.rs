@@ -1,4 +1,4 @@
-//! `elbowroom envelope --method exact`: with which values does the plan work?
+//! `elbowroom envelope --method exact`: the set of all values for which the plan works.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -21,9 +21,9 @@ use crate::output::{self, Output};
 use crate::stopwatch::{Stopwatch, duration};
 use elbowroom_executive::messages::counted;
 
-/// So many of the reasons for an inequality are printed; `--json` has all.
+/// Maximum number of reasons printed for an inequality; `--json` has all.
 const REASONS_SHOWN: usize = 2;
-/// Exact volumes with more digits than this are printed as powers of ten.
+/// Maximum number of digits of a printed exact volume; larger volumes are printed as powers of ten.
 const MOST_DIGITS: usize = 24;
 
 /// Prints the region.
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     )
     .map_err(failure)?;
     let drawn = draw(arguments, plane.as_ref(), &outcome, &mut watch);
-    // What was computed is shown, whatever becomes of the picture.
+    // The answer is printed even if the picture cannot be written.
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
@@ -105,7 +105,7 @@ fn draw(
     let flow = &mut || watch.flow().map_break(|_| ());
     match picture(outcome, plane, flow) {
         Ok(drawn) => output::write_file(path, &drawn.svg()),
-        // The answer says why.
+        // The answer contains the reason.
         Err(PictureError::NoRegion) => Ok(()),
         Err(error @ PictureError::Limit(_)) => Err(Failure::new(
             error,
@@ -200,7 +200,7 @@ fn text(outcome: &RegionOutcome, look: Look) -> String {
     text
 }
 
-/// The volume, and the shares of the boxes.
+/// Appends the volume, and the shares of the boxes.
 fn volume(measure: &Measure, boxes: &[BoxAnswer], look: Look, text: &mut String) {
     let mut say = |words: &str| push_wrapped(text, words, 0, look.width);
     match (&measure.volume, measure.log10_interval) {
@@ -251,7 +251,7 @@ fn volume(measure: &Measure, boxes: &[BoxAnswer], look: Look, text: &mut String)
     text.push('\n');
 }
 
-/// Two digits that say something.
+/// Formats a percentage with two significant digits.
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     if percent >= 10.0 {

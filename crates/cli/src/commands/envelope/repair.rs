@@ -1,4 +1,4 @@
-//! `elbowroom envelope --repair`: what is the least that has to change for the plan to work?
+//! `elbowroom envelope --repair`: the cheapest change that makes the plan work.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -22,11 +22,11 @@ use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::{Stopwatch, duration};
 
-/// So many digits of numbers are printed; `--json` has all.
+/// Number of digits printed; `--json` has exact numbers.
 const DIGITS: u32 = 6;
-/// So many of the reasons are printed; `--json` has all.
+/// Maximum number of reasons printed; `--json` has all.
 const REASONS_SHOWN: usize = 8;
-/// The limit of the answer where other orders were not searched to the end.
+/// Limitation of the answer if not all other orders were searched.
 const OTHER_ORDERS: &str =
     "Other orders of interfering actions were not searched to the end; one may cost less.";
 
@@ -80,7 +80,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     })
 }
 
-/// The failure to read one of the specifications of an option.
+/// Returns the failure to parse one of the specifications of an option.
 fn named(option: &str, texts: &[String]) -> Failure {
     let mut failures = texts.iter().filter_map(|text| {
         let error = text
@@ -91,7 +91,8 @@ fn named(option: &str, texts: &[String]) -> Failure {
     Failure::new(failures.next().unwrap_or_default(), "")
 }
 
-/// What is said of quantities that are opened is said of these options here.
+/// Converts a request error to a failure. Messages about `--vary` name `--change` and `--keep`
+/// instead.
 fn refused(error: RequestError) -> Failure {
     match error {
         RequestError::Flow(error) => {
@@ -251,7 +252,7 @@ fn nothing_cheaper(cost: &Rational, bound: &Rational, orders: Orders) -> String 
     }
 }
 
-/// A list with a headline, unless there is nothing to list, or nothing it is about.
+/// Appends a list with a headline, unless `items` or `about` is empty.
 fn section<T>(text: &mut String, headline: &str, items: &[String], about: &[T], look: Look) {
     if items.is_empty() || about.is_empty() {
         return;

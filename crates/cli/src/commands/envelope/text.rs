@@ -1,4 +1,4 @@
-//! The answer as people read it.
+//! Text output of an envelope.
 
 mod best;
 mod example;
@@ -22,7 +22,7 @@ use best::{gained, goodness};
 use elbowroom_executive::messages::counted;
 use example::{example, what};
 
-/// The answer, whatever it is.
+/// Renders the answer.
 pub(super) fn text(
     request: &EnvelopeRequest,
     outcome: &EnvelopeOutcome,
@@ -64,7 +64,7 @@ fn no_room(file: &str, fails: &str) -> String {
     format!("{}: {file} {fails}\n", styled(BAD, "no elbow room"))
 }
 
-/// The plan fails as planned, or can.
+/// Renders the answer for a plan that fails, or may fail, with nominal values.
 fn fails(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> String {
     let has_schedule = outcome
         .why_not
@@ -82,7 +82,7 @@ fn fails(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> St
     text
 }
 
-/// The time-out that an action comes to, where nothing else is wrong.
+/// Appends the time-out that an action reaches, if there is no other reason.
 fn push_timeout(text: &mut String, outcome: &EnvelopeOutcome, look: Look) {
     let (EnvelopeFinding::Outside { counterexample, .. }
     | EnvelopeFinding::Fails(Failing::AsPlanned { counterexample, .. })) = &outcome.answer.finding
@@ -94,7 +94,7 @@ fn push_timeout(text: &mut String, outcome: &EnvelopeOutcome, look: Look) {
     }
 }
 
-/// Why the plan does not work, with an example.
+/// Appends the reason why the plan does not work, with an example.
 fn push_reason(
     text: &mut String,
     request: &EnvelopeRequest,
@@ -115,7 +115,7 @@ fn push_reason(
     }
 }
 
-/// The table, what it means, what limits it, and how it was found.
+/// Renders the tolerance table, its meaning, its limits and the end of the search.
 fn envelope(
     request: &EnvelopeRequest,
     outcome: &EnvelopeOutcome,
@@ -198,7 +198,7 @@ fn envelope(
     text
 }
 
-/// By how much everything may deviate at once.
+/// States the uniform deviation of all quantities that the plan tolerates.
 fn headline(balance: &Balance, parameters: &[Room]) -> String {
     let is_duration = |room: &Room| room.range.quantity.kind == QuantityKind::Duration;
     let (subject, more, less) = if parameters.iter().all(is_duration) {
@@ -217,7 +217,7 @@ fn headline(balance: &Balance, parameters: &[Room]) -> String {
         let percent = number::rounded(&share, digits, Rounding::Down);
         match &deviation.limit {
             _ if deviation.share.is_zero() => format!("no {which}"),
-            // Everything is at its least value.
+            // All quantities may have their least values.
             _ if which == less && deviation.share >= Rational::ONE => format!("any {which}"),
             Some(_) => format!("up to {percent} % {which}"),
             None => format!("more than {percent} % {which}"),
@@ -241,7 +241,8 @@ fn headline(balance: &Balance, parameters: &[Room]) -> String {
     line
 }
 
-/// How conditions that are no bounds on one difference are met, and what the dispatcher keeps to beside the network.
+/// Describes how conditions that are not bounds on a single time difference are met, and which
+/// bounds the dispatcher enforces in addition to the network.
 fn met(conditions: &Conditions) -> Option<String> {
     let mut met = Vec::new();
     if conditions.all_schedules > 0 {
@@ -259,9 +260,9 @@ fn met(conditions: &Conditions) -> Option<String> {
     (!met.is_empty()).then(|| met.join(" "))
 }
 
-/// The worth of foresight, in one sentence.
+/// States the benefit of knowing the values in advance, in one sentence.
 fn worth(foresight: &Foresight) -> String {
-    /// Of a long list only the first are named.
+    /// Maximum number of entries of a list.
     const MOST_NAMED: usize = 4;
     let more = &foresight.weak_width.0 - &foresight.width.0;
     let much = if foresight.width.0.is_zero() {
@@ -296,7 +297,7 @@ fn row(room: &Room) -> Row {
     }
 }
 
-/// A quantity in plain words; the duration of an action goes without saying.
+/// Describes a quantity; for the duration of an action, by the action alone.
 fn quantity(range: &Range) -> &str {
     let words = &range.quantity.quantity;
     match range.quantity.kind {
@@ -305,9 +306,9 @@ fn quantity(range: &Range) -> &str {
     }
 }
 
-/// Which durations do not vary because the executor chooses them.
+/// Lists the durations that do not vary because the executor chooses them.
 fn executor_chooses(chosen: &[Chosen]) -> Option<String> {
-    /// Of a long list only the first are named.
+    /// Maximum number of entries of a list.
     const MOST_NAMED: usize = 4;
     let mut named: Vec<String> = chosen
         .iter()
@@ -322,7 +323,7 @@ fn executor_chooses(chosen: &[Chosen]) -> Option<String> {
         .then(|| format!("Chosen by the executor, so not varied (--controllable): {named}."))
 }
 
-/// The makespan of the plan, with everything started as early as possible.
+/// States the makespan of the plan with all actions started as early as possible.
 fn makespan(makespans: &Makespans) -> String {
     let mut line = format!("Done at {} as planned", number::nearest(&makespans.nominal));
     for (time, which) in [
@@ -338,12 +339,12 @@ fn makespan(makespans: &Makespans) -> String {
     line
 }
 
-/// With a full stop at its end.
+/// Adds a full stop unless there is one.
 fn sentence(text: &str) -> String {
     format!("{}.", text.trim_end_matches('.'))
 }
 
-/// How the search ended.
+/// Describes how the search ended.
 fn ended(
     request: &EnvelopeRequest,
     stop: Stop,
@@ -360,7 +361,7 @@ fn ended(
                 .flat_map(|room| [&room.lower_limit, &room.upper_limit]);
             let is_any = limits.any(|limit| limit.as_deref() == Some(elbowroom::ANY_FINITE));
             let any = if is_any { " or has none" } else { "" };
-            // Ends without a reason stay at the farthest value that the search tries.
+            // Ends without a reason are at the farthest value that the search tries.
             let (which, untold) = if parameters.iter().any(is_untold) {
                 (
                     "Each end with a reason",
@@ -403,7 +404,7 @@ fn ended(
     }
 }
 
-/// Whether nothing is known to limit one of the finite ends.
+/// Returns `true` if a finite end of the interval has no known limiting reason.
 fn is_untold(room: &Room) -> bool {
     let ends = [
         (&room.range.lower, &room.lower_limit),

@@ -1,8 +1,8 @@
-//! Watches the clock and Ctrl-C while an envelope is computed, and shows how far it has come.
+//! Time limit, Ctrl-C and progress line for the computation of an envelope.
 //!
-//! A single question to the library can take long, and it looks at no clock. So it works on a
-//! thread of its own: when it has not come to an end soon after its time is up, what it told last
-//! is the answer.
+//! A single call of the library can take long without checking the time. The computation therefore
+//! runs on its own thread. If it does not return shortly after the limit, the last reported
+//! envelope is the answer.
 
 use std::ops::ControlFlow;
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -19,19 +19,19 @@ use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::stopwatch::{Stopwatch, duration};
 
-/// How often the clock is looked at.
+/// Interval between checks of the time limit and Ctrl-C.
 const TICK: Duration = Duration::from_millis(10);
-/// How long the library has for an answer when its time is up: more than most of its steps take.
+/// Grace period for an answer after the time limit; longer than most steps of the library take.
 const GRACE: Duration = Duration::from_millis(50);
-/// As much as the main thread has.
+/// Stack size of the worker, in bytes: that of the main thread.
 const STACK: usize = 64 << 20;
 
-/// Ends the work never, at a time limit, or at Ctrl-C.
+/// Watcher that ends the computation at a time limit, if there is one, or at Ctrl-C.
 pub(super) struct Watch {
     stopwatch: Stopwatch,
 }
 
-/// What the library has told.
+/// Last progress reported by the library.
 #[derive(Default)]
 struct Told {
     found: Option<(Arc<ParametrizedPlan>, DecoupledEnvelope)>,
@@ -40,7 +40,7 @@ struct Told {
 }
 
 impl Watch {
-    /// Starts to watch.
+    /// Creates a watcher whose time limit starts now.
     pub(super) fn start(arguments: &EnvelopeArgs) -> Self {
         let limit = arguments.time_limit.as_ref().map(duration);
         Self {
@@ -48,7 +48,7 @@ impl Watch {
         }
     }
 
-    /// The answer, or what had been found when there was no more time for it.
+    /// Computes the answer, or returns the best envelope found when the time is up.
     pub(super) fn answer(
         mut self,
         request: &Arc<EnvelopeRequest>,
@@ -61,11 +61,11 @@ impl Watch {
         let (sender, receiver) = mpsc::channel();
         let theirs = Arc::clone(request);
         let worker = thread::Builder::new().stack_size(STACK).spawn(move || {
-            // Nobody listens any more when there was no time left.
+            // After the time limit, the receiver is gone.
             let _ = sender.send(envelope(&theirs, &mut listener));
         });
         if worker.is_err() {
-            // A system without threads to spare: the limit is kept between the steps.
+            // No thread is available: the limit is checked between steps only.
             return envelope(request, &mut self.stopwatch);
         }
         let mut progress = Progress::new();
@@ -73,8 +73,7 @@ impl Watch {
         loop {
             match receiver.recv_timeout(TICK) {
                 Ok(answer) => return answer,
-                // A thread that is gone without an answer has panicked, which has ended the
-                // program.
+                // The thread has ended without an answer: it panicked, which has ended the program.
                 Err(RecvTimeoutError::Disconnected) => {
                     return envelope(request, &mut self.stopwatch);
                 }
@@ -99,7 +98,7 @@ impl Watch {
     }
 }
 
-/// What watches on the library's thread.
+/// Watcher on the library's thread.
 struct Listener {
     stopwatch: Stopwatch,
     told: Arc<Mutex<Told>>,

@@ -1,4 +1,5 @@
-//! `elbowroom export prism`: what the best of all executors can reach, for Storm and PRISM.
+//! `elbowroom export prism`: optimal success probability as a decision process, for Storm and
+//! PRISM.
 
 use std::sync::Arc;
 
@@ -11,10 +12,10 @@ use crate::exit::Failure;
 use crate::input;
 use crate::output::Output;
 
-/// The cells of a process where nothing is said of them: those of the first grid of the optimum.
+/// Default number of cells: that of the first grid of the optimum.
 const CELLS: usize = 32;
 
-/// The text of the process that is asked for.
+/// Returns the text of the requested process.
 pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String, Failure> {
     refuse_what_is_about_plans(
         arguments,
@@ -85,7 +86,7 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
     })
 }
 
-/// Refuses the first option that only outputs about a plan have.
+/// Rejects the first option that only applies to output about a plan.
 pub(super) fn refuse_what_is_about_plans(arguments: &ExportArgs, why: &str) -> Result<(), Failure> {
     let is_default = arguments.epsilon == elbowroom::num::Rational::new(1, 1000);
     refuse(
@@ -103,7 +104,7 @@ pub(super) fn refuse_what_is_about_plans(arguments: &ExportArgs, why: &str) -> R
     )
 }
 
-/// Refuses the first of these that is given.
+/// Rejects the first of these options that is given.
 pub(super) fn refuse(given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
     match given.iter().find(|(_, is_given)| *is_given) {
         Some((name, _)) => Err(Failure::new(format!("{name} {why}"), "leave it out")),

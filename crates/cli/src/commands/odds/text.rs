@@ -1,4 +1,4 @@
-//! The odds of a plan as text.
+//! Text output of the success probability.
 
 use std::fmt::Write as _;
 
@@ -12,10 +12,10 @@ use crate::limits::push_paragraph;
 use crate::look::{BAD, HINT, Look, STRONG, styled};
 use elbowroom_executive::messages::counted;
 
-/// More losses, or ways to gain, are not listed.
+/// Maximum number of losses, or of possible gains, that are listed.
 const MOST_ROWS: usize = 12;
 
-/// Shares below this are not listed.
+/// Minimum share that is listed.
 const NEGLIGIBLE: f64 = 0.000_05;
 
 pub(super) fn of(answer: &OddsAnswer, with_layers: bool, look: Look) -> String {
@@ -281,7 +281,7 @@ fn table(text: &mut String, headings: &[&str], rows: Vec<Vec<String>>, look: Loo
     text.push_str(table.within(look.width).trim_start_matches('\n'));
 }
 
-/// A probability with four digits.
+/// Formats a probability with four digits.
 fn number(p: f64) -> String {
     format!("{p:.4}")
 }

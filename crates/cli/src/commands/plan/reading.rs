@@ -1,4 +1,4 @@
-//! Reads the problem within the limits of the search.
+//! Reading of the problem within the limits of the search.
 
 use std::ops::ControlFlow;
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -13,19 +13,20 @@ use crate::exit::Failure;
 use crate::input::{self, ReadProblem};
 use crate::output::Output;
 
-/// As much as the main thread has: files nest.
+/// Stack size of the reading thread, in bytes: that of the main thread, because files are nested.
 const STACK: usize = 16 << 20;
 
-/// How often the watch is asked.
+/// Interval between calls of the watch.
 const QUESTION: Duration = Duration::from_millis(10);
 
-/// Reads domain, problem and calendar, as long as the watch says so. Warnings go to standard error.
+/// Reads domain, problem and calendar until the watch ends the search. Warnings go to standard
+/// error.
 ///
-/// It is done on a thread of its own, which ends with the process: so a limit holds whatever takes
-/// its time, also a file that never comes to its end.
+/// Reading happens on its own thread, which ends with the process. A limit therefore holds for any
+/// file, including one without an end.
 ///
 /// # Errors
-/// When there is something wrong with the files.
+/// If the files contain errors.
 pub(super) fn read(
     arguments: &PlanArgs,
     watch: &mut Watch,
@@ -34,7 +35,7 @@ pub(super) fn read(
     let (sender, receiver) = mpsc::channel();
     let (files, epsilon) = (arguments.problem.clone(), arguments.epsilon.clone());
     let read = move || {
-        // Nobody listens any longer once time is up.
+        // After the time limit, the receiver is gone.
         let _ = sender.send(input::read(&files, &epsilon));
     };
     thread::Builder::new()

@@ -1,4 +1,4 @@
-//! What came of it, for people.
+//! Text output of planning.
 
 use std::fmt::Write as _;
 
@@ -14,8 +14,8 @@ use crate::number;
 use crate::wrap::wrapped;
 use elbowroom_executive::messages::counted;
 
-/// The plan as text, with a last line, a comment, that says what it is worth where that is not
-/// simply when it ends.
+/// Renders the plan as text. If its metric differs from its makespan, a comment at the end states
+/// the metric.
 pub(super) fn plan(finding: &PlanFinding) -> Option<String> {
     let PlanFinding::Plan {
         plan,
@@ -33,7 +33,7 @@ pub(super) fn plan(finding: &PlanFinding) -> Option<String> {
     Some(text)
 }
 
-/// What the plan is worth, for people: makespan, metric, and whether there may be better ones.
+/// Describes the plan: makespan, metric, and whether better plans may exist.
 pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     let PlanFinding::Plan {
         makespan, metric, ..
@@ -52,7 +52,7 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     let plans = counted(answer.plans, "plan");
     let better = match answer.stop {
         PlanStop::Exhausted => "the search found no better one",
-        // Another planner may have been about to end by itself, which is a matter of chance.
+        // Another planner may have been about to prove optimality when it was ended.
         PlanStop::FirstPlan if answer.planner != EMBEDDED => "not proved optimal",
         PlanStop::FirstPlan => "not proved optimal; --time-limit looks for better ones",
         _ => "not proved optimal",
@@ -61,7 +61,7 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     Some(styled(FAINT, &text))
 }
 
-/// The kind of the certificate that no plan exists or, if there is none, what to try.
+/// Describes the certificate that no plan exists, or advises what to try if there is none.
 pub(super) fn certified(answer: &PlanAnswer, look: Look) -> Option<String> {
     let line = match &answer.finding {
         PlanFinding::Plan { .. } => return None,
@@ -86,7 +86,7 @@ pub(super) fn certified(answer: &PlanAnswer, look: Look) -> Option<String> {
     Some(styled(FAINT, &wrapped(&line, look.width, 0)))
 }
 
-/// What a plan is worth by its objective, beside the shortest one.
+/// Describes the plan's objective value, compared with that of the shortest plan.
 fn chosen(choice: &PlanChoice) -> String {
     let PlanChoice {
         objective,
@@ -121,7 +121,7 @@ fn chosen(choice: &PlanChoice) -> String {
     text
 }
 
-/// The times are not the planner's own.
+/// Reports that the times are not the planner's own.
 pub(super) fn repaired(planner: &str, objection: &str) -> String {
     format!(
         "{}: the plan of {planner} is not valid as it stands, perhaps because its times are \
@@ -131,7 +131,7 @@ pub(super) fn repaired(planner: &str, objection: &str) -> String {
     )
 }
 
-/// The failure of a planner, with advice.
+/// Converts the failure of a planner to one with advice.
 pub(super) fn failure(failure: PlannerFailure) -> Failure {
     let in_words = failure.to_string();
     match failure.outcome {
@@ -154,7 +154,7 @@ pub(super) fn failure(failure: PlannerFailure) -> Failure {
     }
 }
 
-/// Excerpts longer than this hide what they are shown for.
+/// Maximum number of lines of an excerpt.
 const MOST_LINES: usize = 12;
 
 fn with_excerpt(message: String, title: &str, excerpt: &str, help: &str) -> Failure {

@@ -1,4 +1,4 @@
-//! How a search is getting on, and when it has to stop.
+//! Progress and limits of a search for a plan.
 
 use std::fmt::{self, Write as _};
 use std::ops::ControlFlow;
@@ -15,14 +15,15 @@ use crate::stopwatch::{Stopwatch, duration};
 use elbowroom_executive::memory_limit::MemoryLimit;
 use elbowroom_executive::messages::counted;
 
-/// Watches the plans that come, Ctrl-C, and, for who keeps no time of its own, the time.
+/// Watcher that reports plans and checks Ctrl-C. It also checks time and memory, unless the planner
+/// does so itself.
 pub(super) struct Watch {
     stopwatch: Stopwatch,
     line: Progress,
     limit: Option<Duration>,
     memory: Option<MemoryLimit>,
     best: Option<Worth>,
-    /// `true` if each better plan is reported, because there is time to search for some.
+    /// `true` if each better plan is reported, because the search continues after the first one.
     tells_plans: bool,
 }
 
@@ -30,12 +31,12 @@ pub(super) struct Watch {
 struct Worth {
     makespan: Rational,
     metric: Option<Rational>,
-    /// In words, where plans are compared by something else.
+    /// Description of another objective, if plans are compared by one.
     objective: Option<String>,
 }
 
 impl Watch {
-    /// Starts to watch: from now on, whatever is done counts.
+    /// Creates a watcher whose limits start now.
     pub(super) fn start(arguments: &PlanArgs) -> Self {
         let limit = arguments.time_limit.as_ref().map(duration);
         Self {
@@ -50,7 +51,8 @@ impl Watch {
         }
     }
 
-    /// Leaves the limits to a planner that keeps them itself: what is left of the time.
+    /// Stops checking the limits, for a planner that checks them itself. Returns the remaining
+    /// time.
     pub(super) fn hand_over_the_limits(&mut self) -> Option<Duration> {
         self.stopwatch = self.stopwatch.clone().until(None);
         self.memory = None;
@@ -62,7 +64,7 @@ impl Watch {
         self.limit
     }
 
-    /// Shows how far the search has come.
+    /// Shows the progress of the search.
     fn show(&mut self, progress: &PlanProgress<'_>) {
         let elapsed = self.stopwatch.elapsed();
         let (best, limit) = (&self.best, self.limit);

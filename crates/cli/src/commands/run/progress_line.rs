@@ -11,7 +11,7 @@ use crate::progress::Progress;
 use elbowroom_executive::clock::Clock;
 use elbowroom_executive::messages::{counted, escape_control};
 
-/// The limit on running actions that are named.
+/// Maximum number of running actions that are named.
 const MOST_NAMED: usize = 3;
 
 /// Line with the time, the running actions, and the number of new plans.

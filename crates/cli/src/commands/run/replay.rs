@@ -1,4 +1,4 @@
-//! `elbowroom run --replay`: does a stored run come to the same decisions?
+//! `elbowroom run --replay`: comparison of a stored run with its replay.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -109,7 +109,7 @@ fn json_of(line: &Line) -> Value {
     serde_json::from_str(&line.text()).unwrap_or(Value::Null)
 }
 
-/// Ends the run where the stored one was asked to end.
+/// Watcher that ends the run where the stored one was interrupted.
 struct AsStored(Arc<AtomicBool>);
 
 impl Watcher for AsStored {

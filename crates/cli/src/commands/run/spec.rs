@@ -1,4 +1,4 @@
-//! From the command line to what a run is.
+//! Conversion of arguments to the specification of a run.
 
 use std::path::Path;
 
@@ -21,8 +21,9 @@ use crate::exit::Failure;
 use crate::input;
 use crate::output;
 
-/// Returns the specification of the arguments, and the world files, whose names messages need. Files are read here.
-/// Mistakes in the arguments themselves are reported before files are read and `problem` is called.
+/// Returns the specification of the arguments, and the world files, whose names appear in messages.
+/// Files are read here. Errors in the arguments themselves are reported before files are read and
+/// `problem` is called.
 pub(in crate::commands) fn of(
     arguments: &RunArgs,
     domain: &Path,
@@ -58,7 +59,7 @@ pub(in crate::commands) fn of(
         epsilon: arguments.epsilon.clone(),
         ..RunSpec::new(empty(), empty())
     };
-    // A misspelt planner is told before files are read.
+    // Reports a misspelt planner before any file is read.
     spec.check_planner().map_err(contradiction)?;
     spec.domain = (&input::source(domain, "domain")?).into();
     spec.executor = arguments
@@ -105,7 +106,8 @@ pub(in crate::commands) fn of(
     Ok((spec, worlds))
 }
 
-/// Reads the world file of `--believed`. In a folder of `--learn` it is the model; until there is one, all goes as planned.
+/// Reads the world file of `--believed`. In a folder of `--learn` it is the model. If there is no
+/// model yet, all actions are expected to go as planned.
 fn believed(path: &Path, learn: Option<&Path>) -> Result<Source, Failure> {
     let is_new = learn == Some(path) && !path.exists();
     if !path.is_dir() && !is_new {
@@ -125,8 +127,8 @@ fn believed(path: &Path, learn: Option<&Path>) -> Result<Source, Failure> {
     ))
 }
 
-/// Leaves the sections of a learnt model out that the problem cannot have, with a warning. World files that are no models
-/// of a folder of `--learn` stay as they are.
+/// Removes sections of a learnt model that do not fit the problem, with a warning. Other world
+/// files are not changed.
 pub(super) fn fit_model(
     arguments: &RunArgs,
     spec: &mut RunSpec,
@@ -151,15 +153,15 @@ pub(super) fn fit_model(
     Ok(())
 }
 
-/// How many threads a planner of this name has. By default one: beside a run, the other processors have
-/// the robot to look after.
+/// Returns the number of threads for a planner of this name. The default is one, because the robot
+/// needs the other processors during a run.
 pub(super) fn threads_of(arguments: &RunArgs, planner: &str) -> Result<usize, Failure> {
     let is_embedded = planner.eq_ignore_ascii_case(EMBEDDED);
     threads::of(arguments.jobs, 1, is_embedded)
 }
 
-/// On a wall clock, and in a world that is a program, planning takes time unless the arguments say
-/// otherwise.
+/// Returns the rule for planning time. By default, planning takes time on a wall clock and in a
+/// world process.
 fn planning_time(arguments: &RunArgs) -> Result<PlanningTime, Failure> {
     let has_clock = arguments.realtime.is_some() || arguments.world_process.is_some();
     match (&arguments.planning_time, has_clock) {
@@ -174,7 +176,7 @@ fn planning_time(arguments: &RunArgs) -> Result<PlanningTime, Failure> {
     }
 }
 
-/// Advice on arguments, or files, that contradict each other.
+/// Returns a failure with advice on contradictory arguments or files.
 pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
     let hint = match &error {
         SpecError::World(wrong) => {

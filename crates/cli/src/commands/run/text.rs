@@ -1,4 +1,4 @@
-//! What came of a run, in words and as JSON.
+//! Result of a run, as text and as JSON.
 
 use std::fmt::Write as _;
 
@@ -11,12 +11,13 @@ use crate::number::nearest;
 use crate::wrap::wrapped;
 use elbowroom_executive::messages::{counted, escape_control};
 
-/// How a run ends.
+/// Circumstances of the end of a run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ends {
-    /// Whether it was ended because its journal cannot be written.
+    /// `true` if the run ended because its journal cannot be written.
     pub(super) has_lost: bool,
-    /// Whether it goes on when its goals are reached: then it counts from there anew.
+    /// `true` if the run continues after its goals are reached. New plans are then counted from
+    /// that time.
     pub(super) is_lasting: bool,
 }
 
@@ -78,7 +79,7 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
             "{}: the planner failed at {time}, after {replans}\n",
             styled(BAD, "failed")
         ),
-        // Why is the message with which the command ends, and is not said twice.
+        // The command's final message states the reason, so it is not repeated here.
         Verdict::WorldFailed { .. } => format!(
             "{}: the world failed at {time}, after {replans}\n",
             styled(BAD, "failed")
@@ -100,7 +101,7 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
         ("Why no plan reaches the goal", &report.dead_end),
         ("Why the plan was abandoned", &report.reasons),
     ] {
-        // What worlds and other programs say is in there. Nothing is said twice.
+        // Reasons may contain messages of worlds and other programs. Repetitions are omitted.
         let reasons = reasons
             .iter()
             .map(|reason| escape_control(&reason.to_string()));

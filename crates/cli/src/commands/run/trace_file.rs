@@ -1,4 +1,4 @@
-//! The file that a trace is written to, line by line.
+//! File of a trace, written line by line.
 
 use std::fs::File;
 use std::io::Write;
@@ -10,8 +10,8 @@ use elbowroom_executive::messages::plain;
 /// Limit on the size of a trace that is kept in memory, in bytes.
 const MOST_KEPT: usize = 32 << 20;
 
-/// A trace file. Each line is handed to the operating system before the next
-/// thing happens, so that a run that is killed leaves its trace.
+/// A trace file. Each line is passed to the operating system immediately, so that a killed run
+/// leaves its trace.
 ///
 /// Without a file, the trace is kept in memory until the run is known to be valid.
 pub(super) struct TraceFile {
@@ -59,7 +59,7 @@ impl TraceFile {
         Some(path.display().to_string())
     }
 
-    /// Why not all lines were written, if so.
+    /// Closes the file. Returns a message if some lines could not be written.
     pub(super) fn close(self) -> Option<String> {
         let ((_, name), error) = (self.file?, self.error?);
         let why = plain(&error);

@@ -16,13 +16,13 @@ use crate::number::nearest;
 use crate::output::{self, Output};
 use elbowroom_executive::messages::counted;
 
-/// Whether the text is an answer of `elbowroom plan`.
+/// Returns `true` if the text is an answer of `elbowroom plan`.
 pub(super) fn is_meant(text: &str) -> bool {
     let document: Result<Value, _> = serde_json::from_str(text);
     document.is_ok_and(|document| document["format"] == "elbowroom-plan")
 }
 
-/// Checks the answer against its problem, and says what that proves.
+/// Checks the answer against its problem and prints the proved claims.
 pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) -> Answer {
     let certificate = certificate_of(source.text()).map_err(|error| {
         let advice = match error {
@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
     Ok(if verdict.is_ok() { Exit::Yes } else { Exit::No })
 }
 
-/// Why there is no plan, by a certificate that is accepted.
+/// Describes why there is no plan, based on an accepted certificate.
 fn why(certificate: &NoPlan) -> String {
     match certificate.kind() {
         Kind::Apart => {
@@ -124,7 +124,7 @@ fn why(certificate: &NoPlan) -> String {
     }
 }
 
-/// The files of the problem: those that were given, or those that the answer names.
+/// Returns the files of the problem: the given ones, or those named in the answer.
 fn files(arguments: &VerifyArgs, certificate: &NoPlan) -> Result<ProblemArgs, Failure> {
     if let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) {
         return Ok(ProblemArgs::new(domain.clone(), problem.clone()));

@@ -1,4 +1,4 @@
-//! The other side of a conversation with a world: asks, listens, and notes what is wrong.
+//! Protocol client for the world under test: sends messages and records violations.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Child;
@@ -20,10 +20,10 @@ use elbowroom_executive::world_protocol::{
     ReadResult, WriteResult, belief_message, hello, wait_for_exit,
 };
 
-/// How long a world may take to end when it was told to.
+/// Maximum time from `stop` to the exit of the world.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// The conversation cannot go on.
+/// Error: the conversation with the world cannot continue.
 pub(super) struct Gone;
 
 /// A world that is being checked.
@@ -34,24 +34,25 @@ pub(super) struct Player {
     parser: MessageParser,
     patience: Duration,
     pub(super) findings: Findings,
-    /// What time it says it is.
+    /// Time of the world, according to its last answer.
     pub(super) now: Rational,
     actions: BTreeMap<u64, Begun>,
-    /// Of which starts it has said that it knows nothing.
+    /// Starts that the world does not know, according to its reports.
     unknown: BTreeSet<u64>,
-    /// Whether it is asked what happened before it was started: then reports are of that time.
+    /// `true` during the request for events from before the restart. Reports then refer to that
+    /// time.
     recalls: bool,
 }
 
-/// What is left of a world that was killed.
+/// State that outlives a killed world.
 pub(super) struct Rest {
     pub(super) findings: Findings,
-    /// The time that it had last.
+    /// The last time of the killed world.
     pub(super) now: Rational,
     patience: Duration,
 }
 
-/// What became of a start.
+/// State of a started action.
 #[derive(Clone, Debug, Default)]
 struct Begun {
     name: String,
@@ -75,8 +76,8 @@ impl Player {
         Self::greeted(program, task, nothing, &hello(task))
     }
 
-    /// Greets a program that was started again. `open` is what it was told before, as far as is known: ticket,
-    /// action, and whether it has reported that it has started.
+    /// Greets a restarted program. `open` lists the starts from before the restart: ticket, action,
+    /// and `true` if the start was reported.
     pub(super) fn resumed(
         program: (Child, LineWriter, LineReader),
         task: &Arc<Task>,
@@ -124,22 +125,22 @@ impl Player {
         }
     }
 
-    /// How the program has introduced itself.
+    /// Returns the program's greeting, if it has sent one.
     pub(super) fn greeting(&self) -> Option<&Greeting> {
         self.parser.greeting()
     }
 
-    /// Whether it says it can do that.
+    /// Returns `true` if the greeting claims this capability.
     pub(super) fn can(&self, ability: Capability) -> bool {
         self.parser.greeting().is_some() && self.parser.can(ability)
     }
 
-    /// Whether it may be told to stop actions; whoever has not greeted may, too.
+    /// Returns `true` if actions may be cancelled. This is assumed of programs without a greeting.
     pub(super) fn can_cancel(&self) -> bool {
         self.parser.can(Capability::Cancel)
     }
 
-    /// Notes what there is no occasion to look at, because it does not claim to do it.
+    /// Marks the checks of capabilities that the program does not claim as skipped.
     pub(super) fn note_what_it_cannot(&mut self) {
         for (check, can) in [
             (Check::Cancels, self.can_cancel()),
@@ -152,34 +153,34 @@ impl Player {
         }
     }
 
-    /// When the action has started.
+    /// Returns the reported start time of the action.
     pub(super) fn started(&self, ticket: u64) -> Option<&Rational> {
         self.actions.get(&ticket)?.started.as_ref()
     }
 
-    /// The action that was, or was to be, started.
+    /// Returns the name of the action with this ticket.
     pub(super) fn name_of(&self, ticket: u64) -> &str {
         self.actions.get(&ticket).map_or("", |it| &it.name)
     }
 
-    /// Whether it has said that it knows nothing of that start.
+    /// Returns `true` if the world has reported that it does not know this start.
     pub(super) fn is_unknown(&self, ticket: u64) -> bool {
         self.unknown.contains(&ticket)
     }
 
-    /// Whether the action has started, and has not ended.
+    /// Returns `true` if the action has started and not ended.
     pub(super) fn is_running(&self, ticket: u64) -> bool {
         let action = self.actions.get(&ticket);
         action.is_some_and(|it| it.started.is_some() && it.ending.is_none())
     }
 
-    /// Whether the action has ended, or was refused.
+    /// Returns `true` if the action has ended or was refused.
     pub(super) fn has_ended(&self, ticket: u64) -> bool {
         let action = self.actions.get(&ticket);
         action.is_some_and(|it| it.ending.is_some())
     }
 
-    /// Why the action failed, if it did.
+    /// Returns the reported reason if the action has failed.
     pub(super) fn failure(&self, ticket: u64) -> Option<&str> {
         match &self.actions.get(&ticket)?.ending {
             Some(Ending::Failed { why }) => Some(why),
@@ -187,7 +188,7 @@ impl Player {
         }
     }
 
-    /// Whether something was heard of its start, or that it was refused.
+    /// Returns `true` if the start or an end (also a refusal) was reported.
     pub(super) fn has_begun(&self, ticket: u64) -> bool {
         let action = self.actions.get(&ticket);
         action.is_some_and(|it| it.started.is_some() || it.ending.is_some())
@@ -216,14 +217,14 @@ impl Player {
         self.actions.insert(ticket, action);
     }
 
-    /// It is known that this has started.
+    /// Records that this action has started.
     pub(super) fn note_begun(&mut self, ticket: u64) {
         if let Some(action) = self.actions.get_mut(&ticket) {
             action.started = Some(Rational::ZERO);
         }
     }
 
-    /// Tells what is believed: these facts are true, and these are the values.
+    /// Sends beliefs: `facts` are true, and the fluents have these values.
     pub(super) fn believe<'a>(
         &mut self,
         task: &Task,
@@ -239,7 +240,7 @@ impl Player {
         self.tell(&json!({ "type": "cancel", "ticket": ticket, "now": wire::number(&self.now) }))
     }
 
-    /// Says something that no version of the protocol has.
+    /// Sends a message of an unknown type.
     pub(super) fn mumble(&mut self) -> Result<(), Gone> {
         self.tell(&json!({ "type": "from-a-later-version", "now": wire::number(&self.now) }))
     }
@@ -250,7 +251,7 @@ impl Player {
         self.ask(&question, None)
     }
 
-    /// Asks what became of these.
+    /// Requests the outcomes of these starts.
     pub(super) fn recall(&mut self, tickets: &[u64]) -> Result<(), Gone> {
         let number = self.parser.next_question();
         let question = json!({
@@ -262,7 +263,7 @@ impl Player {
         answered
     }
 
-    /// Lets time pass until then, or until something is observed.
+    /// Lets time pass until `until`, or until something is observed.
     pub(super) fn wait(&mut self, until: &Rational) -> Result<(), Gone> {
         let number = self.parser.next_question();
         let question = json!({ "type": "wait", "until": wire::number(until), "question": number });
@@ -369,7 +370,7 @@ impl Player {
         }
         if let Some(until) = until {
             let allowed = until.clone().max(self.now.clone());
-            // A clock that is real may be late when nothing happens; one that reports must not be.
+            // A real clock may be slightly late when nothing happens.
             let late = &now - &allowed;
             if is_silent && late > Rational::from(5) {
                 let why = format!(
@@ -382,7 +383,7 @@ impl Player {
         self.now = now;
     }
 
-    /// Notes what was reported in an answer, after the answer of the time `before`.
+    /// Checks and records the reports of an answer. `before` is the time of the previous answer.
     fn take(&mut self, observations: &[Observation], before: &Rational) {
         for Observation { time, event } in observations {
             let (Event::Started { ticket, .. }
@@ -448,7 +449,7 @@ impl Player {
         }
     }
 
-    /// Tells the program to stop, and sees to it that it does.
+    /// Requests the program to stop, and checks that it does.
     pub(super) fn stop(mut self) -> Findings {
         self.findings.look_at(Check::Stops);
         let told = self
@@ -467,7 +468,7 @@ impl Player {
         self.findings
     }
 
-    /// Kills it, as a crash would.
+    /// Kills the program, like a crash.
     pub(super) fn killed(mut self) -> Rest {
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -478,7 +479,7 @@ impl Player {
         }
     }
 
-    /// The conversation has ended otherwise.
+    /// Kills the program after a failed conversation.
     pub(super) fn abandon(mut self) -> Findings {
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -486,7 +487,7 @@ impl Player {
     }
 }
 
-/// Of which start a message is.
+/// Returns the ticket in a message.
 fn ticket_of(line: &str) -> Option<u64> {
     let message: Value = serde_json::from_str(line).ok()?;
     message["ticket"].as_u64()

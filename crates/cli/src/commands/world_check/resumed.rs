@@ -1,4 +1,5 @@
-//! A world that is killed while it does something, and started again: does it know what became of that?
+//! Check of a world that is killed during an action and restarted: it must report the outcome of
+//! that action.
 
 use std::sync::Arc;
 
@@ -11,12 +12,14 @@ use super::{longest, pass, until_begun};
 use elbowroom_executive::messages::excerpt;
 use elbowroom_executive::world_protocol::{Capability, launch};
 
-/// A start that is over when the world is killed, one that is under way, and one that it was not told any more.
+/// Ticket of a start that has ended before the world is killed. `UNDER_WAY` is running then, and
+/// `UNTOLD` was never sent to the world.
 const OVER: u64 = 0;
 const UNDER_WAY: u64 = 4;
 const UNTOLD: u64 = 5;
 
-/// Plays that, and gives back the world that was started again. `Err` where the conversation has come to its end.
+/// Kills the world during an action and restarts it. Returns the restarted world, or `Err` if the
+/// conversation has ended.
 pub(super) fn resumed(
     mut player: Player,
     command: &str,
@@ -31,7 +34,7 @@ pub(super) fn resumed(
         return Err(player.abandon());
     }
     if !player.is_running(UNDER_WAY) {
-        // It was refused, or takes no time: nothing is under way.
+        // The action was refused or takes no time, so nothing is running.
         return Ok(player);
     }
     let mut rest = player.killed();
@@ -59,7 +62,7 @@ pub(super) fn resumed(
     }
 }
 
-/// What the world that was started again says of what it was told before.
+/// Checks what the restarted world reports of its earlier starts.
 fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<(), Gone> {
     player.recall(&[OVER, UNDER_WAY, UNTOLD])?;
     player.findings.look_at(Check::Resumes);
@@ -104,7 +107,7 @@ fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<
         );
         player.findings.wrong(Check::Resumes, why);
     }
-    // Just before it was killed, it had said when that began.
+    // The start was reported before the kill, so it cannot be later.
     let began = player.started(UNDER_WAY).cloned();
     if let Some(began) = began.filter(|began| began > killed) {
         let why = format!(

@@ -1,8 +1,8 @@
-//! What a world must do, and whether it does.
+//! Table of the requirements on a world and the results of their checks.
 
 use serde::Serialize;
 
-/// One thing that a world must do.
+/// A requirement on a world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Check {
     Lives,
@@ -24,7 +24,7 @@ pub(super) enum Check {
 }
 
 impl Check {
-    /// All of them, in the order in which they are shown, with a word and a sentence for each.
+    /// All checks in the order of display, each with a keyword and a description.
     pub(super) const ALL: [(Self, &str, &str); 16] = [
         (Self::Lives, "lives", "it runs until it receives `stop`"),
         (
@@ -108,11 +108,11 @@ pub(super) struct Row {
     pub(super) check: &'static str,
     pub(super) what: &'static str,
     pub(super) outcome: Outcome,
-    /// What is wrong, or why it was not looked at.
+    /// Violations, or the reason why the check was skipped.
     pub(super) why: Vec<String>,
 }
 
-/// What was found out so far.
+/// Results of the checks so far.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
     wrong: Vec<(Check, String)>,
@@ -120,26 +120,26 @@ pub(super) struct Findings {
     unclaimed: Vec<Check>,
 }
 
-/// So many examples of one mistake are enough.
+/// Maximum number of examples kept of each violation.
 const MOST_EXAMPLES: usize = 3;
 
 impl Findings {
-    /// It was looked at.
+    /// Marks the check as done.
     pub(super) fn look_at(&mut self, check: Check) {
         self.done.push(check);
     }
 
-    /// It is not looked at, because the world does not claim to do it.
+    /// Marks the check as skipped because the world does not claim the capability.
     pub(super) fn leave_out(&mut self, check: Check) {
         self.unclaimed.push(check);
     }
 
-    /// How much was found to be wrong so far.
+    /// Returns the number of violations so far.
     pub(super) fn faults(&self) -> usize {
         self.wrong.len()
     }
 
-    /// The world does something wrong.
+    /// Records a violation.
     pub(super) fn wrong(&mut self, check: Check, why: impl Into<String>) {
         let why = why.into();
         let known = self.wrong.iter().filter(|(other, _)| *other == check);
@@ -149,7 +149,7 @@ impl Findings {
         }
     }
 
-    /// The rows; `end` is why nothing more was looked at, if so.
+    /// Returns the rows. `end` is the reason why the checks ended early, if they did.
     pub(super) fn rows(self, end: Option<&str>) -> Vec<Row> {
         let row = |(check, name, what)| {
             let wrong = self.wrong.iter().filter(|(other, _)| *other == check);

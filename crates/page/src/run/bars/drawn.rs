@@ -1,4 +1,4 @@
-//! Plans and what was done, as bars and as a table.
+//! Plans and executed actions, as bars and as a table.
 
 use elbowroom::num::Rational;
 use elbowroom::report::line::WindowLine;
@@ -9,7 +9,7 @@ use crate::document::{Bar, Mark, Table, Text};
 use crate::plan::{band, window_words};
 
 impl Bars {
-    /// The names of the plans, if there are several.
+    /// Returns the names of the plans, if there are several.
     pub(in crate::run) fn plan_names(&self) -> Vec<String> {
         let names = self.plans.iter().enumerate().map(|(index, since)| {
             let since = nearest(since);
@@ -22,7 +22,7 @@ impl Bars {
         if names.len() > 1 { names } else { Vec::new() }
     }
 
-    /// The moments at which a plan was given up.
+    /// Returns marks for the times at which plans were abandoned.
     pub(in crate::run) fn events(&self) -> impl Iterator<Item = Mark> + '_ {
         self.given_up.iter().map(|(time, words)| Mark {
             at: time.to_f64(),
@@ -31,14 +31,14 @@ impl Bars {
         })
     }
 
-    /// Everything as bars: starts in order, and then the steps that were not started.
+    /// Returns all bars: starts in order, and then the steps that were not started.
     pub(in crate::run) fn drawn(&self, now: &Rational) -> Vec<Bar> {
         let starts = self.starts.values().map(|start| self.started(start, now));
         let waiting = self.steps.iter().filter(|step| !step.is_ordered);
         starts.chain(waiting.map(not_started)).collect()
     }
 
-    /// What the plans order, by the positions of [`Bars::drawn`].
+    /// Returns the orderings of the plans, as positions in [`Bars::drawn`].
     pub(in crate::run) fn drawn_orderings(&self) -> Vec<(usize, usize)> {
         let mut bars = vec![None; self.steps.len()];
         for (bar, start) in self.starts.values().enumerate() {
@@ -121,7 +121,7 @@ impl Bars {
         }
     }
 
-    /// What was planned beside what was done.
+    /// Builds the table of planned and observed times.
     pub(in crate::run) fn table(&self) -> Table {
         let columns = [
             ("action", false),
@@ -220,12 +220,12 @@ fn not_started(step: &Step) -> Bar {
     }
 }
 
-/// A window for drawing, if there is a limit to it.
+/// Converts a window for drawing; `None` if it has no latest time.
 fn limited(due: &WindowLine) -> Option<(Option<f64>, Option<f64>)> {
     band(&answer(due)).filter(|(_, latest)| latest.is_some())
 }
 
-/// An outcome that traces can have.
+/// Maps an outcome to one that traces can have.
 fn known(outcome: &str) -> &'static str {
     match outcome {
         "succeeded" => "succeeded",

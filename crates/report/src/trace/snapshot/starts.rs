@@ -1,4 +1,4 @@
-//! What was started, in a snapshot.
+//! Started actions in a snapshot.
 
 use std::sync::Arc;
 
@@ -14,77 +14,77 @@ use super::super::replay::instantiate;
 use super::fluent;
 use crate::exact::Exact;
 
-/// Something that was started.
+/// A started action.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StartLine {
-    /// By which the world's reports refer to it.
+    /// Identifier of the start in the world's reports.
     pub ticket: u64,
     /// Its name: `(drive rover depot shelf)`.
     pub action: String,
-    /// The planned duration; none for an instantaneous action.
+    /// The planned duration; `None` for an instantaneous action.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub duration: Option<Exact>,
-    /// When it was told to start.
+    /// Time of the start command.
     pub ordered: Exact,
-    /// When it has started, if it has.
+    /// Start time, if it has started.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub started: Option<Exact>,
-    /// When it last reported progress.
+    /// Time of its last progress report.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heard: Option<Exact>,
-    /// The part that was done then, from 0 to 1.
+    /// Completed fraction in that report, from 0 to 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub completion: Option<Exact>,
-    /// When it has ended, if it has.
+    /// End time, if it has ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<Exact>,
-    /// How it has ended: `succeeded`, `failed` or `cancelled`.
+    /// Outcome: `succeeded`, `failed` or `cancelled`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outcome: Option<String>,
-    /// Why it has failed.
+    /// Reason of a failure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
-    /// When it was told to stop, if it was.
+    /// Time of the cancel command, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cancelled: Option<Exact>,
     /// Its time-out, if it has reached it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timed_out: Option<Exact>,
-    /// `true` if it is unknown whether it has come to its end.
+    /// `true` if it is unknown whether it was completed.
     #[serde(default, skip_serializing_if = "super::is_false")]
     pub in_doubt: bool,
-    /// Until when the plan could bear it when that was warned of.
+    /// Latest end that the plan tolerated at the last warning.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub warned: Option<Exact>,
-    /// The time-out that the last warning of one was about.
+    /// Time-out at the last warning about one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub warned_timeout: Option<Exact>,
-    /// What was measured at its start.
+    /// Amounts measured at its start.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub measured_at_start: IndexMap<String, Exact>,
-    /// What was measured at its end.
+    /// Amounts measured at its end.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub measured_at_end: IndexMap<String, Exact>,
 }
 
-/// Something under way.
+/// A running action.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UnderWayLine {
-    /// Which start it is.
+    /// Ticket of its start.
     pub ticket: u64,
-    /// When it started.
+    /// The start time.
     pub start: Exact,
     /// The planned duration.
     pub duration: Exact,
-    /// By end effect of the action: whether it can still take place.
+    /// For each end effect of the action, `true` if it can still take place.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub end_effects: Vec<bool>,
-    /// By continuous effect: whether it is at work.
+    /// For each continuous effect, `true` if it is active.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub continuous: Vec<bool>,
-    /// The conjuncts of the over-all condition that have not held at some moment.
+    /// Conjuncts of the over-all condition that have been violated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub broken: Vec<usize>,
 }
@@ -101,7 +101,7 @@ fn inexact(number: Option<&Exact>) -> Option<Rational> {
     number.map(|it| it.0.clone())
 }
 
-/// The action of a start.
+/// Returns the action of a start.
 pub(super) fn action_of(starts: &[KnownStart], ticket: Ticket) -> Option<&Arc<Action>> {
     let of = starts.iter().find(|it| it.ticket == ticket);
     of.map(|it| &it.action)
@@ -179,7 +179,7 @@ impl StartLine {
         })
     }
 
-    /// Whether it has not ended.
+    /// Returns `true` if the action has not ended.
     pub fn is_open(&self) -> bool {
         self.ended.is_none()
     }

@@ -1,4 +1,4 @@
-//! A plan that is taken up, in a snapshot.
+//! Adopted plan in a snapshot.
 
 use elbowroom_execution::run::{GivenGoal, Goals, KnownStart, TakesUp};
 use elbowroom_execution::{Guards, News, Ticket};
@@ -14,51 +14,51 @@ use super::starts::{action_of, exact};
 use super::{fact, fluent};
 use crate::exact::Exact;
 
-/// A plan that is taken up.
+/// An adopted plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TakenUpLine {
-    /// Its actions, on the world's clock; those under way come first.
+    /// Its actions, on the world's clock; running ones come first.
     pub steps: Vec<StepLine>,
-    /// The time from which on it is.
+    /// Time of its initial state.
     pub time: Exact,
-    /// The facts that are true there.
+    /// True facts of its initial state.
     pub facts: Vec<String>,
-    /// The numbers there.
+    /// Numbers of its initial state.
     pub numbers: IndexMap<String, Exact>,
-    /// What is under way there.
+    /// Running actions of its initial state.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub under_way: Vec<SituatedLine>,
-    /// Which starts of the plan have been made since.
+    /// Tickets of the plan's actions that have been started since.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub begun: Vec<u64>,
-    /// The goals that it is for.
+    /// The goals of the plan.
     pub goals: Vec<GoalLine>,
-    /// Whether these are those of the problem.
+    /// `true` if these are the goals of the problem.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub problem_goals: bool,
-    /// What it does not know of.
+    /// Events that the plan does not account for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub news: Vec<NewsLine>,
-    /// How the goals have changed since it was asked for.
+    /// Change of the goals since the plan was requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turn: Option<TurnLine>,
 }
 
-/// Something under way where a plan begins.
+/// A running action in the initial state of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SituatedLine {
-    /// Which start it is.
+    /// Ticket of its start.
     pub ticket: u64,
-    /// When it started.
+    /// The start time.
     pub start: Exact,
-    /// How long it is expected to take.
+    /// Expected duration.
     pub duration: Exact,
-    /// By end effect of the action: whether it can still take place.
+    /// For each end effect of the action, `true` if it can still take place.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub end_effects: Vec<bool>,
-    /// By continuous effect: whether it is at work.
+    /// For each continuous effect, `true` if it is active.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub continuous: Vec<bool>,
 }
@@ -69,7 +69,7 @@ pub struct SituatedLine {
 pub struct GoalLine {
     /// Its name.
     pub name: String,
-    /// As it was given; none if it is that of the problem.
+    /// The goal in PDDL, as given; `None` for the goal of the problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal: Option<String>,
     /// Its value, if it is not 1.
@@ -78,7 +78,7 @@ pub struct GoalLine {
     /// Its deadline on the world's clock, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deadline: Option<Exact>,
-    /// The reason for which it is set aside while others are pursued; none if it is pursued.
+    /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aside: Option<String>,
     /// Lateness in words; left out if its deadline is not known to be missed.
@@ -86,13 +86,13 @@ pub struct GoalLine {
     pub late: Option<String>,
 }
 
-/// Something that a plan does not know of.
+/// Event that a plan does not account for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NewsLine {
-    /// A fact is not as believed.
+    /// A fact differs from the belief.
     Fact(String),
-    /// A number is not as believed.
+    /// A number differs from the belief.
     Number(String),
     /// Reports on this action contradict each other.
     Contradiction(String),
@@ -102,9 +102,9 @@ pub enum NewsLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TurnLine {
-    /// In words.
+    /// Description of the change.
     pub words: String,
-    /// Whether they have only become more.
+    /// `true` if goals were only added.
     pub only_more: bool,
 }
 
@@ -228,7 +228,7 @@ impl NewsLine {
             News::Fact(fact) => Some(Self::Fact(task.fact_name(*fact))),
             News::Value(fluent) => Some(Self::Number(task.fluent_name(*fluent))),
             News::Contradiction { action } => Some(Self::Contradiction(action.clone())),
-            // What concerns steps of a plan means nothing to another one.
+            // Events about steps of an earlier plan are irrelevant for a new one.
             News::Started { .. } | News::Ended { .. } | News::Silence { .. } => None,
         }
     }

@@ -1,4 +1,4 @@
-//! How good the best box is, in words.
+//! Description of the quality of the best box.
 
 use elbowroom::answers::envelope::{Best, Probability, Relax, Room, Worth};
 use elbowroom::envelope::Objective;
@@ -6,9 +6,9 @@ use elbowroom::num::Rational;
 
 use crate::number::{self, Rounding};
 
-/// Which bounds it would be worth most to relax.
+/// Lists the bounds whose relaxation gains most, or returns `None` if there are none.
 pub(super) fn gained(best: &Best) -> Option<String> {
-    /// Of a long list only the first are named.
+    /// Maximum number of entries of a list.
     const MOST_NAMED: usize = 3;
     let gain = |worth: &Worth| match best.objective {
         Objective::LeastSlack => {
@@ -39,13 +39,13 @@ pub(super) fn gained(best: &Best) -> Option<String> {
     (!named.is_empty()).then(|| format!("Bounds that are worth most: {}.", named.join("; ")))
 }
 
-/// How large the product of the widths is.
+/// Describes the volume as the geometric mean of the widths.
 fn spacious(best: &Best, parameters: &[Room]) -> String {
     let weights: Rational = parameters
         .iter()
         .map(|own| own.range.quantity.weight.clone())
         .sum();
-    // The geometric mean says more to people than a product of many numbers.
+    // The geometric mean is easier to understand than a product of many numbers.
     let mean = |logarithm: &Rational| {
         let mean = (logarithm.to_f64() / weights.to_f64().max(f64::MIN_POSITIVE)).exp();
         let percent = Rational::from_f64_exactly(mean * 100.0).unwrap_or_default();
@@ -64,7 +64,7 @@ fn spacious(best: &Best, parameters: &[Room]) -> String {
     )
 }
 
-/// How likely all durations stay inside.
+/// Describes the probability that all durations stay inside the box.
 fn likely(best: &Best, probability: &Probability) -> String {
     let percent = |value: &Rational, rounding| {
         let percent = value * &Rational::from(100);
@@ -89,7 +89,7 @@ fn likely(best: &Best, probability: &Probability) -> String {
     )
 }
 
-/// How good the box is.
+/// Describes the objective value of the box, and its proved upper bound.
 pub(super) fn goodness(best: &Best, parameters: &[Room]) -> String {
     if let Some(probability) = &best.probability {
         return likely(best, probability);

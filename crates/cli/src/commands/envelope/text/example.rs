@@ -1,4 +1,4 @@
-//! Why a plan does not work, with values and a schedule that show it.
+//! Explanation of why a plan does not work, with example values and a schedule.
 
 use std::fmt::Write as _;
 
@@ -10,10 +10,10 @@ use crate::limits::push_wrapped;
 use crate::look::{Look, STRONG, styled};
 use crate::number;
 
-/// The reason, and by how much.
+/// Describes the reason, and the amount of the violation.
 pub(super) fn what(explanation: &Explanation) -> String {
     let reason = &explanation.reason;
-    // Where a schedule is shown, how much is short is said there, of that schedule.
+    // If a schedule is shown, the amount is stated there, for that schedule.
     let is_said = explanation.verdict.is_some();
     match &explanation.shortfall {
         Some(Shortfall::Boundless) => {
@@ -29,7 +29,7 @@ pub(super) fn what(explanation: &Explanation) -> String {
     }
 }
 
-/// Values and a schedule at which it goes wrong.
+/// Renders values and a schedule that violate the reason.
 pub(super) fn example(
     task: &Task,
     plan: &ParametrizedPlan,

@@ -1,4 +1,4 @@
-//! The promise of an envelope, and the time-outs of its actions.
+//! Guarantee of an envelope, and the time-outs of its actions.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,7 +11,7 @@ use crate::number;
 use crate::table::{self, Row};
 use elbowroom_executive::messages::counted;
 
-/// The promise, in words.
+/// Describes the guarantee.
 pub(super) fn meaning(parameters: &[Room], rows: &[Row]) -> String {
     let is_duration = |room: &Room| room.range.quantity.kind == QuantityKind::Duration;
     let has_timeouts = parameters.iter().any(|room| room.range.timeout.is_some());
@@ -41,9 +41,9 @@ pub(super) fn meaning(parameters: &[Room], rows: &[Row]) -> String {
     meaning
 }
 
-/// The time-out of each action, and the rule that it follows.
+/// Describes the time-outs of actions, and their rule.
 pub(super) fn line(rule: &TimeoutRule, parameters: &[Room], chosen: &[Chosen]) -> Option<String> {
-    /// Of many different time-outs only the most frequent ones are listed.
+    /// Maximum number of different time-outs listed, the most frequent ones.
     const MOST_LISTED: usize = 4;
     let open = parameters.iter().filter_map(|room| {
         let name = room.range.quantity.name.clone();
