@@ -17,7 +17,7 @@ pub(super) struct EmbeddedPlans {
     known: BTreeMap<BTreeSet<FactId>, Option<Arc<TimeTriggeredPlan>>>,
 }
 
-/// Maximum number of states in a search. Beyond it there counts as no plan.
+/// Maximum number of states in a search. A larger search counts as finding no plan.
 const MOST_STATES: u64 = 100_000;
 
 impl EmbeddedPlans {
