@@ -29,9 +29,9 @@ pub mod kind {
     pub const REQUEST: i16 = 1;
     /// A performer offers to execute it.
     pub const RESPONSE: i16 = 2;
-    /// The executor chooses the performer that answered first.
+    /// The executor chooses this performer, which answered first.
     pub const CONFIRM: i16 = 3;
-    /// The executor does not need this performer.
+    /// The executor rejects this performer.
     pub const REJECT: i16 = 4;
     /// A performer reports its progress.
     pub const FEEDBACK: i16 = 5;

@@ -52,7 +52,7 @@ impl Key {
         words
     }
 
-    /// `(at r1 gate)`.
+    /// Returns the fact or fluent as PDDL, such as `(at r1 gate)`.
     fn name(&self) -> String {
         format!("({})", self.words().join(" "))
     }

@@ -128,7 +128,7 @@ impl Network {
         Ok(())
     }
 
-    /// Publishes on a topic.
+    /// Creates a publisher of a topic.
     ///
     /// # Errors
     /// DDS refuses; the text says what.
