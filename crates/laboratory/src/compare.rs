@@ -60,7 +60,7 @@ impl Part {
 }
 
 /// Runs the trials. `observe` receives the number of finished trials, and returns `false` to stop.
-/// The trials so far are kept ([`Results::is_interrupted`]).
+/// The results of finished trials are kept ([`Results::is_interrupted`]).
 ///
 /// # Errors
 /// A problem cannot be read, has no plan to begin with, or a plan cannot be prepared.

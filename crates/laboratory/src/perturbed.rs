@@ -67,7 +67,7 @@ struct Setting<'e> {
 }
 
 /// Runs the trials of each case, in each world, with each executor. `observe` receives the number
-/// of finished trials, and returns `false` to stop. The trials so far are kept
+/// of finished trials, and returns `false` to stop. The results of finished trials are kept
 /// ([`PerturbedResults::is_interrupted`]).
 ///
 /// # Errors

@@ -23,7 +23,7 @@ pub enum StepKind {
 pub enum Entry {
     /// Start of a round with this plan: the names of its actions, by start.
     Plan(Vec<String>),
-    /// A step.
+    /// One step.
     Step {
         /// Its kind.
         kind: StepKind,

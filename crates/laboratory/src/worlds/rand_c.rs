@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 /// 31) mod 2³², whose upper 31 bits are returned.
 #[derive(Clone, Debug)]
 pub(super) struct RandC {
-    /// The last 31 numbers.
+    /// The last 31 numbers of the sequence.
     last: VecDeque<u32>,
 }
 
@@ -37,7 +37,7 @@ impl RandC {
         next >> 1
     }
 
-    /// `rand() / RAND_MAX`, in [0, 1].
+    /// Returns `rand() / RAND_MAX`, in [0, 1].
     pub(super) fn share(&mut self) -> f64 {
         f64::from(self.next()) / 2_147_483_647.0
     }
