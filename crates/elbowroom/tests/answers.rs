@@ -431,8 +431,8 @@ fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
     }
 }
 
-/// Filling takes 15 in the plan, and draining 10, after a separation of 0.001. The domain leaves
-/// both to the executor.
+/// The plan fills for 15 and drains for 10, after a separation of 0.001. The domain leaves both
+/// durations to the executor.
 #[test]
 fn a_timeline_shows_durations_that_the_executor_chooses_as_it_tells_them() {
     let (task, plan) = read("tank");

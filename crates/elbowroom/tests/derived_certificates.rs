@@ -420,7 +420,7 @@ fn certificate_of_another_plan_or_problem_is_refused() {
     let text = answer.to_string();
     verify_answer_of(&text, &task, &plan).expect("it is that of this plan");
     let others = [
-        // Actions of equal durations change places.
+        // Actions of equal durations are exchanged.
         (
             DOMAIN.to_owned(),
             PROBLEM.to_owned(),

@@ -326,7 +326,7 @@ fn a_picture_has_the_region_the_boxes_and_the_nominal_point() {
         let picture = picture(&outcome, &plane, &mut flow).expect("two parameters");
         assert_eq!(picture.boxes.len(), 3);
         assert_eq!(picture.areas.len(), 1);
-        // The nominal point is inside both.
+        // The nominal point is inside both polygons.
         let point = picture.point.as_ref().expect("a point").1;
         assert!((point[0] - 8.0).abs() < 1e-9 && (point[1] - 10.0).abs() < 1e-9);
         let is_left = |corners: &Vec<[f64; 2]>| {

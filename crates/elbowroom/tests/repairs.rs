@@ -119,7 +119,7 @@ fn where_the_deadline_stays_something_gets_shorter() {
     let RepairFinding::Repaired { cost, changes, .. } = outcome.answer.finding else {
         panic!("{:?}", outcome.answer.finding);
     };
-    // One second of the pick at half the price, and 4.004 of the drives.
+    // One second of the pick at half the price, and 4.004 s of the drives.
     assert_eq!(cost, "4504/1000".parse().expect("a number"));
     assert!(
         changes.iter().any(|change| change.to == Rational::ONE),

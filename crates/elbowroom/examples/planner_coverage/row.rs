@@ -13,7 +13,7 @@ pub(crate) struct Row {
     pub(crate) instance: String,
     /// `deadlines`, `numbers`, `concurrency`, separated by spaces.
     pub(crate) kinds: String,
-    /// [`Outcome::name`](elbowroom::external::Outcome::name).
+    /// Outcome, as [`Outcome::name`](elbowroom::external::Outcome::name).
     pub(crate) outcome: String,
     pub(crate) first_seconds: String,
     pub(crate) first_makespan: String,

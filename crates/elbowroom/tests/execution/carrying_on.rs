@@ -65,7 +65,7 @@ fn plan_that_lacks_more_than_time_is_not_carried_on() {
     assert_ne!(verdict, Verdict::GoalReached);
 }
 
-/// Two hoses fill a tank in turn, each for 10 s.
+/// Two hoses fill a tank, one after the other, each for 10 s.
 #[test]
 fn goal_is_reached_if_a_later_action_makes_up_for_numbers_that_fall_short() {
     let domain = "(define (domain hoses)

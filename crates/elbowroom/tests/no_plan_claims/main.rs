@@ -337,7 +337,7 @@ fn fluent_without_value_is_named() {
     };
     assert!(reason.contains("(used) has no initial value"), "{reason}");
     assert_eq!(certificate(&task), Ok(Kind::Reached));
-    // An assignment gives it a value.
+    // An assignment gives the fluent a value.
     let domain = format!(
         "{domain} (:action reset :parameters () :precondition () :effect (assign (used) 0))"
     );

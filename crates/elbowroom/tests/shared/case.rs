@@ -28,14 +28,14 @@ pub(crate) fn number(text: &str) -> Rational {
 }
 
 impl Case {
-    /// Reads a plan file.
+    /// Reads a plan file with its domain and problem.
     pub(crate) fn read(domain: &Path, problem: &Path, plan: &Path) -> Self {
         let text = std::fs::read_to_string(plan)
             .unwrap_or_else(|error| panic!("{}: {error}", plan.display()));
         Self::of_text(domain, problem, &text)
     }
 
-    /// Reads a plan.
+    /// Reads a plan from a text.
     pub(crate) fn of_text(domain: &Path, problem: &Path, plan: &str) -> Self {
         let task = super::task(domain, problem).unwrap_or_else(|error| panic!("{error}"));
         let plan = format::read(plan.as_bytes(), &task).unwrap_or_else(|error| panic!("{error}"));
