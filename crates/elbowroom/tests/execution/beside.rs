@@ -281,7 +281,7 @@ pub(crate) fn told(
     told_in(execution, task, planner, &mut world, &is_to_end)
 }
 
-/// Runs in that world, which ends the run.
+/// Runs in that world until it sets the flag.
 pub(crate) fn told_in(
     execution: Execution<'_>,
     task: &Arc<Task>,
