@@ -44,7 +44,7 @@ pub struct StoredPlan {
 /// Attempt to start an action, or its end.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredStep {
-    /// `started`, `not-started` or `ended`.
+    /// `started`, `not-started`, `ended` or `failed`.
     pub step: String,
     /// The action.
     pub action: String,
