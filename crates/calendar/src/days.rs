@@ -8,15 +8,15 @@ use jiff::civil::Date;
 
 use crate::zone::{Objection, day_number};
 
-/// A set of days, each numbered from 1970-01-01.
+/// Set of days, numbered from 1970-01-01.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Days {
-    /// Monday to Sunday.
+    /// Weekdays in the set, from Monday to Sunday.
     weekdays: [bool; 7],
     dates: Vec<RangeInclusive<i64>>,
 }
 
-/// Sets of days with names, for `days` and `except`.
+/// Named sets of days, for `days` and `except`.
 pub(crate) type NamedDays = BTreeMap<String, Days>;
 
 const WEEKDAYS: [&str; 7] = [
@@ -30,11 +30,11 @@ const WEEKDAYS: [&str; 7] = [
 ];
 
 impl Days {
-    /// Adds what a text names: a weekday, `weekdays`, `weekends`, `every day`, a date, a range such as
-    /// `monday to thursday` or `2026-12-24 to 2027-01-06`, or one of `named`.
+    /// Adds the days named by a text: a weekday, `weekdays`, `weekends`, `every day`, a date, a
+    /// range such as `monday to thursday` or `2026-12-24 to 2027-01-06`, or one of `named`.
     ///
     /// # Errors
-    /// When the text names no days.
+    /// The text names no days.
     pub(crate) fn add(&mut self, text: &str, named: &NamedDays) -> Result<(), Objection> {
         let text = text.trim();
         if let Some(days) = named.get(text) {
@@ -70,7 +70,7 @@ impl Days {
         is_day(text) || is_day(&format!("{}s", text.trim()))
     }
 
-    /// Adds the weekdays from `first` to `last`, over the end of the week where `last` is smaller.
+    /// Adds the weekdays from `first` to `last`, across the end of the week if `last` is smaller.
     fn add_weekdays(&mut self, first: usize, last: usize) {
         let mut day = first;
         self.weekdays[day] = true;
@@ -108,7 +108,7 @@ impl Days {
     }
 }
 
-/// Returns the number of a weekday that is named in full or by its first three letters.
+/// Returns the number of a weekday, given by its name or its first three letters.
 fn weekday(text: &str) -> Option<usize> {
     let text = text.trim();
     WEEKDAYS

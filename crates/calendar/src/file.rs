@@ -1,4 +1,4 @@
-//! Calendar files as they are written.
+//! Deserialized calendar files.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use toml::{Spanned, Value};
 
 use crate::zone::Objection;
 
-/// The file.
+/// Calendar file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct File {
@@ -27,7 +27,7 @@ pub(crate) struct File {
     pub(crate) value: Vec<Spanned<Section>>,
 }
 
-/// All keys of a `[[window]]` or a `[[value]]`.
+/// Keys of a `[[window]]` or a `[[value]]`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Section {
@@ -41,7 +41,7 @@ pub(crate) struct Section {
     pub(crate) to: Option<Spanned<Value>>,
 }
 
-/// Returns the text of a string or of a date that is written without quotes.
+/// Returns the text of a string or of an unquoted date.
 pub(crate) fn text(value: &Value) -> Option<String> {
     match value {
         Value::String(text) => Some(text.clone()),
@@ -50,10 +50,10 @@ pub(crate) fn text(value: &Value) -> Option<String> {
     }
 }
 
-/// Returns the texts of a list, or the only text.
+/// Returns the texts of a list, or a single text as a list.
 ///
 /// # Errors
-/// When the value is no text and no list of texts, or an empty list.
+/// The value is neither a text nor a list of texts, or the list is empty.
 pub(crate) fn texts(value: &Spanned<Value>) -> Result<(Span, Vec<String>), Objection> {
     let all: Option<Vec<String>> = match value.get_ref() {
         Value::Array(elements) => elements.iter().map(text).collect(),

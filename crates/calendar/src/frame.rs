@@ -1,4 +1,4 @@
-//! The parts of a calendar file that all its sections need, and the notes of mistakes.
+//! Data shared by all sections of a calendar file, and the recording of mistakes.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -10,13 +10,13 @@ use crate::days::NamedDays;
 use crate::file::text;
 use crate::zone::{Objection, Zone};
 
-/// The parts of a calendar file that all its sections need.
+/// Data shared by all sections of a calendar file.
 pub(crate) struct Frame {
     pub(crate) zone: Zone,
-    /// The instants from time 0 to the horizon; [`i64::MAX`] where there is none.
+    /// Instants from time 0 to the horizon, or to [`i64::MAX`] without a horizon.
     pub(crate) within: Range<i64>,
     pub(crate) named: NamedDays,
-    /// The facts and fluents that the problem sets itself, and when.
+    /// Facts and fluents that the problem sets itself, each with its time in words.
     pub(crate) set_by_problem: BTreeMap<String, &'static str>,
 }
 
@@ -26,7 +26,7 @@ impl Frame {
     }
 }
 
-/// Returns a value, or notes why there is none.
+/// Returns a value, or adds its error to the report.
 pub(crate) fn noted<T>(
     outcome: Result<T, Objection>,
     span: &Span,
@@ -39,7 +39,7 @@ pub(crate) fn noted<T>(
         .ok()
 }
 
-/// Returns the instant of a date, or notes why there is none.
+/// Returns the instant of a date, or adds an error to the report.
 pub(crate) fn instant(value: &Spanned<Value>, zone: &Zone, report: &mut Report) -> Option<i64> {
     let written = text(value.get_ref()).unwrap_or_else(|| value.get_ref().to_string());
     noted(zone.instant(&written), &value.span(), report)

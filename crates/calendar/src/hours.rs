@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use crate::zone::{DAY, Objection, SECOND};
 
-/// Reads hours as a range of milliseconds since the beginning of the day. The range ends after the
-/// day where the end is not later than the start: `22 to 6`.
+/// Reads hours as a range of milliseconds since the beginning of the day. The range ends on the
+/// next day if its end is not later than its start: `22 to 6`.
 ///
 /// # Errors
-/// When the text has another form, or when the hours are empty.
+/// The text has another form, or the hours are empty.
 pub(crate) fn read(text: &str) -> Result<Range<i64>, Objection> {
     let ends = text.split_once(" to ");
     let ends = ends.and_then(|(start, end)| Some((time(start)?, time(end)?)));

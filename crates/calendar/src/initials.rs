@@ -1,4 +1,4 @@
-//! The problem with the calendar's timed initials.
+//! Problem with the calendar's timed initials.
 
 use std::fmt::Write as _;
 
@@ -52,7 +52,7 @@ impl Calendar {
     }
 }
 
-/// Returns the number as a decimal where that is exact, else as a fraction.
+/// Returns the number as a decimal if that is exact, and as a fraction otherwise.
 fn number(value: &Rational) -> String {
     let decimal = value.to_decimal(60);
     match decimal.parse::<Rational>() {

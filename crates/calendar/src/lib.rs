@@ -75,18 +75,18 @@ pub use read::read;
 use unit::{Rounding, Unit};
 use zone::Zone;
 
-/// The date of time 0, where the calendar file does not decide it.
+/// Date of time 0, if the calendar file does not set it.
 #[derive(Clone, Copy, Debug)]
 pub struct Origin<'a> {
-    /// A date or `now`, in place of the file's `begin`.
+    /// A date or `now`, which overrides the file's `begin`.
     pub begin: Option<&'a str>,
     /// The current time.
     pub now: SystemTime,
-    /// If `true`, time 0 is the current time where there is no other `begin`.
+    /// If `true`, time 0 is the current time if there is no other `begin`.
     pub is_live: bool,
 }
 
-/// The windows of facts and the values of fluents, from time 0 on.
+/// Windows of facts and values of fluents, from time 0 on.
 #[derive(Clone, Debug)]
 pub struct Calendar {
     zone: Zone,
@@ -98,14 +98,14 @@ pub struct Calendar {
     fluents: Vec<CalendarFluent>,
 }
 
-/// A fact with the instants at which it holds.
+/// Fact with the instants at which it holds.
 #[derive(Clone, Debug)]
 struct CalendarFact {
     name: String,
     windows: Ranges,
 }
 
-/// A fluent with the instants at which it gets values.
+/// Fluent with its values and the instants at which it gets them.
 #[derive(Clone, Debug)]
 struct CalendarFluent {
     name: String,
@@ -115,9 +115,9 @@ struct CalendarFluent {
 /// Interval during which a fact holds, in the problem's time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// The first time; 0 if the fact holds at the beginning.
+    /// Start time; 0 if the fact holds at the beginning.
     pub opens: Rational,
-    /// The first time after it; `None` if the window never closes.
+    /// End time; `None` if the window never closes.
     pub closes: Option<Rational>,
 }
 
@@ -132,8 +132,8 @@ impl Calendar {
         Rational::new(self.unit.length, zone::SECOND)
     }
 
-    /// Returns each fact with its windows, in order and apart from each other. Times that have no
-    /// short decimal are rounded into the window, by less than a millionth of the unit.
+    /// Returns each fact with its disjoint windows, in order. Times without a short decimal are
+    /// rounded into the window, by less than a millionth of the unit.
     pub fn windows(&self) -> impl Iterator<Item = (&str, Vec<Window>)> {
         self.facts.iter().map(|fact| {
             let windows = fact.windows.iter().filter_map(|window| {
@@ -155,7 +155,7 @@ impl Calendar {
         })
     }
 
-    /// Returns time 0 in words: its date, the zone and the unit.
+    /// Describes time 0: its date, the zone and the unit.
     pub fn origin(&self) -> String {
         format!(
             "time 0 is {} {} ({}), in {}",
@@ -166,11 +166,11 @@ impl Calendar {
         )
     }
 
-    /// Returns the local date of a time of the problem, to the second. The offset from UTC follows
-    /// where it is another one than at time 0.
+    /// Returns the local date of a time of the problem, to the second, with the offset from UTC if
+    /// it differs from that at time 0.
     pub fn date(&self, time: &Rational) -> String {
         let scaled = time * &Rational::from(self.unit.length);
-        // Half a millisecond more, so that the cut rounds to the nearest.
+        // Half a millisecond is added, so that truncation rounds to the nearest.
         let milliseconds = (scaled + Rational::new(1, 2)).floor();
         let milliseconds = milliseconds
             .to_decimal(0)

@@ -1,4 +1,4 @@
-//! The facts and fluents that a pattern such as `(open _)` names.
+//! Facts and fluents that match a pattern such as `(open _)`.
 
 use elbowroom_model::Problem;
 use elbowroom_model::problem::{ObjectId, Variable};
@@ -6,18 +6,18 @@ use elbowroom_text::nearest;
 
 use crate::zone::Objection;
 
-/// The kind of thing that a pattern names.
+/// Kind of a pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Fact,
     Fluent,
 }
 
-/// Returns the ground names, such as `(open bakery)`, of a pattern. `_` matches any object of the
-/// type.
+/// Returns the ground names, such as `(open bakery)`, that match a pattern. `_` matches any object
+/// of the type.
 ///
 /// # Errors
-/// When the problem has no such fact or fluent, or when it is derived.
+/// The problem has no such fact or fluent, or it is derived.
 pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<String>, Objection> {
     let inner = text.trim();
     let inner = inner.strip_prefix('(').and_then(|it| it.strip_suffix(')'));
@@ -69,7 +69,7 @@ pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<St
         .collect())
 }
 
-/// More of them are a mistake.
+/// Maximum number of names that a pattern may match.
 const MOST_NAMES: usize = 10_000;
 
 impl Kind {

@@ -7,7 +7,7 @@ use std::ops::Range;
 pub(crate) struct Ranges(Vec<Range<i64>>);
 
 impl Ranges {
-    /// The union of the ranges.
+    /// Returns the union of the ranges.
     pub(crate) fn union(mut all: Vec<Range<i64>>) -> Self {
         all.retain(|range| range.start < range.end);
         all.sort_by_key(|range| range.start);

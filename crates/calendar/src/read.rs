@@ -1,4 +1,4 @@
-//! Reads a calendar file for a problem.
+//! Reader of calendar files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -15,7 +15,7 @@ use crate::unit::{Length, Unit, length};
 use crate::zone::Zone;
 use crate::{Calendar, Origin};
 
-/// The text for the current time.
+/// Text that stands for the current time.
 const NOW: &str = "now";
 
 /// Reads a calendar file (`docs/calendars.md`) for a problem. Returns the calendar with the warnings.
@@ -33,10 +33,10 @@ pub fn read(
     report.finish(calendar)
 }
 
-/// Returns `None` if mistakes are in the report.
+/// Returns the calendar, or `None` if there are mistakes in the report.
 ///
 /// # Errors
-/// When the begin that replaces the file's is no date.
+/// `begin` of the origin is not a date.
 fn calendar(
     file: &File,
     problem: &Problem,
@@ -95,7 +95,7 @@ fn calendar(
     }))
 }
 
-/// Warns of a calendar without sections, and of names that no section uses.
+/// Warns about a calendar without sections, and about unused names.
 fn warn_of_unused(file: &File, report: &mut Report) {
     if file.window.is_empty() && file.value.is_empty() {
         let warning = report.warning(0..0, "the calendar has no [[window]] and no [[value]]");
@@ -130,10 +130,10 @@ fn header(file: &File, report: &mut Report) {
     }
 }
 
-/// Returns the instant of time 0, and whether it is the current time.
+/// Returns the instant of time 0, and `true` if it is the current time.
 ///
 /// # Errors
-/// When the begin that replaces the file's is no date.
+/// `begin` of the origin is not a date.
 fn begin(
     file: &File,
     zone: &Zone,
@@ -202,7 +202,7 @@ fn horizon(value: &Spanned<Value>, begin: i64, zone: &Zone, report: &mut Report)
     Some(end)
 }
 
-/// Returns the names of the facts and fluents that the problem sets itself, and when.
+/// Returns the facts and fluents that the problem sets itself, each with its time in words.
 fn set_by(problem: &Problem) -> BTreeMap<String, &'static str> {
     use elbowroom_model::problem::TimedChange;
     let name = |function: elbowroom_model::problem::FunctionId| {

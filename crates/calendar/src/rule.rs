@@ -1,4 +1,4 @@
-//! Rules: at which instants a window is open.
+//! Rules for the instants at which a window is open.
 
 use std::ops::Range;
 
@@ -6,17 +6,17 @@ use crate::days::Days;
 use crate::ranges::Ranges;
 use crate::zone::{DAY, Zone};
 
-/// Midnight to midnight.
+/// A whole day.
 const WHOLE_DAY: Range<i64> = 0..DAY;
 
-/// The instants from `from` to `to` whose local time lies in the hours of a day that is in `days` and
-/// not in `except`. Hours that pass midnight belong to the day on which they begin.
+/// Instants from `from` to `to` whose local time is in the given hours of a day in `days` and not
+/// in `except`. Hours across midnight belong to the day on which they begin.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Rule {
-    /// `None`: every day.
+    /// `None` for every day.
     pub(crate) days: Option<Days>,
     pub(crate) except: Days,
-    /// Empty: the whole day.
+    /// Empty for the whole day.
     pub(crate) hours: Vec<Range<i64>>,
     pub(crate) from: Option<i64>,
     pub(crate) to: Option<i64>,
@@ -39,7 +39,7 @@ impl Rule {
         !self.is_plain() && self.to.is_none() && !is_dated
     }
 
-    /// Returns the number of days that [`Rule::windows`] goes through.
+    /// Returns the number of days that [`Rule::windows`] visits.
     pub(crate) fn day_count(&self, within: &Range<i64>) -> i64 {
         let (first, last) = self.day_range(&self.clipped(within));
         if self.is_plain() {
@@ -49,7 +49,7 @@ impl Rule {
         }
     }
 
-    /// Returns the windows inside `within`, which must have an end if the rule has none.
+    /// Returns the windows inside `within`, which must be bounded if the rule is not.
     pub(crate) fn windows(&self, zone: &Zone, within: &Range<i64>) -> Ranges {
         let within = self.clipped(within);
         if self.is_plain() {
@@ -86,9 +86,9 @@ impl Rule {
         start..end
     }
 
-    /// Returns the first and the last day whose hours may meet the range.
+    /// Returns the first and the last day whose hours may overlap with the range.
     fn day_range(&self, within: &Range<i64>) -> (i64, i64) {
-        // Hours reach into the next day, and local time is up to a day from that of the instants.
+        // Hours may extend into the next day, and local time differs by up to a day.
         let first = within.start.div_euclid(DAY) - 3;
         let last = within.end.div_euclid(DAY).saturating_add(2);
         let dated = self.days.as_ref().and_then(Days::last);

@@ -17,10 +17,10 @@ use crate::ranges::Ranges;
 use crate::rule::Rule;
 use crate::{CalendarFact, CalendarFluent};
 
-/// A rule over more days than this is a mistake: a hundred years.
+/// Maximum number of days of a rule: a hundred years.
 const MOST_DAYS: i64 = 36_600;
 
-/// Limit on the windows of all facts, and on those of all values. No planner can use so many.
+/// Maximum number of windows of all facts, and of those of all values. Planners cannot handle more.
 const MOST_WINDOWS: usize = 200_000;
 
 /// Returns the facts of the `[[window]]` sections with their windows, in the order of the file.
@@ -87,7 +87,7 @@ pub(crate) fn fluents(
 ) -> Vec<CalendarFluent> {
     let mut order = Vec::new();
     let mut layers: BTreeMap<String, Vec<(Rational, Ranges)>> = BTreeMap::new();
-    // Names with a mistake in a section: a missing value for all other times is no second mistake.
+    // Fluents of invalid sections, for which a missing default value is not reported in addition.
     let mut mistaken = BTreeSet::new();
     let mut count = 0;
     for section in &file.value {
@@ -137,8 +137,8 @@ pub(crate) fn fluents(
     order.into_iter().filter_map(changes).collect()
 }
 
-/// Returns the instants at which the value changes, with the value from then on. Of several layers
-/// that cover an instant, the last one counts.
+/// Returns the instants at which the value changes, with the new values. If several layers cover an
+/// instant, the last one counts.
 fn values(layers: &[(Rational, Ranges)], begin: i64) -> Vec<(i64, Rational)> {
     let ends = |range: &Range<i64>| [range.start, range.end];
     let instants: BTreeSet<i64> = layers
@@ -151,7 +151,7 @@ fn values(layers: &[(Rational, Ranges)], begin: i64) -> Vec<(i64, Rational)> {
             .iter()
             .rev()
             .find(|(_, ranges)| ranges.contains(*instant));
-        // At the horizon no layer covers the instant, and the last value stays.
+        // No layer covers the horizon, where the last value remains.
         let Some((value, _)) = covering else {
             continue;
         };
@@ -162,7 +162,8 @@ fn values(layers: &[(Rational, Ranges)], begin: i64) -> Vec<(i64, Rational)> {
     values
 }
 
-/// Returns `true`, and notes it, if there are more windows than [`MOST_WINDOWS`].
+/// Returns `true`, and adds an error to the report, if there are more windows than
+/// [`MOST_WINDOWS`].
 fn too_many(count: usize, section: &Spanned<Section>, report: &mut Report) -> bool {
     if count > MOST_WINDOWS {
         let message = format!("up to here, the calendar has more than {MOST_WINDOWS} windows");
@@ -172,7 +173,7 @@ fn too_many(count: usize, section: &Spanned<Section>, report: &mut Report) -> bo
     count > MOST_WINDOWS
 }
 
-/// Notes keys that have no meaning in a section.
+/// Reports keys without a meaning in a section.
 fn refuse(section: &str, excess: &[(&str, &Option<Spanned<Value>>)], report: &mut Report) {
     for (key, value) in excess {
         if let Some(value) = value {
@@ -238,7 +239,8 @@ fn number(section: &Spanned<Section>, report: &mut Report) -> Option<Rational> {
     number
 }
 
-/// Adds the days that a value names. Returns `false` if it names others, which is in the report.
+/// Adds the days named by a value. Returns `false`, and adds an error to the report, if it names
+/// something else.
 pub(crate) fn add_days(
     value: &Spanned<Value>,
     days: &mut Days,
@@ -255,7 +257,7 @@ pub(crate) fn add_days(
     is_read
 }
 
-/// Returns the rule of a section; `None` if it cannot be used, which is in the report.
+/// Returns the rule of a section, or `None` after adding an error to the report.
 fn rule(section: &Spanned<Section>, frame: &Frame, report: &mut Report) -> Option<Rule> {
     let given = section.get_ref();
     let mut rule = Rule::default();

@@ -1,14 +1,14 @@
-//! Units of a problem's time, and spans of time in words.
+//! Units of a problem's time, and spans of time as texts.
 
 use elbowroom_num::Rational;
 
 use crate::zone::{DAY, SECOND};
 
-/// The unit of a problem's times.
+/// Unit of a problem's times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Unit {
     pub(crate) name: &'static str,
-    /// Its length in milliseconds.
+    /// Length in milliseconds.
     pub(crate) length: i64,
 }
 
@@ -31,7 +31,7 @@ const UNITS: [Unit; 4] = [
     },
 ];
 
-/// Times are written with at most this many decimals.
+/// Maximum number of decimals of a time.
 pub(crate) const DECIMALS: u32 = 6;
 
 /// Rounding direction of times without a short decimal.
@@ -47,7 +47,7 @@ impl Unit {
         UNITS.into_iter().find(|unit| unit.is_called(name))
     }
 
-    /// Returns `true` for the unit's name in the singular or in the plural.
+    /// Returns `true` if the text is the unit's name, singular or plural.
     fn is_called(self, name: &str) -> bool {
         self.name == name || self.name.strip_suffix('s') == Some(name)
     }
@@ -64,10 +64,10 @@ impl Unit {
     }
 }
 
-/// A span of time in words.
+/// Span of time given as a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Length {
-    /// Days on the clock, which are an hour shorter or longer where the clocks change.
+    /// Calendar days, which are an hour shorter or longer when the clocks change.
     Days(i64),
     Milliseconds(i64),
 }

@@ -1,7 +1,7 @@
-//! A time zone: which instant a local time is, and the other way round.
+//! Conversion between instants and local times of a time zone.
 //!
-//! Instants are milliseconds since 1970-01-01T00:00Z. Local times are milliseconds since 1970-01-01T00:00
-//! on the clocks of the zone.
+//! Instants are milliseconds since 1970-01-01T00:00Z. Local times are milliseconds since
+//! 1970-01-01T00:00 on the clocks of the zone.
 
 use std::ops::Range;
 
@@ -12,26 +12,26 @@ use jiff::tz::{AmbiguousOffset, Offset, TimeZone, TimeZoneDatabase};
 
 /// One second, in milliseconds.
 pub(crate) const SECOND: i64 = 1000;
-/// One day on the clock, in milliseconds.
+/// One calendar day, in milliseconds.
 pub(crate) const DAY: i64 = 24 * 60 * 60 * SECOND;
 /// One year, in milliseconds.
 const YEAR: i64 = 366 * DAY;
 
-/// A time zone of the IANA database that is compiled into the program.
+/// Time zone of the IANA database that is compiled into the program.
 #[derive(Clone, Debug)]
 pub(crate) struct Zone {
     rules: TimeZone,
     name: String,
 }
 
-/// The message about a text that gives no instant, and advice.
+/// Message about an invalid text, and advice.
 pub(crate) type Objection = (String, String);
 
 impl Zone {
     /// Returns the zone of that name, such as `Europe/Berlin` or `UTC`.
     ///
     /// # Errors
-    /// When there is no such zone, with the most similar names as advice.
+    /// There is no such zone. The advice lists the most similar names.
     pub(crate) fn named(name: &str) -> Result<Self, Objection> {
         let database = TimeZoneDatabase::bundled();
         if let Ok(rules) = database.get(name) {
@@ -56,10 +56,10 @@ impl Zone {
         &self.name
     }
 
-    /// Reads a date with a time of day; an offset such as `+01:00` or `Z` may follow.
+    /// Reads a date with a time of day, optionally with an offset such as `+01:00` or `Z`.
     ///
     /// # Errors
-    /// When the text has another form, or when the local time does not exist or exists twice.
+    /// The text has another form, or the local time does not exist or exists twice.
     pub(crate) fn instant(&self, text: &str) -> Result<i64, Objection> {
         let text = text.trim();
         if let Ok(instant) = text.parse::<Timestamp>() {
@@ -102,12 +102,12 @@ impl Zone {
         instant.map(Timestamp::as_millisecond).map_err(out_of_range)
     }
 
-    /// Refuses an instant that is written with an offset which the zone does not have within a year. The
-    /// offset of UTC is always allowed.
+    /// Rejects an instant with an offset that the zone does not have within a year. The offset of
+    /// UTC is always allowed.
     fn with_known_offset(&self, text: &str, instant: i64) -> Result<(), Objection> {
         let written = text.parse::<DateTime>().ok();
         let written = written.and_then(|local| TimeZone::UTC.to_timestamp(local).ok());
-        // `Z` is no offset of a local time.
+        // `Z` is not an offset of a local time.
         let Some(local) = written.map(Timestamp::as_millisecond) else {
             return Ok(());
         };
@@ -130,7 +130,7 @@ impl Zone {
     }
 
     /// Returns the instant `days` days later at the same local time, or the first instant after it
-    /// where that local time does not exist.
+    /// if that local time does not exist.
     pub(crate) fn days_later(&self, instant: i64, days: i64) -> i64 {
         let local = self.local(instant).saturating_add(days.saturating_mul(DAY));
         let day = local.saturating_add(2 * DAY);
@@ -143,10 +143,10 @@ impl Zone {
         instant.saturating_add(milliseconds(self.rules.to_offset(timestamp(instant))))
     }
 
-    /// Returns all instants whose local time lies in the range, as disjoint ranges in order. A change
-    /// of the clocks can shorten, split or repeat the local time.
+    /// Returns all instants whose local time is in the range, as disjoint ranges in order. A clock
+    /// change can shorten, split or repeat the local time.
     pub(crate) fn instants(&self, local: Range<i64>) -> Vec<Range<i64>> {
-        // No offset is larger than a day and a bit.
+        // No offset is much larger than a day.
         let first = local.start.saturating_sub(2 * DAY);
         let last = local.end.saturating_add(2 * DAY);
         let mut found = Vec::new();
@@ -173,8 +173,8 @@ impl Zone {
         found
     }
 
-    /// Returns the local date and time of an instant, rounded to the second, and to the minute where it is
-    /// a full one, such as `Mon 2026-11-30 07:30`.
+    /// Returns the local date and time of an instant, rounded to the second. Seconds are omitted if
+    /// they are zero, as in `Mon 2026-11-30 07:30`.
     pub(crate) fn date(&self, instant: i64) -> String {
         let second = instant.saturating_add(SECOND / 2).div_euclid(SECOND);
         let instant = second.saturating_mul(SECOND);
@@ -197,7 +197,7 @@ impl Zone {
 pub(crate) fn day_number(date: jiff::civil::Date) -> i64 {
     let midnight = date.to_datetime(jiff::civil::Time::midnight());
     let instant = TimeZone::UTC.to_timestamp(midnight);
-    // Only dates at the very ends of the calendar have no instant.
+    // Only dates at the ends of the supported range have no instant.
     instant.map_or(0, |it| it.as_millisecond().div_euclid(DAY))
 }
 

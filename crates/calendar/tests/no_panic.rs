@@ -1,4 +1,4 @@
-//! No text makes the reader of calendar files panic.
+//! The reader of calendar files never panics.
 
 use std::time::UNIX_EPOCH;
 
@@ -10,7 +10,7 @@ const DOMAIN: &str = include_str!("../../../examples/market/domain.pddl");
 const PROBLEM: &str = include_str!("../../../examples/market/problem.pddl");
 const CALENDAR: &str = include_str!("../../../examples/market/calendar.toml");
 
-/// Parts of calendar files, with the ends of their ranges.
+/// Fragments of calendar files, including the ends of their ranges.
 const PARTS: [&str; 24] = [
     "\"",
     "[",

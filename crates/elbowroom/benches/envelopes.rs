@@ -1,15 +1,15 @@
-//! From a read plan to its box, on the instances of the paper's Figures 3 and 4.
+//! Time from a parsed plan to its box, on the instances of the paper's Figures 3 and 4.
 //!
-//! `whole` compiles the obligations and searches with the authors' settings (β = 1, doubling);
-//! `first_widening` stops when the box has grown for the first time. Without the benchmark files
-//! beside the repository these have nothing to measure.
+//! `whole` compiles the obligations and searches with the authors' settings (β = 1, doubling).
+//! `first_widening` stops when the box has grown for the first time. Both need the benchmark files
+//! next to the repository.
 //!
-//! These are boxes of the weak guarantee, which the paper's are. The group `dynamic` searches the
-//! same with the dynamic one.
+//! They use the weak guarantee, as the paper does. The group `dynamic` runs the same searches with
+//! the dynamic guarantee.
 //!
-//! `rounds` and `rounds_first_widening` are deliveries of our own with all durations left open, by
-//! the number of parameters. `many` is the whole answer of `elbowroom envelope`, with what limits each
-//! end, for plans with up to a thousand parameters.
+//! `rounds` and `rounds_first_widening` are deliveries of our own with all durations as parameters,
+//! by the number of parameters. `many` is the complete answer of `elbowroom envelope`, with the
+//! limits of each end, for plans with up to a thousand parameters.
 
 #[path = "../tests/shared/mod.rs"]
 mod shared;
@@ -32,7 +32,7 @@ fn main() {
     divan::main();
 }
 
-/// Every instance of both figures.
+/// Returns all instances of both figures.
 fn instances() -> Vec<Instance> {
     let Some(data) = shared::data() else {
         return Vec::new();
@@ -58,7 +58,7 @@ fn read(name: &str) -> (Arc<Task>, Arc<ParametrizedPlan>) {
     (Arc::new(task), Arc::new(plan))
 }
 
-/// Searches until `enough` widenings.
+/// Searches until there are `enough` widenings.
 fn search(
     task: &Arc<Task>,
     plan: &Arc<ParametrizedPlan>,
@@ -90,7 +90,7 @@ fn first_widening(bencher: Bencher<'_, '_>, name: &str) {
     bencher.bench_local(|| search(&task, &plan, Guarantee::Weak, 1));
 }
 
-/// A delivery with so many durations left open.
+/// Returns a delivery with this number of durations as parameters.
 fn delivery(parameters: usize) -> (Arc<Task>, Arc<ParametrizedPlan>) {
     let (problem, plan) = shared::rounds::rounds(parameters / 4);
     let domain = Source::new("domain", shared::rounds::DOMAIN);
@@ -116,7 +116,7 @@ fn rounds_first_widening(bencher: Bencher<'_, '_>, parameters: usize) {
     bencher.bench_local(|| search(&task, &plan, Guarantee::Weak, 1));
 }
 
-/// Robots, ways of each, and what they need.
+/// Numbers of robots and of ways of each robot, and their needs.
 const MANY: [(usize, usize, Needs); 6] = [
     (1, 100, Needs::Time),
     (1, 400, Needs::Time),

@@ -1,5 +1,4 @@
-//! Requests and their answers: what is in them, that they can be stored and read again, and that a
-//! watcher is heard.
+//! Requests and their answers: their contents, serialization, and interruption by a watcher.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -53,7 +52,7 @@ fn asked(request: &EnvelopeRequest) -> EnvelopeOutcome {
     envelope(request, &mut Unwatched).expect("within exact reasoning")
 }
 
-/// What is written can be read, and written again to the same bytes.
+/// Checks that an answer is deserialized and serialized again to the same bytes.
 fn assert_stored<T: Serialize + DeserializeOwned>(answer: &T) -> String {
     let written = serde_json::to_string_pretty(answer).expect("a document");
     let read: T = serde_json::from_str(&written).unwrap_or_else(|e| panic!("{e}\n{written}"));
@@ -73,7 +72,7 @@ fn answers_can_be_stored_and_read_again() {
         assert_stored(&found.answer);
         let opened = found.plan.expect("a valid plan");
         let boxed = elbowroom::write_box(&found.envelope.expect("room"), &opened);
-        // Infinite ends are beyond every time-out.
+        // Infinite ends exceed every time-out.
         let inside = EnvelopeRequest {
             contains: Some(boxed),
             timeout: TimeoutRule::Off,
@@ -244,7 +243,7 @@ fn an_answer_without_a_plan_carries_a_proof_or_says_why_not() {
     assert_eq!(certificate.files, ["d", "p"]);
     assert_eq!(verify_no_plan(&task, &certificate), Ok(()));
     assert!(verify_no_plan(&fuses("(mended)"), &certificate).is_err());
-    // One match is not enough for both, which takes more than earliest times to see.
+    // One match is not enough for both; the earliest times alone do not prove that.
     let (task, both) = asked("(mended) (painted)");
     let both = both.expect("what can happen is listed");
     assert_ne!(both.kind(), NoPlanKind::Reached);
@@ -315,7 +314,7 @@ fn an_envelope_computed_in_mid_execution_can_be_cut_short() {
     assert!(whole.includes(&cut) && whole != cut, "{cut:?}");
 }
 
-/// Wants no more after so many looks at a box, and remembers the last box.
+/// Watcher that halts after some boxes, and stores the last one.
 struct Impatient {
     patience: usize,
     halt: Halt,
@@ -381,8 +380,8 @@ fn a_watcher_sees_the_box_grow_and_can_end_the_search_at_any_moment() {
     assert_stored(&outcome.answer);
 }
 
-/// The windows of a timeline are compared with those of the network at every corner of the box,
-/// which is where the extremes of a plan with this one deadline lie.
+/// The windows of a timeline are compared with those of the network at every corner of the box. For
+/// a plan with this one deadline, the extremes are at the corners.
 #[test]
 fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
     let (task, plan) = read("delivery");
@@ -432,8 +431,8 @@ fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
     }
 }
 
-/// Filling takes 15 in the plan, and draining 10, after a separation of 0.001. The domain leaves
-/// both to the executor.
+/// The plan fills for 15 and drains for 10, after a separation of 0.001. The domain leaves both
+/// durations to the executor.
 #[test]
 fn a_timeline_shows_durations_that_the_executor_chooses_as_it_tells_them() {
     let (task, plan) = read("tank");

@@ -1,7 +1,7 @@
-//! The boxes that the authors' tool found (January 2019), against ours.
+//! Comparison of our boxes with those that the authors' tool found (January 2019).
 //!
-//! Every recorded box of a finished run must be inside the envelope; with any end shifted outward
-//! by more than the run left open, it must not be; and the same search must find the same box.
+//! Every recorded box of a finished run must be inside the envelope. With any end shifted outwards
+//! by more than the run's last step, it must not be. The same search must find the same box.
 
 mod shared;
 
@@ -15,10 +15,10 @@ use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side, format};
 use shared::instances::{Instance, figure_3};
 
-/// A box as the authors' tool printed it, by parameter name.
+/// Box as printed by the authors' tool, by parameter name.
 type Recorded = BTreeMap<String, (Rational, Rational)>;
 
-/// The distinct boxes of finished IRR runs, by instance.
+/// Returns the distinct boxes of finished IRR runs, by instance.
 fn recorded_boxes(data: &Path) -> BTreeMap<String, Vec<Recorded>> {
     let path = data.join("envelopes/paper_runs/aaai_runs.csv");
     let text = std::fs::read_to_string(&path).expect("the table of runs");
@@ -54,7 +54,7 @@ fn interval(text: &str) -> (String, (Rational, Rational)) {
     )
 }
 
-/// An instance, read.
+/// Parsed instance.
 struct Case {
     task: Arc<elbowroom_model::Task>,
     plan: Arc<ParametrizedPlan>,
@@ -81,8 +81,9 @@ fn envelope_of(plan: &ParametrizedPlan, recorded: &Recorded) -> DecoupledEnvelop
     DecoupledEnvelope::new(plan, intervals.collect()).expect("one for each")
 }
 
-/// The only recorded ends that may move further: `senddata` takes exactly 1 in its domain, which
-/// binds it in the authors' tool. Here a duration that is a parameter is free of its domain.
+/// Returns `true` for the only recorded end that may be moved further. `senddata` takes exactly 1
+/// in its domain, which is a constraint in the authors' tool. Here a duration that is a parameter
+/// is not constrained by its domain.
 fn is_freed_by_us(instance: &str, parameter: &str) -> bool {
     instance == "solar_rover 01_4" && parameter == "dur_4"
 }
@@ -129,8 +130,8 @@ fn every_recorded_box_is_inside_and_cannot_grow_by_what_its_run_left_open() {
     assert!(inside >= 50 && outside >= 300);
 }
 
-/// The last step that a run with β = 1 was refused at both ends: the smallest of `nominal · 2^k`
-/// that is not below 1.
+/// Returns the smallest step that a run with β = 1 rejected at both ends: the smallest of `nominal
+/// · 2^k` that is not below 1.
 fn left_open(nominal: &Rational) -> Rational {
     let half = Rational::new(1, 2);
     let mut step = nominal.clone().max(Rational::ONE);
@@ -164,8 +165,8 @@ fn the_same_search_finds_the_same_fractions() {
         if found(&text) {
             in_file_order += 1;
         } else {
-            // Their tool picks parameters in the order of a Python set, which differs from run to
-            // run. Some order gives the recorded box.
+            // Their tool picks parameters in the order of a Python set, which differs between runs.
+            // One of the orders must give the recorded box.
             assert!(
                 reordered(&text).iter().any(|text| found(text)),
                 "{}: no order of the parameters gives the recorded box",
@@ -181,7 +182,7 @@ fn the_same_search_finds_the_same_fractions() {
     assert_eq!((in_file_order, in_other_order, unfinished), (46, 5, 1));
 }
 
-/// What the search with the authors' settings finds.
+/// Runs the search with the authors' settings.
 fn search(case: &Case) -> Recorded {
     let mut oracle = Oracle::new(&case.task, &case.plan, Guarantee::Weak).expect("within reach");
     let run = irr(&mut oracle, &Settings::default(), &mut |_| {
@@ -206,7 +207,7 @@ fn without_freed(instance: &str, mut recorded: Recorded) -> Recorded {
     recorded
 }
 
-/// The plan file with its parameters declared in other orders: all of them for up to four
+/// Returns the plan file with its parameters declared in other orders: all orders for up to four
 /// parameters, all exchanges of two for more.
 fn reordered(text: &str) -> Vec<String> {
     let (parameters, rest): (Vec<&str>, Vec<&str>) =

@@ -1,7 +1,7 @@
-//! The cases, worked by hand in their problem files: the program must come to the same result.
+//! Cases that are solved by hand in their problem files. The program must have the same results.
 //!
-//! For each case the region is written down as inequalities, and the interval of each duration
-//! with the others nominal. The first is compared at many points, the second exactly.
+//! Each case gives the region as inequalities, and the interval of each duration with the others at
+//! their nominal values. The region is compared at many points, the intervals exactly.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -46,7 +46,7 @@ fn epsilon() -> Rational {
     Rational::new(1, 1000)
 }
 
-/// The plan with these left open; all durations if nothing is named.
+/// Returns the plan with these parameters; by default all durations.
 fn opened(task: &Task, plan: &TimeTriggeredPlan, vary: &[&str]) -> ParametrizedPlan {
     let specs: Vec<VarySpec> = vary
         .iter()
@@ -60,7 +60,7 @@ fn number(text: &str) -> Rational {
     text.parse().expect("a number")
 }
 
-/// How far the duration of the instance may deviate while all else is as planned.
+/// Returns the interval of an instance's duration with everything else as planned.
 fn alone(task: &Arc<Task>, time_triggered: &TimeTriggeredPlan, instance: usize) -> Interval {
     let vary = format!("duration n{instance}");
     let plan = Arc::new(opened(task, time_triggered, &[&vary]));
@@ -75,8 +75,8 @@ fn alone(task: &Arc<Task>, time_triggered: &TimeTriggeredPlan, instance: usize) 
     sharp.intervals()[0].clone()
 }
 
-/// Compares a case with what was worked out by hand: for each duration, in the order of the
-/// plan's actions by start, its interval with the others nominal; and the region.
+/// Compares a case with the results by hand: the interval of each duration with the others nominal,
+/// in the order of the plan's actions by start; and the region.
 fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) {
     let (task, plan) = read(case);
     let task = Arc::new(task);
@@ -89,7 +89,7 @@ fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) 
     let nominal: Vec<Rational> = opened.nominal().into_iter().collect();
     assert!(region(&nominal), "{case}: the nominal point");
     let mut oracle = Oracle::new(&task, &opened, Guarantee::Weak).expect("within exact reasoning");
-    // All points whose coordinates are these shares of the nominal ones, and just beyond zero.
+    // All points whose coordinates are these multiples of the nominal values, and just above zero.
     let shares = ["0", "1/3", "3/4", "1", "7/6", "3/2", "2"].map(number);
     let mut inside = 0;
     let mut outside = 0;
@@ -276,7 +276,7 @@ fn the_stn_file_of_the_delivery_means_the_same_as_its_plan() {
     let derived = Arc::new(opened(&task, &plan, &[]));
     let oracle = |plan| Oracle::new(&task, plan, Guarantee::Weak).unwrap();
     let (mut of_file, mut of_plan) = (oracle(&by_hand), oracle(&derived));
-    // The file leaves open first, second, handing and opening; the plan also the pick.
+    // The file has the parameters first, second, handing and opening; the plan also the pick.
     for (first, second, handing, opening) in [
         (10, 15, 3, 6),
         (20, 15, 3, 6),

@@ -1,4 +1,4 @@
-//! The tool that computes whole envelopes (CCMMZ): its examples, and the boxes it found in them.
+//! CCMMZ, the tool that computes whole envelopes: its examples, and its boxes in them.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -51,16 +51,17 @@ fn plans_that_it_finds_invalid_break_what_it_says() {
         let why_not = case.why_not("").expect("it is not valid");
         (broken.expect("it is not valid"), why_not.reason)
     };
-    // Refuelled from 4 on, the tank is full before the refuelling ends, with no happening inside.
+    // Refuelled from 4 on, the tank is full before the end of refuelling, with no happening in
+    // between.
     let (requirement, reason) = broken("bug1.stn");
     assert!(matches!(requirement, Requirement::OverAll { .. }));
     assert_eq!(
         reason,
         "(refuel gen tank1) needs (< (fuellevel gen) (capacity gen)) throughout"
     );
-    // Refuelled from 991 on, the generator has run dry. (The tool calls this an action condition:
-    // what must hold throughout is one of those on arrival at a happening inside the action, here
-    // the start of refuelling, and an invariant only between happenings.)
+    // Refuelled from 991 on, the generator is empty. (The tool calls this an action condition: at a
+    // happening inside the action, here the start of refuelling, it treats an over-all condition as
+    // an action condition, and as an invariant only between happenings.)
     let (requirement, reason) = broken("bug2.stn");
     assert!(matches!(requirement, Requirement::OverAll { .. }));
     assert_eq!(
@@ -101,7 +102,7 @@ fn the_running_example_of_the_paper_covers_a_distance_of_100_to_150() {
     assert!(case.has_inside("dur_n1=[10,35]"));
 }
 
-/// The distinct boxes of finished runs, with the instance's name.
+/// Returns the distinct boxes of finished runs, with the instance's name.
 fn recorded_boxes(data: &Path) -> BTreeSet<(String, String)> {
     let path = data.join("envelopes/paper_runs/aaai_runs.csv");
     let text = std::fs::read_to_string(&path).expect("the table of runs");

@@ -1,5 +1,4 @@
-//! The largest boxes come with certificates that `elbowroom verify` accepts, and it refuses what is
-//! changed in them.
+//! Certificates of the largest boxes: `elbowroom verify` accepts them, and rejects modified ones.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -113,7 +112,7 @@ fn certificates_of_all_cases_are_accepted() {
     assert!(accepted > 90);
 }
 
-/// What the claim is about, in an answer: the box, how good it is, and what no box exceeds.
+/// Claim of an answer: the box, its value, and the upper bound for all boxes.
 const CLAIM: [&str; 5] = [
     "/parameters",
     "/best/most",
@@ -122,7 +121,7 @@ const CLAIM: [&str; 5] = [
     "/best/certificate",
 ];
 
-/// Cases with certificates that have one of each kind of proof.
+/// Cases whose certificates contain each kind of proof.
 const CHANGED: [(&str, Guarantee, Objective); 13] = [
     ("delivery", Guarantee::Dynamic, Objective::LeastSlack),
     ("delivery", Guarantee::Dynamic, Objective::Widths),
@@ -139,8 +138,8 @@ const CHANGED: [(&str, Guarantee, Objective); 13] = [
     ("match", Guarantee::Strong, Objective::LeastSlack),
 ];
 
-/// What is changed and still accepted has to be a proof of what the answer then claims: where a bound
-/// of the network or of a way to fail leaves room, another number is as good.
+/// A modified certificate that is accepted must still be a proof of the answer's claim: if a bound
+/// of the network or of a failure has slack, another number is equally valid.
 #[test]
 fn each_number_that_is_changed_in_turn_makes_a_certificate_refused_or_leaves_it_a_proof() {
     let (mut count, mut still) = (0, 0);
@@ -179,7 +178,7 @@ fn each_number_that_is_changed_in_turn_makes_a_certificate_refused_or_leaves_it_
     println!("{count} numbers changed: {still} proofs stayed proofs");
 }
 
-/// A box that is a little too large is not proved to be inside by what proves it of the right one.
+/// The proof of the right box does not prove a box that is slightly too large.
 #[test]
 fn a_box_with_an_end_beyond_the_envelope_is_refused() {
     let (mut outside, mut inside) = (0, 0);
@@ -279,7 +278,7 @@ fn a_claim_that_says_more_than_is_proved_is_refused() {
     }
 }
 
-/// The places of all decimals beside an exact number.
+/// Finds the places of all decimals next to an exact number.
 fn decimals(value: &Value, place: &str, found: &mut Vec<String>) {
     match value {
         Value::Array(items) => {
@@ -336,7 +335,7 @@ fn a_bound_is_worth_what_is_gained_when_it_is_relaxed() {
         best.expect("a largest box")
     };
     for objective in [Objective::LeastSlack, Objective::Widths] {
-        // Early enough for the deadline to be what limits the least slack.
+        // Early enough for the deadline to limit the least slack.
         let (before, after) = (relaxed("35", objective), relaxed("36", objective));
         assert!(before.is_proved && after.is_proved);
         let deadline = before.worth.iter().find(|own| own.bound.contains("35"));
@@ -346,7 +345,7 @@ fn a_bound_is_worth_what_is_gained_when_it_is_relaxed() {
     }
 }
 
-/// A plan of which all is told, and what is left open in it.
+/// Returns the answer and the certificate for a plan given as text, with some parameters.
 fn told_box(
     [domain, problem, plan]: [&str; 3],
     vary: &[&str],
@@ -398,7 +397,7 @@ fn durations_that_may_be_neither_short_nor_long_take_schedules_for_both_ends() {
         .iter()
         .filter(|case| matches!(case, Schedules::Split { .. }));
     assert!(splits.count() > 0, "{cases:?}");
-    // None of the cases can do without another one.
+    // Each of the cases is needed.
     for place in 0..cases.len() {
         let mut fewer = cases.clone();
         fewer.remove(place);
@@ -444,7 +443,7 @@ fn rates_that_are_multiplied_by_times_are_looked_at_at_both_ends() {
                 .iter()
                 .all(|way| way.sums.len() == 1 << way.corners.len())
         );
-        // A sum for one end only is none for both.
+        // A sum for one end is not a proof for both.
         let mut broken = certificate.clone();
         let conditions = broken
             .sound
@@ -468,7 +467,7 @@ fn rates_that_are_multiplied_by_times_are_looked_at_at_both_ends() {
     }
 }
 
-/// Ends a search after some steps.
+/// Watcher that ends a search after some steps.
 struct Patience(usize);
 
 impl Watcher for Patience {
@@ -481,8 +480,8 @@ impl Watcher for Patience {
     }
 }
 
-/// Searches a published plan, and checks the certificate: accepted, with how many assumptions, in
-/// how many seconds.
+/// Searches a published plan, and checks that its certificate is accepted. Prints the number of
+/// assumptions and the time.
 #[allow(
     clippy::disallowed_methods,
     reason = "how long a check takes is worth seeing"
@@ -553,7 +552,7 @@ fn certificates_of_published_plans_are_accepted() {
     println!("{kinds:?}");
 }
 
-/// How many proofs of each kind there are: a test that has none of a kind says nothing about it.
+/// Number of proofs of each kind. Each kind must occur for the test to cover it.
 #[derive(Debug, Default)]
 struct Kinds {
     bounds: usize,

@@ -1,4 +1,4 @@
-//! Plans that are chosen for their probability, or for their slack, among many.
+//! Choice among many plans by their probability or their slack.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::collections::BTreeSet;
@@ -52,12 +52,12 @@ fn settings() -> RunSettings {
     }
 }
 
-/// The choice for an executor in a world of `experiments`.
+/// Returns the choice for an executor in a world of `experiments`.
 fn chosen(name: &str, executor: &str) -> (Arc<Task>, WorldModel, Choice) {
     chosen_within(u64::MAX, 1, name, executor)
 }
 
-/// The same with a planning budget, and with this number of threads.
+/// Returns the choice with a planning budget and a number of threads.
 fn chosen_within(
     work: u64,
     threads: usize,
@@ -89,7 +89,7 @@ fn chosen_within(
     (task, world, choice)
 }
 
-/// In how many of so many runs of its own the goal is reached, beginning with a plan.
+/// Counts in how many of `runs` runs the goal is reached, starting with a plan.
 fn count(task: &Arc<Task>, world: &WorldModel, plan: &TimeTriggeredPlan, runs: u64) -> u64 {
     let reaches = |seed: &u64| {
         let task = Arc::new(task.with_own_table());
@@ -203,8 +203,8 @@ fn candidates_are_valid_differ_from_each_other_and_are_the_same_each_time() {
     }
 }
 
-/// A workpiece draws on the battery, more often than not more than planned. The shortest plan begins
-/// with what charge there is; it can also be filled up first, at next to no time.
+/// A workpiece often consumes more charge than planned. The shortest plan starts with the initial
+/// charge. The battery can also be filled first, which takes almost no time.
 #[test]
 fn where_amounts_vary_a_plan_is_made_for_less_than_planned() {
     let folder = "experiments/table2";
@@ -271,10 +271,10 @@ fn the_estimate_agrees_with_a_count_of_other_runs() {
     }
 }
 
-/// The actions of a plan, and what is said of it.
+/// Actions of a plan, and a remark about it.
 type Remarked = (Vec<String>, Option<String>);
 
-/// Keeps the first plan that a run is given by its planner.
+/// Recorder of the first plan of a run.
 #[derive(Clone, Default)]
 struct First(Arc<Mutex<Option<Remarked>>>);
 
@@ -356,7 +356,7 @@ fn without_a_clock_the_choice_is_by_the_exact_probability() {
         goes_on: &|| true,
     };
     let choice = chooser.choose(&task, &Situation::initial(&task)).unwrap();
-    // By hand: all else is certain, and one grasps once.
+    // By hand: everything else is certain, and there is one grasp.
     assert_eq!(choice.value, Value::Exact(0.98));
     assert_eq!(choice.shortest, Value::Exact(0.4));
     let request = OddsRequest {
@@ -372,7 +372,7 @@ fn without_a_clock_the_choice_is_by_the_exact_probability() {
     assert!((odds.order.probability - 0.98).abs() < 1e-12);
 }
 
-/// Ends a search after so many questions.
+/// Watcher that ends a search after this number of polls.
 struct Impatient(usize);
 
 impl Watcher for Impatient {
@@ -410,7 +410,7 @@ fn where_the_shortest_plan_has_no_slack_a_longer_one_is_chosen() {
     let task = task("cases/crossing");
     let outcome = best(&task, PlanAim::Slack, &mut Unwatched);
     let choice = choice(&outcome);
-    // As worked by hand in the problem.
+    // Computed by hand in the problem file.
     let worth = |slack: Rational| PlanWorth::Slack { slack };
     assert_eq!(choice.value, worth(Rational::new(2999, 7000)));
     assert_eq!(choice.shortest, worth(Rational::ZERO));
@@ -467,7 +467,7 @@ fn a_plan_made_for_its_probability_works_as_often_as_is_said() {
         panic!("it was tried out");
     };
     let (least, most) = interval.unwrap();
-    // Without new plans: both careful moves succeed, and the drives are not too long.
+    // Without replanning: both careful moves succeed, and the drives are not too long.
     assert!(
         least > 0.85 && most <= 0.98_f64.powi(2) + 0.02,
         "{choice:?}"

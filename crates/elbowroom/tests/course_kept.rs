@@ -1,5 +1,5 @@
-//! Constraints on the course of a plan hold in every schedule of its network: the judge says so of
-//! schedules drawn at random.
+//! Trajectory constraints of a plan hold in every schedule of its network. The validator checks
+//! random schedules.
 
 #![allow(clippy::unwrap_used, reason = "the helpers of a test are part of it")]
 
@@ -38,8 +38,9 @@ const FORMS: [&str; 12] = [
     "(hold-after {t} (or (p) (not (r))))",
 ];
 
-/// A problem with actions that each change some facts at their start and end, one constraint, and a
-/// plan for it. The executor chooses durations, or the domain fixes them to those of the plan, so that the world does.
+/// Returns a problem with one constraint and actions that each change some facts at their start and
+/// end, and a plan for it. The executor chooses durations, or the domain fixes them to those of the
+/// plan, so that the world chooses them.
 fn case(form: &str, is_fixed: bool, rng: &mut ChaCha8Rng) -> (Task, String) {
     let mut domain = "(define (domain d) (:predicates (p) (q) (r))\n".to_owned();
     let mut plan = String::new();
@@ -85,7 +86,7 @@ fn case(form: &str, is_fixed: bool, rng: &mut ChaCha8Rng) -> (Task, String) {
     (Task::new(read_problem(&domain, &problem).unwrap().0), plan)
 }
 
-/// A schedule: the nodes, in random order, take an end of their window or a time within.
+/// Draws a schedule: in random order, each node gets an end of its window or a time within.
 fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     let zero = network_node(NodeId::ZERO);
     let network = ConsistentNetwork::try_from(plan.network(&Valuation::default()));
@@ -131,7 +132,7 @@ fn a_constraint_on_the_course_holds_in_every_schedule() {
                 if let Verdict::Invalid(why) = judge(&deordered.plan.scheduled(&schedule)) {
                     panic!("{form}\n{text}{why}");
                 }
-                // Without the constraints between happenings, it would not.
+                // It would be invalid without the constraints between happenings.
                 let schedule = draw(&free, &mut rng);
                 needed += usize::from(!judge(&free.scheduled(&schedule)).is_valid());
             }
@@ -141,8 +142,7 @@ fn a_constraint_on_the_course_holds_in_every_schedule() {
     assert!(needed > 100, "{needed}");
 }
 
-/// Whatever values a plan's durations take in its box, and whatever schedule they leave, the
-/// constraint is kept.
+/// The constraint holds for all durations in the box, and for all their schedules.
 #[test]
 fn a_constraint_on_the_course_holds_throughout_the_box() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -174,7 +174,7 @@ fn a_constraint_on_the_course_holds_throughout_the_box() {
                 let schedule = schedule.unwrap_or_else(|| panic!("{form}\n{text}"));
                 let verdict = validate(&task, &fixed.scheduled(&schedule), &Settings::default());
                 assert!(verdict.is_valid(), "{form}\n{text}{verdict:?}");
-                // Without the constraints between happenings, some would be broken.
+                // Some would be invalid without the constraints between happenings.
                 let mut loose = fixed.clone();
                 loose.constraints.retain(|one| one.reason != Reason::Course);
                 if let Some(schedule) = shared::draw::schedule(&loose, &valuation, &mut rng) {

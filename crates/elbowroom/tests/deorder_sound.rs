@@ -1,5 +1,5 @@
-//! Every schedule of a deordered plan is a valid plan: the soundness check says so, also of those plans that
-//! are made ready without it; and the judge, of schedules drawn at random.
+//! Every schedule of a deordered plan is a valid plan. This is checked by the soundness check, also
+//! for plans that are prepared without it, and by the validator for random schedules.
 
 #![allow(
     clippy::print_stdout,
@@ -31,10 +31,11 @@ use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A schedule of the plan: some nodes, in random order, take a time in their window, often one of
-/// its ends; all others are as early, or as late, as they can be then.
+/// Draws a schedule: in random order, some nodes get a time in their window, often one of its ends.
+/// All others are then as early, or as late, as possible.
 fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
-    /// Looking up windows takes time; of large plans, not all nodes need it.
+    /// Maximum number of nodes with a random time. Computing windows is slow, and large plans do
+    /// not need all nodes.
     const MOST: usize = 40;
     let zero = network_node(NodeId::ZERO);
     let network = ConsistentNetwork::try_from(plan.network(&Valuation::default()));
@@ -69,7 +70,7 @@ fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     schedule.into()
 }
 
-/// What the judge objects to in a schedule of the plan.
+/// Returns the validator's objection to a schedule of the plan.
 fn objection(task: &Task, plan: &StnPlan, schedule: &Schedule) -> Option<String> {
     let fixed: TimeTriggeredPlan = plan.scheduled(schedule);
     match validate(task, &fixed, &Settings::default()) {
@@ -79,7 +80,7 @@ fn objection(task: &Task, plan: &StnPlan, schedule: &Schedule) -> Option<String>
     }
 }
 
-/// With all durations left open, the nominal schedule is one at the nominal values.
+/// With all durations as parameters, the nominal schedule is one at the nominal values.
 fn assert_parametrized(task: &Task, deordered: &Deordered) {
     let Deordered { plan, nominal, .. } = deordered.clone();
     let open = parametrize(task, plan, &nominal, &[]).unwrap_or_else(|error| panic!("{error}"));
@@ -87,8 +88,8 @@ fn assert_parametrized(task: &Task, deordered: &Deordered) {
     assert!(elbowroom_stn::Schedule::from(nominal).holds_in(&network));
 }
 
-/// Domain, problem and plan of each line of `plans.csv` whose plan is valid when VAL is called with
-/// a tolerance of a thousandth.
+/// Returns domain, problem and plan of each line of `plans.csv` whose plan is valid by VAL with a
+/// tolerance of a thousandth.
 fn valid_plans(data: &Path) -> Vec<[PathBuf; 3]> {
     let data = data.join("pddl");
     let table = std::fs::read_to_string(data.join("plans.csv")).unwrap();
@@ -100,7 +101,7 @@ fn valid_plans(data: &Path) -> Vec<[PathBuf; 3]> {
         .collect()
 }
 
-/// Domain, problem and plan of what stands beside the authors' STN plan files.
+/// Returns domain, problem and plan of the plans next to the authors' STN plan files.
 fn plans_of_the_authors(data: &Path) -> Vec<[PathBuf; 3]> {
     let auv = data.join("envelopes/auv");
     let generators = data.join("envelopes/generator_linear");
@@ -133,11 +134,11 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Whether deordering is said to keep all that the plan reads, and it is not long: then its envelope, which is
-/// worked out without a look at its conditions when it is made ready, is the one for which each of them was
-/// looked at.
+/// Compares two envelopes of a short plan whose deordering is said to preserve all conditions. When
+/// such a plan is prepared, its envelope is computed without the conditions. It must equal the
+/// envelope with a check of each condition. Returns `false` for other plans.
 fn same_envelope(task: &Task, plan: &TimeTriggeredPlan, name: &str) -> bool {
-    /// Looking at each condition takes time that grows with the square.
+    /// Maximum length of a plan, because the check of each condition takes quadratic time.
     const LONG: usize = 60;
     let task = Arc::new(task.clone());
     let settings = flow::Settings {
@@ -156,7 +157,7 @@ fn same_envelope(task: &Task, plan: &TimeTriggeredPlan, name: &str) -> bool {
         irr(&mut oracle?, &settings, &mut |_| ControlFlow::Continue(()))
     };
     for guarantee in Guarantee::ALL {
-        // One box after the other, and all at once where that is right: the same steps.
+        // One box after the other, and all at once where that is valid: the same steps.
         let asked = search(Oracle::new(&task, &open, guarantee));
         let of_times = search(Oracle::of_times(&task, &open, guarantee));
         let (Ok(asked), Ok(of_times)) = (asked, of_times) else {
@@ -173,7 +174,7 @@ fn same_envelope(task: &Task, plan: &TimeTriggeredPlan, name: &str) -> bool {
     true
 }
 
-/// How many schedules are drawn of each plan.
+/// Number of random schedules for each plan.
 const DRAWS: usize = 50;
 
 #[derive(Default)]
@@ -187,8 +188,8 @@ struct Count {
     failures: Vec<String>,
 }
 
-/// The deordered plan is sound at the nominal point, its nominal schedule is one of it, and the
-/// judge accepts that one and others drawn at random.
+/// Checks that the deordered plan is sound at the nominal point, that its nominal schedule belongs
+/// to it, and that the validator accepts this and other random schedules.
 fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, count: &mut Count) {
     let name = plan_file.display();
     let Ok(task) = shared::task(domain, problem) else {
@@ -266,7 +267,7 @@ fn examine_all(plans: &[[PathBuf; 3]]) -> Count {
     count
 }
 
-/// Domain, problem and plan of the cases that come with the project.
+/// Returns domain, problem and plan of the cases that come with the project.
 fn our_plans() -> Vec<[PathBuf; 3]> {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
     let folders = files(&cases).into_iter();

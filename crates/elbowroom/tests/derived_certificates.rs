@@ -1,5 +1,5 @@
-//! Certificates checked against the network and the conditions that the checker derives from domain,
-//! problem and plan: correct ones are accepted, and changed ones are rejected.
+//! Certificates checked against the network and the conditions that the checker derives from
+//! domain, problem and plan: correct ones are accepted, and modified ones are rejected.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -53,7 +53,8 @@ fn answer(
     answer_for(task, plan, (guarantee, objective), &[])
 }
 
-/// The answer if these quantities may deviate; by default the durations that the domain fixes.
+/// Returns the answer with these quantities as parameters; by default the durations that the domain
+/// fixes.
 fn answer_for(
     task: &Arc<Task>,
     plan: &(impl Clone + Into<AnyPlan>),
@@ -81,7 +82,7 @@ fn request(
     request
 }
 
-/// The answer, if it has a certificate.
+/// Returns the answer, if it has a certificate.
 fn answered(request: &EnvelopeRequest) -> Option<Value> {
     let outcome = envelope(request, &mut Unwatched).ok()?;
     let answer = serde_json::to_value(&outcome.answer).expect("a document");
@@ -135,7 +136,7 @@ fn true_certificates_of_plans_that_need_orders_alone_are_accepted() {
     assert!(accepted >= 30, "{accepted}");
 }
 
-/// Problems whose conditions read numbers that depend on times and durations.
+/// Returns problems whose conditions read numbers that depend on times and durations.
 fn of_numbers() -> Vec<(&'static str, (Arc<Task>, TimeTriggeredPlan))> {
     let own = numbers_that_change::ALL.iter();
     let own = own.map(|(name, (domain, problem, plan))| (*name, read(domain, problem, plan)));
@@ -247,7 +248,7 @@ fn certificate_without_its_conditions_or_of_another_decimal_is_not_accepted() {
                 "{name}: {verdict:?}"
             );
         }
-        // All that is said of conditions may be absent, as long as the checker can refute all failures itself.
+        // All proofs about conditions may be missing if the checker can refute all failures itself.
         let mut bare = answer.clone();
         bare["best"]["certificate"]["sound"]["conditions"] = json!([]);
         let certificate: Certificate =
@@ -261,7 +262,8 @@ fn certificate_without_its_conditions_or_of_another_decimal_is_not_accepted() {
     assert!(count >= 5, "{count}");
 }
 
-/// Each accepted certificate of a problem is one of each changed problem for which the checker accepts it.
+/// If the checker accepts a certificate for a modified problem, the answer for the modified problem
+/// has the same claim.
 #[test]
 fn certificate_of_a_changed_problem_is_accepted_only_if_it_claims_the_same() {
     let (mut count, mut same) = (0, 0);
@@ -401,7 +403,7 @@ fn certificate_is_not_accepted_once_such_a_number_limits_the_box() {
         }
     }
     assert!(refused >= 3, "{refused}");
-    // A quotient has no value for some duration.
+    // The quotient is undefined for some duration.
     let quotient = WORKSHOP.replace("(+ 1 ?duration)", "(/ 1 ?duration)");
     let (task, plan) = read(&quotient, WORKSHOP_PROBLEM, WORKSHOP_PLAN);
     let verdict = verify_answer_of(&text, &task, &plan);
@@ -418,7 +420,7 @@ fn certificate_of_another_plan_or_problem_is_refused() {
     let text = answer.to_string();
     verify_answer_of(&text, &task, &plan).expect("it is that of this plan");
     let others = [
-        // Actions of equal durations change places.
+        // Actions of equal durations are exchanged.
         (
             DOMAIN.to_owned(),
             PROBLEM.to_owned(),

@@ -1,4 +1,4 @@
-//! The documents name only files that exist.
+//! The documents mention only files that exist.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,8 +7,8 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// All Markdown files at the root and under `docs`, and the chapters of the tutorial, which stand
-/// in the packages that compile them.
+/// Returns all Markdown files at the root and under `docs`, and the chapters of the tutorial in the
+/// packages that compile them.
 fn documents() -> Vec<PathBuf> {
     let folders = ["docs", "crates/elbowroom/docs", "crates/laboratory/docs"];
     let mut folders: Vec<PathBuf> = folders.map(|folder| root().join(folder)).into();
@@ -34,7 +34,7 @@ fn markdown_in(folder: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// The targets of `[text](target)` that are not on the web.
+/// Returns the targets of `[text](target)` that are not URLs.
 fn links(text: &str) -> Vec<&str> {
     text.split("](")
         .skip(1)
@@ -44,7 +44,7 @@ fn links(text: &str) -> Vec<&str> {
         .collect()
 }
 
-/// Words in backquotes that look like paths from the root.
+/// Returns words in backquotes that look like paths from the root.
 fn paths(text: &str) -> Vec<&str> {
     let quoted = text.split('`').skip(1).step_by(2);
     quoted
@@ -74,8 +74,8 @@ fn links_and_paths_in_documents_lead_somewhere() {
     assert!(missing.is_empty(), "{}", missing.join("\n"));
 }
 
-/// What a package carries has to be in its folder. Links to files elsewhere do not survive every
-/// way in which a repository is copied, so these are files of their own, the same everywhere.
+/// A package must contain all of its files. Links to files outside are lost when a repository is
+/// copied in some ways, so the licences are identical copies.
 #[test]
 fn every_package_carries_the_licences_word_for_word() {
     let crates = fs::read_dir(root().join("crates")).expect("the folder of crates");

@@ -7,7 +7,7 @@ use elbowroom::execution::executors::EXECUTORS;
 const BEGIN: &str = "<!-- from the list of executors: begin -->\n";
 const END: &str = "<!-- end -->";
 
-/// `ELBOWROOM_UPDATE_DOCS=1 cargo test -p elbowroom --test executors_page` writes the list anew.
+/// `ELBOWROOM_UPDATE_DOCS=1 cargo test -p elbowroom --test executors_page` updates the list.
 #[test]
 fn the_page_lists_the_executors_as_they_are_registered() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/executors.md");

@@ -1,5 +1,5 @@
-//! What is exported says the same to others as the box check says here: z3 for boxes and regions,
-//! the readers of networks for STNUs.
+//! Exported files give the same results in other programs as the box check: in z3 for boxes and
+//! regions, and in the readers of networks for STNUs.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -43,10 +43,10 @@ const CASES: [&str; 7] = [
     "tank",
 ];
 
-/// The seconds that z3 has for one text.
+/// Time limit of z3 for one text, in seconds.
 const SECONDS: u64 = 10;
 
-/// What z3 says, line by line; `None` where there is no z3.
+/// Returns the output of z3, line by line, or `None` if z3 is not installed.
 fn z3(text: &str) -> Option<Vec<String>> {
     let mut child = Command::new("z3")
         .args([&format!("-T:{SECONDS}"), "-in"])
@@ -62,7 +62,7 @@ fn z3(text: &str) -> Option<Vec<String>> {
     Some(output.lines().map(str::to_owned).collect())
 }
 
-/// Whether all questions are answered `unsat`; `None` if z3 could not tell in time.
+/// Returns `true` if all queries are `unsat`, or `None` if z3 reached its time limit.
 fn is_unsat(text: &str) -> Option<bool> {
     let answers = z3(text).expect("z3 was there a moment ago");
     let questions = text.matches("(check-sat)").count();
@@ -87,7 +87,7 @@ fn has_z3() -> bool {
     has
 }
 
-/// A case of this repository.
+/// Returns a case of this repository.
 fn case(name: &str) -> (Arc<Task>, AnyPlan) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../../cases")
@@ -102,11 +102,11 @@ fn case(name: &str) -> (Arc<Task>, AnyPlan) {
     (task, plan.expect("a plan without mistakes").0.into())
 }
 
-/// The same verdict in each format that others read.
+/// Returns the verdict, which must be the same in each exported format.
 fn is_controllable(file: &NetworkFile) -> bool {
     let json = write_json(file);
     let (whole, _) = file.in_whole_numbers().expect("small numbers");
-    // Links without an upper bound have no place in the other formats.
+    // The other formats have no links without an upper bound.
     let is_bounded = whole
         .network
         .links()
@@ -131,7 +131,7 @@ fn is_controllable(file: &NetworkFile) -> bool {
     verdicts[0]
 }
 
-/// What others say about a box.
+/// Returns the verdicts of other programs on a box.
 fn others(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -153,17 +153,17 @@ fn others(
     verdict
 }
 
-/// How often they agreed.
+/// Numbers of agreeing verdicts.
 #[derive(Debug, Default)]
 struct Tally {
     inside: usize,
     outside: usize,
-    /// What z3 could not tell in time.
+    /// Queries on which z3 reached its time limit.
     open: Vec<String>,
 }
 
 impl Tally {
-    /// Compares a box, and the boxes with one end further out.
+    /// Compares a box, and the boxes with one end moved outwards.
     fn compare(
         &mut self,
         name: &str,
@@ -198,7 +198,7 @@ impl Tally {
     }
 }
 
-/// The plan of a request and its envelope.
+/// Returns the plan of a request and its envelope.
 fn found(request: &EnvelopeRequest) -> Option<(Arc<ParametrizedPlan>, DecoupledEnvelope)> {
     let outcome = envelope(request, &mut Unwatched).expect("within exact reasoning");
     let plan = opened(request).expect("a plan");
@@ -239,7 +239,7 @@ fn z3_and_readers_of_networks_agree_with_the_box_check_on_published_plans() {
         ("robot deliveries", figure_4(&data)),
     ] {
         let mut tally = Tally::default();
-        // A slice: each fifth.
+        // A sample: each fifth.
         for instance in instances.iter().step_by(5) {
             let case = Case::read(&instance.domain, &instance.problem, &instance.plan);
             for guarantee in GUARANTEES {
@@ -263,8 +263,9 @@ fn z3_and_readers_of_networks_agree_with_the_box_check_on_published_plans() {
     }
 }
 
-/// How many random points z3 and the box check put into a region, and how many they leave out; they
-/// agree on each but those that z3 did not decide about in time, which come last.
+/// Compares z3 and the box check at random points of a region. Returns the numbers of points
+/// inside, of points outside, and of those on which z3 reached its time limit. They agree on all
+/// others.
 fn points_agree(
     name: &str,
     (task, plan): (&Arc<Task>, &Arc<ParametrizedPlan>),
@@ -282,7 +283,7 @@ fn points_agree(
     let mut counts = [0; 3];
     let mut left = points;
     while left > 0 {
-        // Several points to one process.
+        // Several points for each process.
         let some = left.min(50);
         left -= some;
         let mut ours = Vec::new();
@@ -341,7 +342,7 @@ fn the_region_has_a_point_exactly_if_the_plan_works_there() {
     assert!(counts[0] > 10 && counts[1] > 10 && counts[2] == 0);
 }
 
-/// With `ELBOWROOM_POINTS`, so many points of each plan; otherwise a few of each fifth.
+/// `ELBOWROOM_POINTS` sets the number of points of each plan; by default, a few of each fifth.
 #[test]
 fn z3_has_the_same_points_in_the_regions_of_published_plans() {
     let Some(data) = shared::data() else { return };

@@ -1,4 +1,4 @@
-//! Boxes that the authors' tool was seen to find, and borders known in closed form.
+//! Boxes found by the authors' tool, and borders with a closed form.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -9,14 +9,14 @@ use std::path::{Path, PathBuf};
 use elbowroom::parse_box;
 use shared::case::{Case, number};
 
-/// A run of the authors' tool.
+/// Run of the authors' tool.
 struct Run {
-    /// Below the folder of benchmarks.
+    /// Path below the folder of benchmarks.
     domain: &'static str,
     problem: &'static str,
     plan: &'static str,
     precision: &'static str,
-    /// The box it ended with.
+    /// Its final box.
     found: &'static str,
 }
 
@@ -76,7 +76,7 @@ const RCLL_4: Run = Run {
     ..RCLL
 };
 
-/// The deadline of the plan lowered below that of the problem.
+/// The deadline of the plan is lowered below that of the problem.
 const DELIVERY: Run = Run {
     domain: "golden_reference_runs/robot_delivery/domain_robot_delivery_goto_relaxed.pddl",
     problem: "robot_delivery/scalability/problems_deadline/problem_g01_w04_ROSPlan.pddl",
@@ -85,7 +85,7 @@ const DELIVERY: Run = Run {
     found: "dur_1=[0,1975/32] dur_2=[0,1975/32] dur_3=[0,1000] dur_4=[0,130] dur_5=[0,3965/4]",
 };
 
-/// The plan as the authors' tool made it, and the start point that it printed.
+/// Plan made by the authors' tool, and the initial point that it printed.
 const LATE_DELIVERY: Run = Run {
     plan: "robot_delivery/scalability/stn_params_deadline/\
            STN_plan_problem_g01_w04_ROSPlan.stn",
@@ -164,8 +164,8 @@ fn a_start_point_after_its_deadline_is_refused_with_the_late_literal() {
 #[test]
 fn refuelling_takes_what_the_fuel_and_the_tank_allow() {
     let Some(envelopes) = envelopes() else { return };
-    // 990 in the tank and 4 a unit of time make the 1000 that are burnt, from 10/4 on. Started at
-    // 5, with 985 in a tank for 1000, the level rises by 3 for 5 at most.
+    // With 990 in the tank, a rate of 4 makes the burnt 1000 from 10/4 on. Started at 5, with 985
+    // in a tank for 1000, the level rises by 3 for 5 at most.
     assert_eq!(GENERATOR.read(&envelopes).limits(), "dur_r=[5/2,5]");
 }
 
@@ -179,8 +179,8 @@ fn refuelling_at_once_waits_for_room_and_comes_before_the_tank_is_empty() {
 #[test]
 fn two_durations_share_the_time_before_a_literal() {
     let Some(envelopes) = envelopes() else { return };
-    // At worst 4 + n1 + 4 + 10 + 1 + cs1 have passed when the transmission ends. It needs the link
-    // throughout, that is before its end, so the end may fall on 45, when the link is lost.
+    // In the worst case, the transmission ends at 4 + n1 + 4 + 10 + 1 + cs1. It needs the link
+    // throughout, that is before its end, so the end may be at 45, when the link is lost.
     let case = TILS.read(&envelopes);
     for (first, second) in [("10", "16"), ("10.5", "15.5"), ("11", "15")] {
         let sum = number(first) + number(second);
@@ -199,7 +199,7 @@ fn two_durations_share_the_time_before_a_literal() {
             "(transmitsample s1) needs (transmissionavailable) throughout"
         );
     }
-    // The goal asks for a distance of 100, all of it: 5 times 10 at speed 2.
+    // The goal requires a distance of 100: 5 times 10 at speed 2.
     let why_not = case.why_not("dur_n1=[9.9999,10]").expect("too short");
     assert_eq!(
         why_not.reason,
@@ -210,8 +210,8 @@ fn two_durations_share_the_time_before_a_literal() {
 #[test]
 fn production_lasts_until_the_deadline_less_everything_around_it() {
     let Some(envelopes) = envelopes() else { return };
-    // Collecting, two drives before, stacking and two more drives take 180; seven separations
-    // stand in the plan between them (an eighth between the starts of both productions).
+    // Collecting, two drives before, stacking and two more drives take 180. The plan has seven
+    // separations between them (an eighth between the starts of both productions).
     let deadline = number("419.389474");
     let upper = &deadline - number("180.007");
     assert_eq!(RCLL.read(&envelopes).limits(), format!("dur_0=[0,{upper}]"));
@@ -220,8 +220,8 @@ fn production_lasts_until_the_deadline_less_everything_around_it() {
         RCLL_2.read(&envelopes).limits(),
         format!("dur_0=[0,{second}] dur_1=[0,{upper}]")
     );
-    // As the domain fixes them, the recorded runs kept the third and the fourth production at 150
-    // and 140. What is a parameter is free of its domain here.
+    // The recorded runs kept the third and the fourth production at 150 and 140, as the domain
+    // fixes them. Here a parameter is not constrained by its domain.
     let third = &second - number("0.001");
     let fourth = &third - number("0.001");
     assert_eq!(

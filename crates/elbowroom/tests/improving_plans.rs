@@ -1,4 +1,4 @@
-//! Plans as they are found.
+//! Plans reported during the search.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::ops::ControlFlow;
@@ -35,7 +35,7 @@ fn request(task: &Arc<Task>) -> ImprovingPlansRequest<'_> {
     }
 }
 
-/// By what plans are compared where the metric is to be small.
+/// Returns the values by which plans are compared if the metric is minimized.
 fn value(better: &BetterPlan) -> (Rational, Rational) {
     let PlanFinding::Plan {
         makespan, metric, ..
@@ -60,7 +60,7 @@ fn each_plan_is_valid_and_strictly_better_than_the_one_before() {
             let verdict = validate(&task, &better.plan, &Settings::default());
             assert!(matches!(verdict, Verdict::Valid(_)), "{name}: {verdict:?}");
         }
-        // The answer is the last one, and that of a search without a listener.
+        // The answer is the last plan, and the same as without a listener.
         let outcome = search.answer().unwrap().as_ref().unwrap();
         assert_eq!(
             outcome.plan,
@@ -87,7 +87,7 @@ fn where_there_is_a_better_plan_there_is_more_than_one() {
     assert!(search.unwrap().count() > 1);
 }
 
-/// Is there for as long as the search.
+/// Watcher that lives as long as the search.
 struct Attached(Arc<()>);
 
 impl Watcher for Attached {
@@ -110,7 +110,7 @@ fn a_search_ends_when_nobody_wants_its_plans_any_more() {
     }
 }
 
-/// Wants nothing.
+/// Watcher that ends the search at once.
 struct Impatient;
 
 impl Watcher for Impatient {

@@ -1,5 +1,5 @@
-//! Small plans of the kinds in which it is easy to promise something wrong: the judge, deordering,
-//! the box check and the nominal schedule, in whatever order the lines of the plan stand.
+//! Small plans of kinds with frequent errors in guarantees. The tests cover the validator,
+//! deordering, the box check and the nominal schedule for any order of the lines of the plan.
 
 mod kinds;
 
@@ -23,7 +23,7 @@ fn judge(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
     validate(task, plan, &elbowroom::model::validate::Settings::default())
 }
 
-/// The plan with all durations left open, and its nominal schedule.
+/// Returns the plan with all durations as parameters, and its nominal schedule.
 fn opened(task: &Task, plan: &TimeTriggeredPlan) -> (Arc<ParametrizedPlan>, Schedule) {
     let freed = flow::free(task, plan).expect("a valid plan");
     let nominal = freed.nominal.clone();
@@ -39,8 +39,8 @@ fn is_inside(kind: &Kind, guarantee: Guarantee, text: &str) -> bool {
     oracle.objection(&envelope).expect("few cases").is_none()
 }
 
-/// Some schedules for values in the box: at its corners and inside, each as early or as late as can
-/// be, or with some times drawn.
+/// Returns some schedules for values in the box: at its corners and inside, each as early or as
+/// late as possible, or with some random times.
 fn schedules(
     open: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,
@@ -170,8 +170,8 @@ fn each_kind_has_an_envelope_that_the_judge_accepts_and_that_holds_the_plan() {
     }
 }
 
-/// Widening one end of one interval after the other, against an oracle that knows nothing of the
-/// box before.
+/// Widens one end after the other. An oracle with a cache agrees with one without knowledge of
+/// earlier boxes.
 #[test]
 fn an_oracle_that_remembers_says_what_one_says_that_does_not() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
@@ -210,7 +210,7 @@ fn an_oracle_that_remembers_says_what_one_says_that_does_not() {
     assert!(counts.iter().all(|&count| count > 200), "{counts:?}");
 }
 
-/// All orders of the lines of a plan.
+/// Returns all orders of the lines of a plan.
 fn orders(lines: &[&str]) -> Vec<String> {
     if lines.is_empty() {
         return vec![String::new()];
@@ -228,7 +228,8 @@ fn orders(lines: &[&str]) -> Vec<String> {
     all
 }
 
-/// What is done, in the order in which deordering numbers it. (Facts are numbered as they are met.)
+/// Returns the names of the actions, in the order of their numbers after deordering. (Facts are
+/// numbered in the order of their first use.)
 fn names(plan: &ParametrizedPlan) -> Vec<&str> {
     let instances = plan.plan.instances.iter();
     instances
@@ -264,7 +265,7 @@ fn nothing_ties_ends_together_that_do_not_need_each_other() {
     for kind in kinds() {
         let (task, plan) = kind.read();
         let (open, _) = opened(&task, &plan);
-        // Free of what durations are at present, no two ends coincide in all schedules.
+        // Without the nominal durations, no two ends coincide in all schedules.
         let mut network = elbowroom::stn::Network::with_nodes(open.plan.nodes.len());
         for constraint in &open.plan.constraints {
             let (from, to) = (network_node(constraint.from), network_node(constraint.to));
@@ -297,9 +298,9 @@ fn nothing_ties_ends_together_that_do_not_need_each_other() {
     }
 }
 
-/// Two chains of actions, the one the other's mirror image: each action takes as long as its
-/// namesake in the other chain, whatever that is, so both chains end together. A box does not show
-/// that before it has been taken apart at every duration.
+/// Returns a plan with two parallel chains of actions. Corresponding actions have the same
+/// parameter as their duration, so both chains end together. To prove that, a box must be split at
+/// every duration.
 fn twin_chains(count: usize) -> String {
     let mut lines = Vec::new();
     for index in 0..count {
@@ -367,7 +368,7 @@ fn a_number_in_a_continuous_decrease_is_left_open_as_it_is_written() {
     assert_eq!(open.nominal(), Valuation::new(vec![Rational::ONE]));
     assert!(opened("constant work charge 1 shared").is_ok());
     assert!(opened("constant work charge -1 shared").is_err());
-    // Three jobs of 10 each, and 39 to spend.
+    // Three jobs of 10 each, and a budget of 39.
     let mut oracle = Oracle::new(&task, &open, Guarantee::Weak).expect("within reach");
     for (text, expected) in [("[0,13/10]", true), ("[1/2,1301/1000]", false)] {
         let name = &open.parameters[0].name;

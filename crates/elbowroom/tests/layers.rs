@@ -1,11 +1,11 @@
-//! Which crates of the workspace each crate may import.
+//! Permitted dependencies between the crates of the workspace.
 //!
-//! Cargo forbids circles between crates but not a wrong direction; this table does. It is the
-//! table of ARCHITECTURE.md: change both together, and give the reason there.
+//! Cargo forbids cyclic dependencies, but does not check layers; this table does. It is the table
+//! of ARCHITECTURE.md. Change both together, and give the reason there.
 //!
-//! `[dependencies]`, `[build-dependencies]` and their `[target.….…]` forms count. So does what a
-//! crate imports under another name. `[dev-dependencies]` do not: a test may look upwards, because
-//! nobody who uses the crate gets its tests.
+//! `[dependencies]`, `[build-dependencies]` and their `[target.….…]` forms count, also under
+//! another name. `[dev-dependencies]` do not count: a test may depend on a higher layer, because
+//! users of the crate do not get its tests.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -14,12 +14,12 @@ use std::process::Command;
 
 use toml::{Table, Value};
 
-/// Each crate, by folder, with those it may import. Lowest first.
+/// Crates by folder, lowest first, with their permitted dependencies.
 const LAYERS: &[(&str, &[&str])] = &[
     ("text", &[]),
     ("num", &[]),
     ("model", &["num"]),
-    // The checker of certificates knows neither search nor what has searched.
+    // The checker of certificates is independent of all search algorithms.
     ("verify", &["num", "model"]),
     ("stn", &["num"]),
     ("network", &["text", "num", "stn"]),
@@ -33,7 +33,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("sim", &["text", "num", "model", "probability", "execution"]),
     ("report", &["num", "model", "plan", "execution"]),
     ("learning", &["text", "num", "sim", "report"]),
-    // Time zones, which only the command knows.
+    // Time zones, used only by the command.
     ("calendar", &["text", "num", "model", "pddl"]),
     (
         "elbowroom",
@@ -81,7 +81,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         &["calendar", "elbowroom", "laboratory", "page", "executive"],
     ),
     ("python", &["elbowroom", "laboratory", "executive", "cli"]),
-    // A program beside the command, which it knows by the protocol of worlds alone.
+    // A separate program that communicates with the command by the protocol of worlds.
     ("plansys2", &[]),
 ];
 
@@ -121,8 +121,8 @@ fn the_table_goes_upwards_only() {
     }
 }
 
-/// What decides while a plan is executed decides by what was worked out before: it could not ask
-/// for an envelope or a plan if it wanted to.
+/// Decisions during execution use results that were computed before. The executing crates have no
+/// access to solvers for envelopes or plans.
 #[test]
 fn what_executes_cannot_reach_a_solver() {
     for name in ["probability", "execution", "sim", "report"] {
@@ -136,7 +136,8 @@ fn what_executes_cannot_reach_a_solver() {
     }
 }
 
-/// Experiments need threads, and what only they ask for; who embeds the library gets neither.
+/// Experiments need threads and further dependencies. Programs that embed the library must not get
+/// either.
 #[test]
 fn only_the_laboratory_has_a_pool_of_threads() {
     for (name, _) in LAYERS {
@@ -147,10 +148,10 @@ fn only_the_laboratory_has_a_pool_of_threads() {
     }
 }
 
-/// Crates that stand beside the world: what they make threads for waits for others.
+/// Crates that communicate with the world. They use threads only to wait for others.
 const BESIDE_THE_WORLD: [&str; 5] = ["cli", "executive", "external", "plansys2", "python"];
 
-/// The third rule of ARCHITECTURE.md. Tests may.
+/// The third rule of ARCHITECTURE.md. Tests may create threads.
 #[test]
 fn threads_are_made_in_one_file_below_what_stands_beside_the_world() {
     let mut found = Vec::new();
@@ -178,7 +179,7 @@ fn threads_are_made_in_one_file_below_what_stands_beside_the_world() {
     assert_eq!(found, ["side_by_side.rs"]);
 }
 
-/// Cargo itself says what is built for who asks for the library alone.
+/// Cargo lists the dependencies of the library alone.
 #[test]
 fn the_library_builds_neither_plots_nor_threads() {
     let tree = |arguments: &[&str]| {
@@ -205,7 +206,7 @@ fn the_library_builds_neither_plots_nor_threads() {
     assert!(has(&tree(&["--features", "plots"]), "plotters"));
 }
 
-/// The crates that a crate imports, and those that they import, by the table.
+/// Returns the transitive dependencies of a crate, by the table.
 fn reachable(name: &'static str) -> BTreeSet<&'static str> {
     let mut reached = BTreeSet::new();
     let mut open = vec![name];
@@ -255,7 +256,8 @@ fn a_forbidden_import_is_found_wherever_it_is_written() {
     );
 }
 
-/// The crates of this workspace that a manifest imports although `allowed` does not list them.
+/// Returns the crates of this workspace that a manifest imports although `allowed` does not list
+/// them.
 fn forbidden_imports(manifest: &Table, allowed: &[&str]) -> Vec<String> {
     imports_of(manifest)
         .into_iter()
@@ -263,7 +265,7 @@ fn forbidden_imports(manifest: &Table, allowed: &[&str]) -> Vec<String> {
         .collect()
 }
 
-/// The folders of the workspace's crates that a manifest imports.
+/// Returns the folders of the workspace's crates that a manifest imports.
 fn imports_of(manifest: &Table) -> BTreeSet<String> {
     let mut sections = vec![manifest];
     if let Some(targets) = manifest.get("target").and_then(Value::as_table) {
@@ -283,7 +285,7 @@ fn imports_of(manifest: &Table) -> BTreeSet<String> {
         .collect()
 }
 
-/// The folder of a package of this workspace; `None` for packages from elsewhere.
+/// Returns the folder of a package of this workspace, or `None` for other packages.
 fn folder(package: &str) -> Option<String> {
     match package {
         "elbowroom" => Some(package.to_owned()),

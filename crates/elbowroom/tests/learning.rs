@@ -1,5 +1,5 @@
-//! What is learnt from logs of worlds that are known: distributions, failures, and intervals that
-//! hold as often as they promise.
+//! Learning from logs of known worlds: distributions, failures, and coverage of prediction
+//! intervals.
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ const DOMAIN: &str = include_str!("../../../cases/delivery/domain.pddl");
 const PROBLEM: &str = include_str!("../../../cases/delivery/problem.pddl");
 const PLAN: &str = include_str!("../../../cases/delivery/plan.plan");
 
-/// Drives are slow now and then, the unlocking starts late, and picking can fail on the way.
+/// Drives are sometimes slow, unlocking starts late, and picking can fail midway.
 const WORLD: &str = "format = \"elbowroom-world\"\nversion = 1\n\
     [[duration]]\naction = \"drive\"\nnormal = { mean = 1.2, deviation = 0.2 }\nrelative = true\n\
     [[duration]]\naction = \"unlock\"\nuniform = { from = 5, to = 15 }\n\
@@ -57,7 +57,7 @@ fn problem() -> (Arc<Task>, TimeTriggeredPlan) {
     (task, plan)
 }
 
-/// A run in the world: its trace, and whether the goal was reached.
+/// Runs in the world. Returns the trace, and `true` if the goal was reached.
 fn run(world: &str, seed: u64) -> (String, bool) {
     let (task, plan) = problem();
     let spec = spec(world, seed);
@@ -124,23 +124,23 @@ fn the_world_behind_traces_is_found_again() {
             .as_ref()
             .expect("drives are described together");
         assert_eq!(drift.since, None);
-        // What is written can be read.
+        // The learnt world file can be read.
         let source = Source::new("learnt.toml", answer.world.clone());
         WorldModel::read(source, task.problem()).expect("a world file");
-        // No drive of the logs, and hardly another one, reaches its time-out.
+        // No drive of the logs reaches its time-out, and future ones hardly ever do.
         let timeouts = answer.timeouts.as_deref().expect("durations were learnt");
         let timeouts: TimeoutRule = timeouts.parse().expect("a rule");
         let limit = |action: &str, planned: i64| {
             let limit = timeouts.of(action, &Rational::from(planned));
             limit.expect("all time out").to_f64()
         };
-        // About twice the mean and four or five standard deviations.
+        // About twice the mean, and four to five standard deviations.
         let drive = limit("(drive rover depot shelf)", 100);
         assert!((300.0..700.0).contains(&drive), "{count}: {drive}");
         let unlock = limit("(unlock office)", 6);
         assert!((26.0..40.0).contains(&unlock), "{count}: {unlock}");
         assert!(limit("(fly rover)", 1) > 599.0, "the default");
-        // The answer is data.
+        // The answer can be serialized.
         let json = serde_json::to_string(&answer).expect("texts and numbers");
         let read: LearnAnswer = serde_json::from_str(&json).expect("an answer");
         assert_eq!(read, answer);
@@ -155,14 +155,14 @@ fn runs_in_the_learnt_world_go_as_in_the_true_one() {
         f64::from(u32::try_from(done).expect("few runs")) / 400.0
     };
     let (true_rate, learnt_rate) = (rate(WORLD), rate(&learnt));
-    // Twice the deviation of the difference of two rates of 400 runs.
+    // Twice the standard deviation of the difference of two rates of 400 runs.
     assert!(
         (true_rate - learnt_rate).abs() < 0.07,
         "{true_rate} {learnt_rate}"
     );
 }
 
-/// Actions that were cut off are those that took long: without them, all look quick.
+/// Cancelled actions have long durations; without them, all durations would look short.
 #[test]
 fn what_was_cut_off_counts() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -212,8 +212,8 @@ fn what_was_cut_off_counts() {
     assert!(without < 9.2, "{without}");
 }
 
-/// The intervals hold all durations of the next run as often as promised, and no oftener than the
-/// number of samples explains.
+/// The intervals contain all durations of the next run with the promised frequency, up to the
+/// sampling error.
 #[test]
 fn conformal_intervals_hold_the_next_run() {
     let (task, plan) = problem();
@@ -293,7 +293,7 @@ fn too_few_samples_are_told() {
     );
 }
 
-/// The water boils 10 after the beginning, and the fetching takes up to 14 in the logs, but 5 in the plan.
+/// The water boils 10 after the beginning. Fetching takes up to 14 in the logs, but 5 in the plan.
 fn fetching(throughout: &str) -> ConformalBox {
     let domain = format!(
         "(define (domain d) (:predicates (boiled) (fetched)) (:functions (heat))
@@ -338,14 +338,14 @@ fn a_plan_that_may_survive_another_course_is_not_said_to_fail() {
     assert_eq!(found.verdict, Verdict::Undecided);
     let reason = found.reason.expect("a reason");
     assert!(reason.contains("the event (boils)"), "{reason}");
-    // Where the water must not boil meanwhile, it does fail.
+    // If the water must not boil meanwhile, the plan fails.
     let found = fetching("(over all (not (boiled)))");
     assert_eq!(found.verdict, Verdict::Outside, "{found:?}");
     let reason = found.reason.expect("a reason");
     assert!(reason.contains("boil"), "{reason}");
 }
 
-/// Only what was believed counts, and a log that ends early has actions that are still running.
+/// Only believed events count, and a truncated log has actions that are still running.
 #[test]
 fn a_trace_that_was_cut_off_is_read_up_to_there() {
     let (trace, _) = run(WORLD, 3);
@@ -366,7 +366,7 @@ fn a_trace_that_was_cut_off_is_read_up_to_there() {
     }
 }
 
-/// Doors are unlocked and locked by somebody, at rates; the robot unlocks one of them itself.
+/// Doors are unlocked and locked spontaneously, at rates. The robot unlocks one of them itself.
 #[test]
 fn rates_of_changes_are_found_again_and_actions_and_deadlines_are_no_changes() {
     const UP: f64 = 0.01;
@@ -381,7 +381,7 @@ fn rates_of_changes_are_found_again_and_actions_and_deadlines_are_no_changes() {
             Log::read(&Source::new(format!("run {number}"), trace)).expect("a trace")
         });
         let answer = learnt(logs.collect(), None);
-        // Neither what drives and picks do, nor that the counter closes.
+        // Neither the effects of drives and picks, nor the closing of the counter.
         let found: Vec<_> = answer
             .changes
             .iter()
@@ -395,7 +395,7 @@ fn rates_of_changes_are_found_again_and_actions_and_deadlines_are_no_changes() {
             assert!((found - truth).abs() <= 3.5 * error, "{count}: {learnt:?}");
             assert!(learnt.apart.is_empty(), "{count}: {learnt:?}");
         }
-        // What was learnt is a world in which the next run can be simulated.
+        // The learnt model can be simulated.
         let (task, _) = problem();
         let model = WorldModel::read(answer.world.as_str(), task.problem());
         let model = model.expect("a correct world file");
@@ -408,7 +408,7 @@ fn rates_of_changes_are_found_again_and_actions_and_deadlines_are_no_changes() {
     }
 }
 
-/// A pick that fails leaves the parcel where it was: that is no change by itself.
+/// A failed pick leaves the parcel where it was. This is not a spontaneous change.
 #[test]
 fn what_a_failure_undoes_has_not_changed_by_itself() {
     let world = WORLD.replace("when = \"midway\"", "when = \"midway\"\nundone = true");
@@ -423,7 +423,7 @@ fn what_a_failure_undoes_has_not_changed_by_itself() {
     assert_eq!(failures.undone, Some((failures.failed, failures.failed)));
     assert!(answer.world.contains("undone = true"), "{}", answer.world);
     assert_eq!(answer.changes, []);
-    // Without being undone, what the start has changed stays.
+    // If failures are not undone, the start effects remain.
     let answer = learnt(logs(20), None);
     let picks = answer.actions.iter().find(|action| action.action == "pick");
     let failures = &picks.expect("it was executed").failures;
@@ -431,8 +431,8 @@ fn what_a_failure_undoes_has_not_changed_by_itself() {
     assert!(!answer.world.contains("undone = true"), "{}", answer.world);
 }
 
-/// Whoever went by the true rates sees as many changes as they let expect; whoever went by others is
-/// told so, also of facts that did not change at all.
+/// With the true rates, the number of observed changes is as expected. With other rates the answer
+/// reports the difference, also for facts that never changed.
 #[test]
 fn expected_changes_stand_beside_those_that_were_seen() {
     let world = format!(
@@ -466,7 +466,7 @@ fn expected_changes_stand_beside_those_that_were_seen() {
             "{learnt:?}"
         );
     }
-    // Of two predicates: one that changed where nothing was expected, and the other way round.
+    // Two predicates: one changed unexpectedly, and the other did not change as expected.
     let other = "format = \"elbowroom-world\"\nversion = 1\n[[hazard]]\nfact = \"idle\"\n\
                  becomes_false_per_second = 0.5\n";
     let answer = asked(&logs, other).expect("an answer");
@@ -485,7 +485,7 @@ fn expected_changes_stand_beside_those_that_were_seen() {
     );
     assert!(answer.changes[0].all.expected > Some(1.0));
     assert_eq!(answer.changes[1].all.expected, Some(0.0));
-    // What cannot be compared is said.
+    // The answer lists what cannot be compared.
     let without_facts: Vec<Log> = logs
         .iter()
         .cloned()
@@ -502,7 +502,7 @@ fn expected_changes_stand_beside_those_that_were_seen() {
     assert!(refused.to_string().contains("unlocked"), "{refused}");
 }
 
-/// A world whose reports are from a moment after they are made, as rounding of binary numbers can make them.
+/// World whose reports are slightly earlier than they are made, as with rounded binary numbers.
 struct Early<'a>(Box<dyn World + 'a>);
 
 impl World for Early<'_> {

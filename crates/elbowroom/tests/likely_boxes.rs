@@ -1,4 +1,5 @@
-//! The box in which durations most likely stay in a world, its certificate, and what is refused.
+//! Box with the greatest probability that all durations stay inside, its certificate, and rejected
+//! requests.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -25,14 +26,14 @@ use shared::changed::{changed, numbers};
 use shared::instances::{figure_3, figure_4};
 use shared::own::case;
 
-/// Every duration spread around what is planned.
+/// Every duration is distributed around its nominal value.
 const AROUND: &str = "
     [[duration]]
     action = \"*\"
     normal = { mean = 1, deviation = 0.15 }
     relative = true";
 
-/// Of all sorts.
+/// A mixture of distributions.
 const MIXED: &str = "
     [[duration]]
     action = \"*\"
@@ -204,7 +205,7 @@ fn a_duration_that_never_is_as_the_plan_can_bear_leaves_no_probability() {
         matches!(verdict, Err(AnswerError::NoCertificate)),
         "nothing is proved of a box without probability: {verdict:?}"
     );
-    // As planned, and only as planned: certain.
+    // Exactly as planned, with certainty.
     let always = "[[duration]]\naction = \"pick\"\nconstant = 2";
     let outcome = answered(&request(&task, plan, always));
     let certain = best(&outcome).probability.clone().expect("a probability");
@@ -251,7 +252,7 @@ fn certificates_of_published_plans_are_accepted() {
     for (guarantee, (family, instances)) in [
         (Guarantee::Weak, aaai()),
         (Guarantee::Dynamic, aaai()),
-        // Nearly all of these have no room at all.
+        // Nearly all of these have no slack.
         (Guarantee::Strong, aaai()),
         (Guarantee::Dynamic, ("robot deliveries", figure_4(&data))),
     ] {

@@ -1,4 +1,4 @@
-//! Plans with many parameters: the work grows with the plan, not with its square.
+//! Plans with many parameters: the work grows linearly with the plan, not quadratically.
 
 mod shared;
 
@@ -35,7 +35,8 @@ fn open(robots: usize, ways: usize, needs: Needs) -> (Arc<Task>, Arc<Parametrize
     (task, Arc::new(plan))
 }
 
-/// The number of bad cases that a search refutes from scratch: most of what it does.
+/// Returns the number of failure cases that a search refutes from scratch, which is most of its
+/// work.
 fn refutations(robots: usize, ways: usize, needs: Needs, guarantee: Guarantee) -> usize {
     let (task, plan) = open(robots, ways, needs);
     let mut oracle = Oracle::new(&task, &plan, guarantee).expect("within reach");
@@ -46,7 +47,7 @@ fn refutations(robots: usize, ways: usize, needs: Needs, guarantee: Guarantee) -
     let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(()));
     let run = run.expect("few cases");
     assert!(run.envelope.is_ok());
-    // Each box that is decided about has been checked, were nothing known beforehand.
+    // Without a cache, each of these boxes would have been checked.
     assert!(run.checks > 2 * plan.parameters.len());
     oracle.refutations()
 }
@@ -93,7 +94,7 @@ fn what_limits_each_end_is_told_in_a_plan_with_many_parameters() {
     }
 }
 
-/// Wants no more after so many questions, and counts those that come all the same.
+/// Watcher that ends the search after `left` polls, and counts the polls after that.
 struct Patience {
     left: usize,
     after: usize,
@@ -127,7 +128,7 @@ fn who_wants_no_more_is_not_asked_for_long_and_gets_what_has_been_found() {
             let mut patience = Patience { left, after: 0 };
             let outcome = envelope(&request, &mut patience);
             let place = format!("{needs:?} {method} after {left}");
-            // Each part of the work that is left asks once.
+            // Each part of the remaining work polls once.
             assert!(patience.after <= 12, "{place}: {}", patience.after);
             let outcome = outcome.expect(&place);
             let found = outcome.envelope.expect(&place);

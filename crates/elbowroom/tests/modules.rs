@@ -1,18 +1,17 @@
-//! Which modules of a crate use each other in a circle.
+//! Cyclic dependencies between modules of a crate.
 //!
-//! Nothing in Rust forbids circles inside a crate. What stands in one cannot be read, tested or
-//! moved without the rest of it, so each circle among a crate's top-level modules is listed here
-//! with the reason why it stays; any other fails.
+//! Rust permits cycles inside a crate. The modules of a cycle cannot be understood, tested or moved
+//! separately, so each cycle among a crate's top-level modules must be listed here with its reason.
 //!
-//! Read from the sources: paths that begin with `crate::`, or with as many `super::` as lead to the
-//! root of the crate, outside tests, comments and texts. What the root re-exports counts as its
-//! module's.
+//! The dependencies are read from the sources: paths that begin with `crate::`, or with as many
+//! `super::` as lead to the root of the crate, outside tests, comments and strings. A re-export of
+//! the root counts as its module's.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Crate, modules, and why they stay together.
+/// Crate, modules, and the reason for the cycle.
 const KNOWN: &[(&str, &[&str], &str)] = &[
     (
         "elbowroom",
@@ -99,7 +98,7 @@ fn a_circle_is_found_however_the_path_is_written() {
     assert_eq!(found(&[root, to_b, ("b/tests.rs", "use crate::a::X;")]), []);
 }
 
-/// The files below a folder with their texts, by path from there.
+/// Returns the files below a folder with their texts, by relative path.
 fn sources(folder: &Path) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     let mut open = vec![folder.to_owned()];
@@ -118,7 +117,7 @@ fn sources(folder: &Path) -> BTreeMap<String, String> {
     found
 }
 
-/// Which top-level modules each of them uses.
+/// Returns the top-level modules that each of them uses.
 fn uses(sources: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<String>> {
     let is_root = |path: &str| matches!(path, "lib.rs" | "main.rs");
     let top = |path: &str| {
@@ -162,7 +161,7 @@ fn uses(sources: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<String>
     uses
 }
 
-/// The first names of all paths that begin with the prefix, and not with more of the kind.
+/// Returns the first names of all paths that begin with the prefix, and not inside a longer path.
 fn heads(text: &str, prefix: &str) -> Vec<String> {
     let mut found = Vec::new();
     for (at, _) in text.match_indices(prefix) {
@@ -172,7 +171,7 @@ fn heads(text: &str, prefix: &str) -> Vec<String> {
             continue;
         }
         let rest = &text[at + prefix.len()..];
-        // In braces, what follows the first brace or a comma of that level.
+        // In braces, the names after the first brace or a comma of that level.
         let mut level = 0;
         let mut is_head = true;
         let mut name = String::new();
@@ -204,7 +203,7 @@ fn heads(text: &str, prefix: &str) -> Vec<String> {
     found
 }
 
-/// The text without comments, the contents of texts, and modules of tests.
+/// Returns the text without comments, contents of strings, and test modules.
 fn code(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     let mut rest = text;
@@ -241,7 +240,7 @@ fn code(text: &str) -> String {
     plain
 }
 
-/// Where a text in quotation marks, with which `rest` begins, ends.
+/// Returns the end of the string literal at the beginning of `rest`.
 fn end_of_text(rest: &str) -> usize {
     let mut is_escaped = false;
     for (index, c) in rest.char_indices().skip(1) {
@@ -253,7 +252,7 @@ fn end_of_text(rest: &str) -> usize {
     rest.len()
 }
 
-/// The modules that reach each other: each circle as a whole.
+/// Returns the strongly connected components with more than one module.
 fn circles(uses: &BTreeMap<String, BTreeSet<String>>) -> Vec<BTreeSet<String>> {
     let reached = |from: &String| {
         let mut reached: BTreeSet<String> = BTreeSet::new();

@@ -1,4 +1,4 @@
-//! Networks of the field, examined and simulated.
+//! Simple temporal networks: analysis and simulation.
 
 use elbowroom::network::{
     Answer, Durations, NetworkFile, Request, Simulation, Verdict, examine, read, write_json,
@@ -8,7 +8,7 @@ use elbowroom::stn::uncertain::{ContingentLink, UncertainNetwork};
 use elbowroom::stn::{Constraint, Network, NodeId};
 use proptest::prelude::*;
 
-/// A network in plain text: points, edges `X 12 C`, links `A 1 3 C`.
+/// Returns a network in plain text: points, edges `X 12 C`, links `A 1 3 C`.
 fn network(points: &str, edges: &str, links: &str) -> NetworkFile {
     let text = format!(
         "# KIND OF NETWORK\nSTNU\n# Time-Point Names\n{points}\n# Ordinary Edges\n{}\n\
@@ -23,7 +23,7 @@ fn examined(file: &NetworkFile) -> Answer {
     examine(file, &Request::default()).expect("no runs")
 }
 
-/// The verdicts, and the words of the reasons.
+/// Returns the verdicts, and the texts of the reasons.
 fn told(answer: &Answer) -> String {
     let promises = [
         Some(&answer.consistent),
@@ -82,7 +82,7 @@ fn a_contradiction_is_told_in_the_names_of_the_file() {
 
 #[test]
 fn who_would_have_to_know_a_duration_beforehand_is_told() {
-    // Film must begin two to four before the eggs hatch, and they hatch when they like.
+    // Filming must begin two to four before the eggs hatch, at an uncontrollable time.
     let file = network(
         "laid hatched film",
         "film 4 hatched, hatched -2 film",
@@ -154,7 +154,7 @@ fn an_end_without_limit_and_a_deadline_contradict_each_other() {
         (runs.executor.as_str(), runs.successes),
         ("early-first", 500)
     );
-    // Evenly between 1 and infinity means nothing.
+    // There is no uniform distribution between 1 and infinity.
     let request = Request {
         simulation: Some(Simulation {
             runs: 1,
@@ -212,7 +212,8 @@ fn correlated_durations_are_long_together() {
         let runs = simulated(&file, 2000, 5, Durations::Given).simulation;
         runs.expect("runs").share
     };
-    // The difference of two independent ones has the deviation 7.07: it lies within 1 in 11.2 %.
+    // The difference of two independent ones has the standard deviation 7.07: it lies within 1 in
+    // 11.2 %.
     assert!((links("") - 0.112).abs() < 0.03);
     // With a correlation of 0.99 it has 0.707: 84.3 %.
     let correlated =
@@ -261,8 +262,8 @@ fn arbitrary_networks() -> impl Strategy<Value = NetworkFile> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
-    /// Promises imply each other, a promise is kept in every run, and a network that has been
-    /// written in dispatchable form is as good as before.
+    /// Promises imply each other, each promise is kept in every run, and the dispatchable form of a
+    /// network is equivalent to it.
     #[test]
     fn what_is_promised_is_kept(file in arbitrary_networks(), seed in 0..1000_u64) {
         let answer = simulated(&file, 20, seed, Durations::Uniform);

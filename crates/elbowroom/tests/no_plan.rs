@@ -1,4 +1,5 @@
-//! Certificates by pairs and by closed sets of states: none denies a plan, whatever is changed in it.
+//! No-plan certificates by pairs and by closed sets of states. No modification yields an accepted
+//! certificate for a problem with a plan.
 
 #![allow(
     clippy::unwrap_used,
@@ -52,7 +53,7 @@ fn answer(task: &Task) -> Answer {
 }
 
 fn certificate(task: &Task) -> Result<NoPlan, String> {
-    // Some problems have no end of states.
+    // Some problems have infinitely many states.
     let mut left = 600;
     no_plan_certificate_from(task, &Situation::initial(task), &mut || {
         left -= 1;
@@ -60,7 +61,7 @@ fn certificate(task: &Task) -> Result<NoPlan, String> {
     })
 }
 
-/// The certificate with one number or entry changed, for each of them.
+/// Returns all modifications of a certificate with one changed number or entry.
 fn changed(certificate: &NoPlan) -> Vec<NoPlan> {
     let mut all = Vec::new();
     let mut note = |change: &dyn Fn(&mut NoPlan)| {
@@ -122,8 +123,8 @@ fn changed(certificate: &NoPlan) -> Vec<NoPlan> {
     all
 }
 
-/// A plan is found and has been judged: no certificate of a problem with less says that there is none,
-/// and none of its changes does.
+/// The problem has a validated plan. No certificate of a reduced problem is accepted for it, and no
+/// modification of one.
 #[test]
 fn no_plan_is_denied_by_the_certificate_of_a_problem_with_less() {
     let mut random = Random(11);
@@ -170,7 +171,7 @@ fn no_plan_is_denied_by_the_certificate_of_a_problem_with_less() {
         }
     }
     println!("{made:?}, {attacks} attacks, {uncertified} of {denied} without a certificate");
-    // Most of these are out of reach by themselves; the problems below are not.
+    // Most of these are unreachable by themselves; the problems below are not.
     assert!(
         made.values().sum::<usize>() > 1_000 && made.len() > 1,
         "{made:?}"
@@ -200,7 +201,8 @@ fn cellar(fuses: usize) -> Task {
     )
 }
 
-/// Two fuses can be mended by the light of one match, three cannot: which takes times to see.
+/// Two fuses can be mended by the light of one match, three cannot. Earliest times alone do not
+/// prove that.
 #[test]
 fn each_entry_of_a_closed_set_counts() {
     let three = cellar(3);
@@ -215,9 +217,9 @@ fn each_entry_of_a_closed_set_counts() {
             Err(_) => refused += 1,
         }
     }
-    // What is looser than it has to be is as good.
+    // A looser entry may be equally valid.
     assert!(refused > 20, "{refused} {accepted}");
-    // Without its classes of objects, it is not closed; and a match is no fuse.
+    // Without its classes of objects, it is not closed; and a match is not a fuse.
     let mut other = proof.clone();
     other.closed.as_mut().unwrap().alike.clear();
     assert!(matches!(
@@ -248,7 +250,8 @@ const COURIER: &str = "(:requirements :durative-actions :timed-initial-literals)
       :condition (and (at start (held)) (at start (there)) (over all (open)))
       :effect (at end (given)))";
 
-/// With the parcel in hand it is 7 at the earliest, though being there and holding it come sooner each.
+/// With the parcel in hand it is 7 at the earliest, although each of the two facts alone can be
+/// reached earlier.
 #[test]
 fn pairs_prove_that_it_is_too_late() {
     let closing = |time: &str| {
@@ -265,7 +268,7 @@ fn pairs_prove_that_it_is_too_late() {
     for own in changed(&proof).into_iter().chain([proof.clone()]) {
         assert!(verify_no_plan(&early, &own).is_err(), "{own:?}");
     }
-    // A claim out of the air.
+    // An unfounded claim.
     let mut forged = proof;
     forged.apart = vec![Apart {
         from: None,

@@ -1,4 +1,5 @@
-//! Plans of the benchmarks as they are: each is guaranteed, or what it breaks has a name.
+//! Benchmark plans at their nominal values: each is guaranteed, or the violated requirement is
+//! named.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -11,7 +12,8 @@ use elbowroom_plan::DecoupledEnvelope;
 use shared::case::Case;
 use shared::instances::figure_4;
 
-/// What keeps each plan from being guaranteed, and how often; the empty text for those that are.
+/// Counts the plans by the reason why they are not guaranteed; the empty text stands for guaranteed
+/// ones.
 fn verdicts(cases: impl Iterator<Item = (String, Case)>) -> BTreeMap<String, usize> {
     let mut counts = BTreeMap::new();
     for (name, case) in cases {
@@ -60,7 +62,7 @@ fn rigid_auv_plans_are_guaranteed_and_flexible_ones_unless_they_leave_too_little
         );
         (name.clone(), case)
     };
-    // From `var00` to `var09`, ever more durations may be longer.
+    // From `var00` to `var09`, more and more durations may be longer.
     let (rigid, flexible): (Vec<_>, Vec<_>) = names(&folder.join("stns"))
         .into_iter()
         .partition(|name| name.ends_with("_var00"));
@@ -86,7 +88,7 @@ fn deliveries_are_guaranteed_or_later_than_a_deadline_with_a_name() {
         let case = Case::read(&instance.domain, &instance.problem, &instance.plan);
         (instance.name, case)
     });
-    // In some files there is no plan.
+    // Some files contain no plan.
     let (cases, empty): (Vec<_>, Vec<_>) =
         cases.partition(|(_, case)| !case.plan.plan.instances.is_empty());
     let mut counts = verdicts(cases.into_iter());

@@ -1,4 +1,4 @@
-//! How likely a plan is to succeed: the answer as a whole.
+//! Success probability of a plan: the complete answer.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::path::Path;
@@ -90,7 +90,7 @@ const LIKELY: &str = "format = \"elbowroom-likelihoods\"\nversion = 1
 
 #[test]
 fn the_published_values_of_the_first_order_are_found() {
-    // What the authors' code returned, to four digits, where it returned the best order.
+    // Results of the authors' code, to four digits, where it returned the best order.
     for (name, value) in [("sf3-p1", 0.1575), ("sf3-p2", 0.1541), ("sf3-p9", 0.0656)] {
         let odds = published(name).odds(OddsSettings::default());
         assert!(odds.order.is_best && odds.order.is_proven == Some(true));
@@ -98,7 +98,7 @@ fn the_published_values_of_the_first_order_are_found() {
         assert!((found - value).abs() < 0.000_051, "{name}: {found}");
         let lost: f64 = odds.order.losses.iter().map(|loss| loss.mass).sum();
         assert!((lost + found - 1.0).abs() < 1e-9);
-        // Retrying helps, and so does everything that can be done.
+        // Retrying increases the probability, and so do all other actions.
         let value = |answer: &ValueAnswer| match answer {
             ValueAnswer::Probability(p) => *p,
             ValueAnswer::Unknown(why) => panic!("{why}"),
@@ -136,7 +136,7 @@ fn an_answer_is_a_document_that_can_be_read_again() {
 fn the_odds_say_where_and_why_worlds_are_lost() {
     let odds = Scene::new(LAMP, EVENING, LIKELY).with_plan("0: (screw) [5]");
     let odds = odds.odds(OddsSettings::default());
-    // It starts, the lamp stays whole for one step, and the effect takes place.
+    // It starts, the lamp stays intact for one step, and the effect takes place.
     assert!((odds.order.probability - 0.5 * 0.75 * 0.9).abs() < 1e-12);
     let losses = odds
         .order
@@ -163,8 +163,8 @@ fn the_odds_say_where_and_why_worlds_are_lost() {
         ]
     );
     let action = &odds.order.actions[0];
-    // After each failed attempt the lamp must be whole still: nothing asks for it, but breaking it
-    // is noticed at the start's over-all condition.
+    // After each failed attempt the lamp must still be intact. No condition requires that, but the
+    // start's over-all condition detects a broken lamp.
     let retried: f64 = (0..200)
         .map(|n| 0.5_f64.powi(n) * 0.75_f64.powi(n))
         .sum::<f64>()
@@ -214,7 +214,7 @@ fn samples_of_a_world_say_what_its_chances_are() {
     assert_eq!(executed[0].ends[0].action.as_deref(), Some("(screw)"));
     let (low, high) = executed[0].interval.unwrap();
     assert!(low < 0.7 && 0.7 < high, "{low} {high}");
-    // Who tries again gets there.
+    // With retries, it always succeeds.
     assert_eq!(executed[2].reached, 1000);
     assert_eq!(
         executed,
@@ -234,7 +234,7 @@ fn all_orders_of_a_short_plan_make_a_picture_and_those_of_a_long_one_are_refused
         panic!("three actions have few orders");
     };
     assert_eq!(lattice.sets.len(), 27);
-    // The best order is among them, from nothing to everything.
+    // The lattice contains the best order, from the empty set to the whole.
     assert_eq!(lattice.order.len(), 7);
     let svg = lattice.picture("orders").svg();
     assert_eq!(svg.matches("<circle").count(), 27);
@@ -259,7 +259,7 @@ fn all_orders_of_a_short_plan_make_a_picture_and_those_of_a_long_one_are_refused
         .collect::<Vec<_>>()
         .concat();
     let likely = LIKELY.replace("facts.whole.becomes_false = 0.25", "");
-    // The best order does not matter here.
+    // The best order is not needed here.
     let settings = OddsSettings {
         most_sequences: 100,
         ..settings
@@ -299,7 +299,7 @@ fn bound_of_a_condition_on_a_duration_delays_the_end() {
         ("(at start (not (< ?duration 5)))", 5),
         ("(at end (<= (least) ?duration))", 5),
         ("(over all (>= ?duration 5))", 5),
-        // An open end: as planned.
+        // An open end, as planned.
         ("(at start (> ?duration 5))", 6),
     ] {
         let domain = format!(
@@ -340,7 +340,7 @@ fn starts_that_need_each_other_at_one_moment_succeed_together() {
         let happenings = odds.order.happenings.iter();
         let together: Vec<bool> = happenings.map(|it| it.together).collect();
         assert_eq!(together, [false, true, false, false], "{odds:?}");
-        // A single attempt that is repeated would lack the other one.
+        // Retries of a single start would lack the other one.
         assert!(
             matches!(odds.gains.any_action, ValueAnswer::Unknown(_)),
             "{odds:?}"

@@ -32,7 +32,7 @@ use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 use sources::Origin;
 
-/// The envelope of the first plan of a run.
+/// Recorder of the envelope of the first plan of a run.
 #[derive(Clone, Default)]
 struct First(Arc<Mutex<Option<DecoupledEnvelope>>>);
 
@@ -47,7 +47,7 @@ impl Recorder for First {
     }
 }
 
-/// The envelope under which a run of the plan starts.
+/// Returns the envelope under which a run of the plan starts.
 fn of_run(
     task: &Arc<Task>,
     plan: &TimeTriggeredPlan,
@@ -71,7 +71,7 @@ fn of_run(
     first.0.lock().expect("nobody has panicked").take()
 }
 
-/// The envelope that is reported.
+/// Returns the reported envelope.
 fn reported(
     task: &Arc<Task>,
     plan: &TimeTriggeredPlan,
@@ -107,7 +107,7 @@ fn read(domain: &Path, problem: &Path, epsilon: Option<Rational>) -> Option<Arc<
     Some(Arc::new(task))
 }
 
-/// Folders with a domain, a problem and a plan.
+/// Returns the folders with a domain, a problem and a plan.
 fn folders(within: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(within).expect("a folder");
     let mut folders: Vec<PathBuf> = entries

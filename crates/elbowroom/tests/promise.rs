@@ -1,8 +1,8 @@
-//! What an envelope promises is kept: in the world where nothing deviates, and in worlds in which
-//! every duration is somewhere in its interval, drawn or chosen by a spoiler.
+//! The promises of envelopes are kept without deviations, and in worlds with every duration inside
+//! its interval, drawn or chosen by a spoiler.
 //!
-//! Plans of our own and the cases; where the benchmarks are beside the repository, a slice of
-//! those. `cargo run --release --example promise` is the whole of it.
+//! The tests cover our own plans, the cases, and a sample of the benchmarks if they are next to the
+//! repository. `cargo run --release --example promise` covers everything.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 #![allow(dead_code, reason = "the program uses the rest")]
@@ -41,13 +41,13 @@ use worlds::Worlds;
 
 const KEEP: [&str; 3] = ["guarded", "live", "stn"];
 
-/// Boxes as they are after so many checks: the test has to be quick.
+/// A limited search, to keep the test fast.
 const SEARCH: Search<'static> = Search {
     most_checks: 60,
     goes_on: &|| true,
 };
 
-/// The plans of our own, and those of the cases.
+/// Returns our own plans, and those of the cases.
 fn own_subjects() -> Vec<Subject> {
     let mut subjects: Vec<Subject> = own::OWN
         .iter()
@@ -77,7 +77,7 @@ fn own_subjects() -> Vec<Subject> {
     subjects
 }
 
-/// A few plans of each family of the benchmarks: those that somebody else made.
+/// Returns a few plans of each family of the benchmarks, without those of the embedded planner.
 fn slice() -> Vec<Subject> {
     let Some(data) = shared::data() else {
         return Vec::new();
@@ -106,12 +106,12 @@ fn slice() -> Vec<Subject> {
     subjects
 }
 
-/// What goes wrong with a plan where nothing deviates.
+/// Returns the failures of a plan without deviations.
 fn failures_as_planned(subject: &Subject) -> Vec<String> {
     let label = format!("{} {}", subject.family, subject.name);
     let ready = match Ready::new(subject, SEARCH) {
         Ok(ready) => ready,
-        // Numbers that change in nonlinear ways are refused by name, which is no failure.
+        // Nonlinear numbers are rejected with a message, which is not a failure.
         Err(why) if why == "beyond exact analysis" => return Vec::new(),
         Err(why) => return vec![format!("{label}: {why}")],
     };
@@ -135,7 +135,7 @@ fn assert_kept_as_planned(subjects: &[Subject]) {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// Runs each plan so many times in worlds inside its box.
+/// Runs each plan `runs` times in worlds inside its box.
 fn assert_kept_inside(subjects: &[Subject], runs: u64) {
     let mut failures = Vec::new();
     let mut total = 0;
@@ -177,16 +177,16 @@ fn a_slice_of_the_benchmarks_works_wherever_durations_are_in_their_intervals() {
     assert_kept_inside(&slice(), 40);
 }
 
-/// The plan of a name in [`own::OWN`].
+/// Returns the plan of that name in [`own::OWN`].
 fn own_plan(name: &str) -> Subject {
     let found = own::OWN.iter().find(|own| own[0] == name);
     let [name, domain, problem, plan] = found.expect("a plan of that name");
     Subject::of_texts(["own", name], [domain, problem, plan]).expect("a correct test")
 }
 
-/// The brooding ends before a late shot begins, which excuses that the shot fails. It would not if the
-/// shot had been seen to begin, if the brooding had not ended, if anything else had failed, or if something had
-/// been started that has to wait for the shot.
+/// The brooding ends before a late shot begins, which excuses the failure of the shot. It would not
+/// if the start of the shot had been observed, if the brooding had not ended, if anything else had
+/// failed, or if an action had been started that must wait for the shot.
 #[test]
 fn a_late_start_excuses_only_what_it_is_too_late_for() {
     let name = "an end that needs another end, which must not have come at the start";
@@ -228,8 +228,8 @@ fn the_spoiler_beats_whoever_relies_on_a_box_that_is_weak_only() {
 
     let subject = own_plan("an end that needs another end, which must not have come at the start");
     let ready = Ready::new(&subject, SEARCH).expect("a box");
-    // Brooding may take 8 to 12, filming 5 at least: 12 - 8 is less than 5, and can be kept.
-    // From 6 to 12 on it cannot.
+    // Filming takes at least 5. If brooding takes 8 to 12, the plan is controllable, because
+    // 12 - 8 is less than 5. If it takes 6 to 12, the plan is not.
     let plan = &ready.open.plan;
     let point = DecoupledEnvelope::point(&plan.nominal());
     let brood = BoxEnd {
@@ -260,7 +260,7 @@ fn the_spoiler_beats_whoever_relies_on_a_box_that_is_weak_only() {
         prepared.envelope = Some(envelope.clone());
         let nominal = ready.with_open(prepared);
         for executor in ["guarded", "live", "stn", "fixed:60", "esterel"] {
-            // In the box that can be kept, only those that promise anything do.
+            // In the controllable box, only executors with a promise must succeed.
             if is_won && !["guarded", "live"].contains(&executor) {
                 continue;
             }

@@ -1,5 +1,5 @@
-//! Whole envelopes as the authors published them: formulas over the parameters, true exactly where
-//! the plan works. Our box check and our exact region must agree with them, point by point.
+//! Whole envelopes as published by the authors: formulas over the parameters that are true exactly
+//! if the plan is valid. Our box check and our exact region must agree with them, point by point.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -17,12 +17,12 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shared::case::{Case, number};
 
-/// A formula as the authors' tool prints it: `((1.0 <= param_dur_1_23) & (! (… <= …)))`.
+/// Formula as printed by the authors' tool: `((1.0 <= param_dur_1_23) & (! (… <= …)))`.
 struct Formula<'a> {
     words: Vec<&'a str>,
 }
 
-/// What a part of a formula is worth at a point.
+/// Value of a part of a formula at a point.
 enum Value {
     Truth(bool),
     Number(Rational),
@@ -58,7 +58,7 @@ impl<'a> Formula<'a> {
         Self { words }
     }
 
-    /// Whether it is true where the parameters have these values.
+    /// Returns `true` if the formula holds for these values of the parameters.
     fn holds(&self, value_of: &dyn Fn(&str) -> Rational) -> bool {
         let mut rest = &self.words[..];
         let value = Self::value(&mut rest, value_of).truth();
@@ -91,7 +91,7 @@ impl<'a> Formula<'a> {
         }
     }
 
-    /// The numbers in it, which is where its borders are.
+    /// Returns the numbers in it, which determine its borders.
     fn numbers(&self) -> Vec<Rational> {
         let words = self.words.iter();
         words.filter_map(|word| word.parse().ok()).collect()
@@ -115,12 +115,12 @@ fn combined(left: Value, operator: &str, right: Value) -> Value {
     }
 }
 
-/// The rover whose batteries may be used for as long as they last.
+/// Returns the folder of the rover with unrestricted use of its batteries.
 fn rover(data: &Path) -> std::path::PathBuf {
     data.join("envelopes/solar_rover/flexible")
 }
 
-/// The plan of `plan` for the problem `NN`, with a nominal value for what is open.
+/// Returns the plan `plan` for the problem `NN`, with nominal values for its parameters.
 fn case(data: &Path, domain: &str, problem: &str, plan: &str, declarations: &str) -> Case {
     let folder = rover(data);
     let plan = std::fs::read_to_string(folder.join(plan)).expect("a plan");
@@ -177,7 +177,7 @@ fn every_published_region_is_ours_point_by_point() {
             let kind = if is_open { "pramDomain" } else { "Ndomain" };
             let file = format!("{folder}/output_{kind}_STN_{count}pram_{problem}prob");
             let Ok(text) = std::fs::read_to_string(results.join(file)) else {
-                // Only the short ones were kept.
+                // Only the short formulas were published.
                 continue;
             };
             let formula = Formula::read(text.lines().next().expect("a formula"));
@@ -199,8 +199,8 @@ fn every_published_region_is_ours_point_by_point() {
     assert!(regions >= 20);
 }
 
-/// Asks all three about points near the borders, as many as `ELBOWROOM_POINTS` says. How many are inside, and how
-/// many outside.
+/// Compares all three at points near the borders, as many as `ELBOWROOM_POINTS` says. Returns the
+/// numbers of points inside and outside.
 fn compared(case: &Case, formula: &Formula<'_>) -> [usize; 2] {
     let points = std::env::var("ELBOWROOM_POINTS");
     let points = points.map_or(200, |count| count.parse().expect("a number"));
@@ -232,8 +232,8 @@ fn compared(case: &Case, formula: &Formula<'_>) -> [usize; 2] {
     counts
 }
 
-/// Durations of batteries: at a border, a thousandth beside it, or between 0 and 7; their sums and
-/// the energy needed are hit by chance, as all are multiples of a tenth most of the time.
+/// Draws durations of batteries: at a border, a thousandth next to it, or between 0 and 7. As all
+/// are mostly multiples of a tenth, their sums and the required energy are also hit by chance.
 fn near_borders(case: &Case, formula: &Formula<'_>, rng: &mut ChaCha8Rng) -> Vec<Rational> {
     let numbers = formula.numbers();
     let parameters = case.plan.parameters.iter();

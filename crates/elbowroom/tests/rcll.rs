@@ -19,10 +19,10 @@ use elbowroom_pddl::{Source, read_plan};
 use elbowroom_plan::{BoxEnd, ParameterId, Side};
 use shared::case::{Case, number};
 
-/// The four productions run side by side. Written for the domain with uncertain durations.
+/// The four productions are concurrent. For the domain with uncertain durations.
 const DURATION_PLAN: &str = "golden_reference_runs/rcll/plan_o0.plan";
 
-/// The six productions run side by side. For the domain with uncertain consumption.
+/// The six productions are concurrent. For the domain with uncertain consumption.
 const RESOURCE_PLAN: &str = "
       0.000: (collect_order r0 s0 o0) [60.000]
      60.001: (goto_waypoint r0 s0 bs0) [20.000]
@@ -37,7 +37,7 @@ const RESOURCE_PLAN: &str = "
     390.005: (goto_waypoint r0 rs0 ow0) [20.000]
     410.006: (deliver_order r0 ow0 o0) [1.000]";
 
-/// The plan with only the order it needs, and some quantities left open.
+/// Returns the deordered plan with some parameters.
 fn opened(domain: &Path, problem: &Path, plan: &str, specs: &[&str]) -> Result<Case, FlowError> {
     let task = shared::task(domain, problem).expect("a readable problem");
     let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a readable plan");
@@ -57,7 +57,7 @@ const ALL_PRODUCTIONS: [&str; 4] = [
     "produce_base_4",
 ];
 
-/// When the window of order 0 closes.
+/// Returns the closing time of the window of order 0.
 fn deadline(task: &Task) -> Rational {
     let closes = |change: &Change| match change {
         Change::Delete(fact) => task.fact_name(*fact) == "(open ow0)",
@@ -68,7 +68,8 @@ fn deadline(task: &Task) -> Rational {
     closing.next().expect("the window closes").time.clone()
 }
 
-/// What limits the upper end of the parameter in the largest box around its nominal values.
+/// Returns the limit of the upper end of the parameter in the largest box around its nominal
+/// values.
 fn upper_limit(case: &Case, parameter: usize) -> String {
     let [_, sharp] = case.found("1");
     let mut oracle = case.oracle();
@@ -97,12 +98,12 @@ fn duration_files(data: &Path) -> (PathBuf, PathBuf, String) {
     (folder, problem, plan)
 }
 
-/// What each of the parallel productions may take until the deadline.
+/// Returns the maximum duration of each concurrent production until the deadline.
 ///
-/// Collecting takes 60, three drives 60, stacking 60: 180. Three separations lie on the way that
-/// leads through the first production: stacking reads at its start that the robot has arrived, the
-/// drive away takes from it where it stood at its end, and delivering reads that the window is
-/// open. Each further production starts ε after the one before.
+/// Collecting takes 60, three drives 60, stacking 60: 180. Three separations are on the path
+/// through the first production: stacking requires at its start that the robot has arrived, the
+/// drive away deletes the position that stacking requires at its end, and delivering requires an
+/// open window. Each further production starts ε after the previous one.
 fn duration_limits(deadline: &Rational) -> [Rational; 4] {
     let first = deadline - number("180.003");
     [0, 1, 2, 3].map(|place| &first - Rational::new(place, 1000))
@@ -131,7 +132,7 @@ fn durations_relaxed_here_and_durations_relaxed_by_hand_give_the_same_room() {
     }
 }
 
-/// The problem files of a folder.
+/// Returns the problem files of a folder.
 fn problems(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).expect("a folder of problems");
     let mut paths: Vec<_> = entries
@@ -157,7 +158,7 @@ fn the_room_follows_the_deadline_and_without_room_the_deadline_is_named() {
             match opened(&domain, &problem, &plan, &["produce_base_1"]) {
                 Ok(case) => {
                     let [limit, ..] = duration_limits(&closes);
-                    // Earlier ends of the other productions are no concern of this one.
+                    // Earlier ends of the other productions do not affect this one.
                     assert_eq!(case.limits(), format!("dur_2=[0,{limit}]"));
                     met += 1;
                 }
@@ -182,8 +183,8 @@ fn resource_files(data: &Path, rate: &str) -> (PathBuf, PathBuf) {
     (folder, problem)
 }
 
-/// What the first production may consume: the battery holds 160 + 20 · rate, 9 less in the
-/// beginning, the other productions take 40 + 20 + 20 + 20, and delivering needs 30.
+/// Returns the maximum consumption of the first production. The battery holds 160 + 20 · rate, 9
+/// less in the beginning. The other productions take 40 + 20 + 20 + 20, and delivering needs 30.
 fn consumption_limit(rate: &str) -> Rational {
     let charge = number("151") + number("20") * number(rate);
     charge - number("100") - number("30")
@@ -238,12 +239,12 @@ fn durations_and_consumption_vary_together() {
         ],
     )
     .expect("a valid plan");
-    // Collecting takes 60, three drives 60, stacking 120. Arriving and leaving are ε from the
-    // start and the end of collecting, producing and stacking (five times; nothing comes before
+    // Collecting takes 60, three drives 60, stacking 120. Arriving and leaving are ε from the start
+    // and the end of collecting, producing and stacking (five times; nothing comes before
     // collecting), and delivering starts ε before the deadline.
     let latest = number("460") - number("240.006");
-    // The plan has the production end, and draw from the battery, after the others have ended,
-    // because those need the battery throughout. It keeps this order even though there is charge
+    // In the plan the production ends, and consumes charge, after the others have ended, because
+    // those need the battery throughout. The plan keeps this order even though there is charge
     // enough for any other: the second starts ε later and takes 160.
     let shortest = number("160.001");
     let consumption = consumption_limit("0.80");

@@ -1,4 +1,4 @@
-//! The region has a point exactly if the box check accepts it.
+//! The region contains a point exactly if the box check accepts it.
 
 #![allow(clippy::print_stdout, reason = "counts and times are worth seeing")]
 
@@ -34,7 +34,7 @@ fn of(task: &Arc<Task>, plan: AnyPlan) -> RegionOutcome {
     .expect("within exact reasoning")
 }
 
-/// Values around the nominal ones, a share of each time on round numbers.
+/// Draws values around the nominal ones, some of them round numbers.
 fn around(plan: &ParametrizedPlan) -> DecoupledEnvelope {
     let mut values = DecoupledEnvelope::ranges(plan);
     for (index, parameter) in plan.parameters.iter().enumerate() {
@@ -49,7 +49,7 @@ fn around(plan: &ParametrizedPlan) -> DecoupledEnvelope {
     values
 }
 
-/// Compares with the box check at so many points: how many are in the region.
+/// Compares with the box check at `points` points. Returns the number of those in the region.
 fn compare(name: &str, task: &Arc<Task>, outcome: &RegionOutcome, points: usize) -> usize {
     let plan = Arc::new(outcome.plan.clone().expect("a plan"));
     let found = outcome.region.as_ref().expect("a region");
@@ -60,7 +60,7 @@ fn compare(name: &str, task: &Arc<Task>, outcome: &RegionOutcome, points: usize)
     let mut inside = 0;
     for count in 0..points {
         let drawn = draw::valuation(&wide, &mut random);
-        // A half of them near the nominal values, where more of the points are inside.
+        // Half of them are near the nominal values, where more points are inside.
         let near = Rational::new(1, if count % 2 == 0 { 1 } else { 8 });
         let point = drawn.iter().zip(&nominal);
         let point = point
@@ -109,8 +109,8 @@ fn the_region_of_each_case_has_the_points_that_the_box_check_accepts() {
     assert!(inside > 1000 && inside < 6000, "{inside}");
 }
 
-/// The signal has to be given before the gate opens, which waits for two crews: it is in time if it
-/// takes less long than one of them.
+/// The signal must be given before the gate opens, which waits for two crews. It is in time if it
+/// takes less time than one of them.
 #[test]
 fn where_one_of_two_things_has_to_be_so_there_are_two_pieces() {
     let (task, plan) = gate();
@@ -157,7 +157,7 @@ const GATE_PLAN: &str = "parameter s default 1; parameter c default 2; parameter
         c: n3.start - n1.end in [0, inf];
         c: n3.start - n2.end in [0, inf];";
 
-/// The plan of a gate, whose region has two pieces.
+/// Returns the plan of a gate, whose region has two pieces.
 fn gate() -> (Arc<Task>, ParametrizedPlan) {
     let domain = Source::new("gate.pddl", GATE);
     let problem = Source::new(
@@ -188,7 +188,7 @@ fn volumes_and_shares_are_what_random_points_say() {
     assert!(exact >= 5, "{exact}");
 }
 
-/// Whether the volume is exact.
+/// Returns 1 if the volume is exact, and 0 otherwise.
 fn measured(name: &str, task: &Arc<Task>, plan: AnyPlan) -> usize {
     let settings = RegionSettings {
         with_boxes: true,
@@ -261,7 +261,7 @@ fn measured(name: &str, task: &Arc<Task>, plan: AnyPlan) -> usize {
     usize::from(measure.volume.is_some())
 }
 
-/// Says no after so many questions.
+/// Watcher that ends a search after this number of polls.
 struct Patience(usize);
 
 impl Watcher for Patience {
@@ -326,7 +326,7 @@ fn a_picture_has_the_region_the_boxes_and_the_nominal_point() {
         let picture = picture(&outcome, &plane, &mut flow).expect("two parameters");
         assert_eq!(picture.boxes.len(), 3);
         assert_eq!(picture.areas.len(), 1);
-        // The nominal point is inside both.
+        // The nominal point is inside both polygons.
         let point = picture.point.as_ref().expect("a point").1;
         assert!((point[0] - 8.0).abs() < 1e-9 && (point[1] - 10.0).abs() < 1e-9);
         let is_left = |corners: &Vec<[f64; 2]>| {

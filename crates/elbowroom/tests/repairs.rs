@@ -1,5 +1,5 @@
-//! The cheapest repairs of plans: against brute force, and on all plans of the benchmarks that do not
-//! work.
+//! Cheapest repairs of plans, in comparison with brute force, and for all invalid plans of the
+//! benchmarks.
 
 #![allow(
     clippy::print_stdout,
@@ -54,7 +54,7 @@ fn any_plan(task: &Task, text: &str) -> Option<AnyPlan> {
     }
 }
 
-/// `deadline …: 120 instead of 100` for each change; or why there is no repair.
+/// Returns `deadline …: 120 instead of 100` for each change, or why there is no repair.
 fn said(request: &RepairRequest) -> String {
     let outcome = repair(request, &mut Unwatched).expect("within reach");
     verified(&outcome);
@@ -81,7 +81,7 @@ fn said(request: &RepairRequest) -> String {
     }
 }
 
-/// The judge accepts the plan for the changed problem.
+/// Checks that the validator accepts the plan for the changed problem.
 fn verified(outcome: &RepairOutcome) {
     if let Some((task, plan)) = &outcome.repaired {
         let verdict = validate(task, plan, &validate::Settings::default());
@@ -96,7 +96,7 @@ fn closing_at(time: &'static str) -> impl Fn(String) -> String {
 #[test]
 fn a_deadline_that_is_too_early_moves_as_far_as_it_must() {
     let request = case("delivery", &closing_at("25"), "");
-    // 10 + 2 + 15 + 3 and three hand-overs; the counter closes ε after the end.
+    // 10 + 2 + 15 + 3 and three separations; the counter closes ε after the end.
     assert_eq!(
         said(&request),
         "deadline of (counter-open office): 30.004 instead of 25"
@@ -119,7 +119,7 @@ fn where_the_deadline_stays_something_gets_shorter() {
     let RepairFinding::Repaired { cost, changes, .. } = outcome.answer.finding else {
         panic!("{:?}", outcome.answer.finding);
     };
-    // One second of the pick at half the price, and 4.004 of the drives.
+    // One second of the pick at half the price, and 4.004 s of the drives.
     assert_eq!(cost, "4504/1000".parse().expect("a number"));
     assert!(
         changes.iter().any(|change| change.to == Rational::ONE),
@@ -165,7 +165,7 @@ fn no_change_on_a_grid_is_cheaper() {
     grid::compare();
 }
 
-/// The files of a plan of the benchmarks.
+/// Files of a benchmark plan.
 struct Files {
     domain: PathBuf,
     problem: PathBuf,
@@ -241,8 +241,8 @@ fn benchmarks(data: &Path) -> Vec<Files> {
     files
 }
 
-/// Whether the plan has an envelope: at least its nominal values; `None` if it is beyond exact
-/// analysis.
+/// Returns `true` if the plan has an envelope with at least its nominal values, or `None` if it is
+/// beyond exact analysis.
 fn works(request: &RepairRequest) -> Option<bool> {
     let mut asked = EnvelopeRequest::new(&request.task, request.plan.clone());
     asked.guarantee = Guarantee::Weak;

@@ -1,8 +1,9 @@
-//! No plan is rejected in the situation for which it was made, no plan is requested twice for the same situation, and
-//! the default executor begins no plan a third time with a guarantee that durations have broken twice.
+//! No plan is rejected in the situation for which it was made, no plan is requested twice for the
+//! same situation, and the default executor does not begin a plan a third time with a guarantee
+//! that durations have violated twice.
 //!
-//! The tests cover all cases, random problems, and the benchmark plans if their folder is next to the repository: one plan of
-//! each family, or as many as `ELBOWROOM_REQUEST_PLANS` says.
+//! The tests cover all cases, random problems, and the benchmark plans if their folder is next to
+//! the repository: one plan of each family, or as many as `ELBOWROOM_REQUEST_PLANS` says.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 #![allow(dead_code, reason = "other tests use the rest")]
@@ -34,11 +35,11 @@ const WORLD: &str = "format = \"elbowroom-world\"\nversion = 1
 [[duration]]\naction = \"*\"\nuniform = { from = 0.7, to = 1.3 }\nrelative = true
 [[failure]]\naction = \"*\"\nprobability = 0.1\n";
 
-/// All actions take less than planned, by the same share. The same plans are made again and again.
+/// All actions take less time than planned, by the same share. The same plans are made repeatedly.
 const SHORT_WORLD: &str = "format = \"elbowroom-world\"\nversion = 1
 [[duration]]\naction = \"*\"\nconstant = 0.8\nrelative = true\n";
 
-/// The requests of a run.
+/// Requests of a run.
 #[derive(Clone, Default)]
 struct Requests(Arc<Mutex<Noted>>);
 
@@ -47,14 +48,15 @@ struct Noted {
     situations: BTreeSet<String>,
     count: usize,
     faults: Vec<String>,
-    /// The beginning of the present plan, until something is observed.
+    /// Start of the current plan, until an event is observed.
     begins: Option<Rational>,
-    /// The present plan, with times from its beginning.
+    /// Current plan, with times from its start.
     plan: TimeTriggeredPlan,
-    /// The number of times in a row that this plan was abandoned for lack of time.
+    /// Number of times in a row that this plan was abandoned for lack of time.
     abandoned: usize,
     is_lacking_time: bool,
-    /// The number of plans that were begun after they were abandoned twice, and the times with a guarantee.
+    /// Number of plans that were started again after two failures, and the times of those with a
+    /// guarantee.
     third_attempts: usize,
     third_with_guarantee: Vec<Rational>,
 }
@@ -127,7 +129,7 @@ fn requests(label: &str, task: &Arc<Task>, plan: &TimeTriggeredPlan, seeds: u64)
     count
 }
 
-/// Runs the plan once, and returns the notes about its requests, which have no fault.
+/// Runs the plan once, and returns the notes about its requests, after checking them.
 fn run(
     label: &str,
     task: &Arc<Task>,
@@ -157,14 +159,16 @@ fn run(
     let is_short = world == SHORT_WORLD;
     let noted = std::mem::take(&mut *requests.0.lock().expect("no thread has panicked"));
     assert_eq!(noted.faults, [""; 0], "{label}, {executor}, seed {seed}");
-    // There, nothing fails but for its duration. The other executors repeat a plan with its guarantee.
+    // In this world, only durations can cause failures. The other executors repeat a plan with its
+    // guarantee.
     if is_short && executor == "live" {
         assert_eq!(noted.third_with_guarantee, [], "{label}");
     }
     noted
 }
 
-/// Three actions: the end of the first one lies in the second, the end of the second one in the third.
+/// Returns a task with three actions: the first one ends during the second, and the second during
+/// the third.
 fn nested(least: [i64; 3]) -> Arc<Task> {
     let [a, b, c] = least;
     let domain = format!(
@@ -240,7 +244,7 @@ fn plan_of_a_case_is_requested_once_and_not_rejected() {
 #[test]
 fn plan_of_a_random_problem_is_requested_once_and_not_rejected() {
     let mut count = 0;
-    // In the seeds after the first ones, numbers decide on conditional effects.
+    // In the seeds after the first ones, conditional effects depend on numbers.
     for seed in (0..500).chain([1590]) {
         let problem = solvable::problem(seed).expect("a problem");
         let task = Arc::new(problem.task());

@@ -1,4 +1,4 @@
-//! The rule about rounded plans, and plans written for other tools.
+//! Rounding rule for plans, and plans written for other tools.
 
 use std::fmt::Write as _;
 
@@ -18,8 +18,8 @@ fn task(domain: &str, problem: &str) -> Task {
     Task::new(problem)
 }
 
-/// A guard that moves for `time`, then watches for 2 to 10, while a lamp may shine, whose battery
-/// it drains by 3 a second.
+/// Returns a task with a guard that moves for `time`, then watches for 2 to 10. Meanwhile a lamp
+/// may shine, which drains its battery by 3 a second.
 fn guard(time: &str, charge: &str) -> Task {
     let domain = "
         (define (domain guard)
@@ -45,7 +45,7 @@ fn guard(time: &str, charge: &str) -> Task {
     task(domain, &problem)
 }
 
-/// The plan as the rule reads it, and the number of warnings.
+/// Returns the plan as the rule reads it, and the number of warnings.
 fn meant(task: &Task, text: &str, tolerance: Option<&str>) -> (TimeTriggeredPlan, usize) {
     let tolerance = tolerance.map(|text| text.parse().expect("a number"));
     let rule = RoundingRule::with_tolerance(tolerance);
@@ -83,7 +83,7 @@ fn numbers_within_one_unit_of_the_last_digit_are_accepted_and_others_are_not() {
         ("0: (move) [5]\n5.001: (watch) [1.9998]", false),
         // A fraction is exact.
         ("0: (move) [50001/10000]\n5.001: (watch) [2]", false),
-        // Interfering happenings at one time have no order.
+        // Simultaneous happenings that interfere have no order.
         ("0: (move) [5]\n5: (watch) [2]", false),
         ("0: (move) [5]\n3: (watch) [2]", false),
         ("5.001: (move) [5]\n0: (watch) [2]", false),
@@ -97,7 +97,7 @@ fn accepted_plan_has_durations_of_domain_and_differs_from_text_by_rounding_only(
     let task = guard("10/3", "1");
     for (text, start) in [
         ("0.000: (move) [3.333]\n3.335: (watch) [2.000]", "667/200"),
-        // The separation of 0.001 does not survive truncation.
+        // Truncation removes the separation of 0.001.
         (
             "0.000: (move) [3.333]\n3.334: (watch) [2.000]",
             "13003/3000",
@@ -140,7 +140,7 @@ fn tolerance_takes_the_place_of_the_printed_digits() {
     let rounded = "0: (move) [4.9999]\n5.001: (watch) [2]";
     assert!(!accepted(rounded, "0"));
     assert!(accepted(rounded, "0.0001"));
-    // A valid plan is taken as printed.
+    // A valid plan is used as printed.
     let exact = "0: (move) [5]\n5.001: (watch) [2]";
     assert!(accepted(exact, "0"));
     let (plan, warnings) = meant(&task, exact, Some("3"));
@@ -198,14 +198,14 @@ fn plan_is_written_in_decimals() {
         plan_text(&task, &valid),
         "0.000: (move) [3.333]\n4.334: (watch) [2.000]\n"
     );
-    // Finite decimals stay as they are.
+    // Finite decimals are preserved.
     let task = guard("3.33334", "1");
     let finite = plan("0: (move) [3.33334]\n3.33434: (watch) [2]");
     assert_eq!(
         plan_text(&task, &finite),
         "0.000: (move) [3.33334]\n3.33434: (watch) [2.000]\n"
     );
-    // No rounding makes an invalid plan a valid one.
+    // Rounding never makes an invalid plan valid.
     let invalid = plan("0: (move) [10/3]\n1: (watch) [2]");
     assert!(plan_text(&task, &invalid).contains("[10/3]"));
 }
@@ -237,7 +237,7 @@ fn more_digits_are_written_where_a_condition_needs_them() {
     assert!(validate(&task, &read, &like_val).is_valid(), "{text}");
 }
 
-/// A chain of jobs one after the other, 0.001 apart, and its plan: job `index` has `parts` to make at
+/// Returns a sequence of jobs, 0.001 apart, and its plan: job `index` has `parts` to make at
 /// `speed`.
 fn chain(jobs: &[(i64, i64)]) -> (Task, String) {
     let domain = "

@@ -1,7 +1,7 @@
-//! Every box is attacked with the judge: random values in it, random schedules for them.
+//! Random tests of every box by the validator: random values in it, and random schedules for them.
 //!
-//! `ELBOWROOM_SAMPLES` says how many per box; a few by default. `ELBOWROOM_INSTANCES` restricts
-//! the attack to instances whose name contains it.
+//! `ELBOWROOM_SAMPLES` sets the number of samples of each box; a few by default.
+//! `ELBOWROOM_INSTANCES` selects the instances whose name contains it.
 
 mod shared;
 
@@ -28,7 +28,7 @@ fn samples() -> usize {
         .unwrap_or(20)
 }
 
-/// Attacks these instances, less those that are not wanted, and says how many withstood.
+/// Tests the selected instances, and prints the number of boxes.
 #[allow(clippy::print_stdout, reason = "says how many boxes were attacked")]
 fn attack_all(instances: &[Instance], least: usize) {
     let wanted = std::env::var("ELBOWROOM_INSTANCES").ok();
@@ -58,7 +58,7 @@ fn values_and_schedules_in_the_boxes_of_figure_4_pass_the_judge() {
     attack_all(&figure_4(&data), 25);
 }
 
-/// Samples the instance's box; false if the plan does not work at its nominal values.
+/// Tests the instance's box. Returns `false` if the plan is invalid at its nominal values.
 fn attack(instance: &Instance) -> bool {
     let task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
     let bytes = std::fs::read(&instance.plan).expect("a plan file");
@@ -73,7 +73,7 @@ fn attack(instance: &Instance) -> bool {
     true
 }
 
-/// The box that the search finds; `None` if the plan does not work at its nominal values.
+/// Returns the box found by the search, or `None` if the plan is invalid at its nominal values.
 fn envelope(task: &Arc<Task>, plan: &Arc<ParametrizedPlan>) -> Option<DecoupledEnvelope> {
     let mut oracle = Oracle::new(task, plan, Guarantee::Weak).expect("within reach");
     let run = irr(&mut oracle, &Settings::default(), &mut |_| {
@@ -83,7 +83,8 @@ fn envelope(task: &Arc<Task>, plan: &Arc<ParametrizedPlan>) -> Option<DecoupledE
     run.envelope.ok()
 }
 
-/// Values in a box for which the plan has no schedule (`None`), or one that the judge rejects.
+/// Returns values in a box for which the plan has no schedule (`None`), or one that the validator
+/// rejects.
 fn refuted(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -101,8 +102,8 @@ fn refuted(
     })
 }
 
-/// What is asked of the papers' instances, of the cases that come with the project. That the attack
-/// can succeed is seen by a box that is too large: some of its values break the plan.
+/// Tests the cases of the project like the instances of the papers. To show that the test can fail,
+/// it also uses a box that is too large: some of its values break the plan.
 #[test]
 fn values_and_schedules_in_the_boxes_of_our_cases_pass_the_judge() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");

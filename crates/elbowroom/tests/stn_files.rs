@@ -1,4 +1,5 @@
-//! Every STN plan file of the authors' benchmarks is read, unchanged; and what we write is read.
+//! All STN plan files of the authors' benchmarks can be read without changes, and so can the files
+//! that we write.
 
 #![allow(
     clippy::print_stdout,
@@ -15,7 +16,7 @@ use elbowroom::flow;
 use elbowroom_pddl::read_plan;
 use elbowroom_plan::format;
 
-/// All files below the folder, in order.
+/// Adds all files below the folder, sorted.
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     let mut entries: Vec<_> = fs::read_dir(folder)
         .unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
@@ -36,7 +37,7 @@ fn is_stn_plan(path: &Path) -> bool {
     name.ends_with(".stn") || name.starts_with("stn_plan")
 }
 
-/// The domain and the problem that go with a file; the folders' READMEs say which.
+/// Returns the domain and the problem for a file, as the folders' READMEs specify.
 fn companions(envelopes: &Path, file: &Path) -> (PathBuf, PathBuf) {
     let inside = file.strip_prefix(envelopes).unwrap();
     let folders: Vec<_> = inside
@@ -124,7 +125,7 @@ fn every_stn_plan_file_of_the_benchmarks_is_read_and_written() {
     for path in &found {
         let (domain, problem) = companions(&envelopes, path);
         if !problem.exists() {
-            // A part of the benchmarks was set aside.
+            // A part of the benchmarks is missing.
             println!("no problem file for {}", path.display());
             without_problem += 1;
             continue;
@@ -152,8 +153,8 @@ fn every_stn_plan_file_of_the_benchmarks_is_read_and_written() {
     assert!(mistakes.is_empty(), "{}", mistakes.join("\n"));
 }
 
-/// What the property asks of the benchmarks, of the cases that come with the project: their
-/// networks are the same after writing and reading, and so are their parameters.
+/// The networks and parameters of the project's cases are the same after writing and reading, like
+/// those of the benchmarks.
 #[test]
 fn the_networks_of_our_own_plans_are_the_same_after_writing_and_reading() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");

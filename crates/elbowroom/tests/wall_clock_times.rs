@@ -1,5 +1,4 @@
-//! Plans from situations whose times are those of a wall clock: fractions with many digits, which lie
-//! on no grid that a search could reckon with.
+//! Plans from situations at wall-clock times: fractions with many digits, which lie on no grid.
 
 use std::path::Path;
 
@@ -10,7 +9,7 @@ use elbowroom::model::{RunningAction, Situation, Task, validate_from};
 use elbowroom::num::{Interval, Rational};
 use elbowroom::pddl::{Source, read_problem};
 
-/// The parcel of `cases/delivery`.
+/// Returns the task of `cases/delivery`.
 fn delivery() -> Task {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/delivery");
     let source = |file: &str| {
@@ -21,8 +20,8 @@ fn delivery() -> Task {
     Task::new(read.expect("a case without mistakes").0)
 }
 
-/// A situation at `time` with these facts, and with actions under way: name, start and bounds of the
-/// duration.
+/// Returns a situation at `time` with these facts and running actions: name, start and bounds of
+/// the duration.
 fn situation(
     task: &Task,
     time: &str,
@@ -103,7 +102,7 @@ fn an_action_that_takes_a_time_between_two_ticks_is_planned_on_with() {
         let running = (words, start, duration, duration);
         assert_solved(&task, &situation(&task, time, &facts, &[running]));
     }
-    // One of several durations, whose first tick is behind the last one.
+    // One of several durations, whose first tick is after the last one.
     let most = "18756060094833377/1000000000000000";
     let running = (words, start, "18.75606009483337", most);
     assert_solved(&task, &situation(&task, time, &facts, &[running]));

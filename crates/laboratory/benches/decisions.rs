@@ -1,7 +1,7 @@
-//! How long the decisions of `policy` take, in the worlds of `experiments`: making the table, then
-//! median, 99th percentile and worst of all decisions of 200 runs, those with which a run begins
-//! included. `live` beside it has no table. The optimum's bounds are those of the table's grid. With the
-//! word `rehearsed`, the same of `policy` where it is given no table, in 20 runs.
+//! Decision times of `policy` in the worlds of `experiments`: the time for its table, then the
+//! median, 99th percentile and maximum over all decisions of 200 runs, the first ones included. For
+//! comparison, `live` has no table. The optimum's bounds are those of the table's grid. With the
+//! argument `rehearsed`, the benchmark measures `policy` without a table in 20 runs.
 //!
 //! ```text
 //! cargo bench -p elbowroom-laboratory --bench decisions
@@ -31,11 +31,11 @@ use timed::{Timed, Times, milliseconds};
 
 const RUNS: u64 = 200;
 
-/// The same, where what can be done is tried out.
+/// Number of runs of `policy` without a table.
 const REHEARSED_RUNS: u64 = 20;
 
 fn main() {
-    // As the harness of tests does: only those whose name contains the words are run.
+    // Like the test harness, it runs only the cases whose name contains the words.
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<_> = words.iter().filter(|word| !word.starts_with('-')).collect();
     println!(
@@ -80,7 +80,7 @@ fn read(folder: &str, world: &str) -> (Arc<Task>, WorldModel) {
     (task, world)
 }
 
-/// `policy` without a table.
+/// Measures `policy` without a table.
 fn rehearsed(name: &str, folder: &str, world: &str) {
     let (task, world) = read(folder, world);
     let beginning = Situation::initial(&task);

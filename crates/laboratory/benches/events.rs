@@ -1,12 +1,13 @@
-//! How long the decisions of `guarded` and `live` take on a plan from files: median, 99th percentile and worst of all
-//! decisions of one run. Making plans ready is not among them.
+//! Decision times of `guarded` and `live` for a plan from files: median, 99th percentile and
+//! maximum over all decisions of one run. The preparation of plans is not included.
 //!
 //! ```text
 //! cargo bench -p elbowroom-laboratory --bench events -- DOMAIN PROBLEM PLAN [WORLD] [EXECUTOR…]
 //! ```
 //!
-//! Without a world, nothing deviates. `python3 testing/large_plans.py - --files FOLDER --shape NAME POINTS` writes a plan to
-//! measure, with a world in which durations deviate. Paths are from the crate's folder, or absolute.
+//! Without a world, nothing deviates. `python3 testing/large_plans.py - --files FOLDER --shape NAME
+//! POINTS` writes a plan for a measurement, with a world in which durations deviate. Paths are
+//! absolute or relative to the crate's folder.
 
 #![allow(clippy::print_stdout, reason = "the table is what it is for")]
 #![allow(clippy::disallowed_methods, reason = "decisions are timed")]

@@ -1,4 +1,4 @@
-//! How do executors compare? One request and one answer, whatever kind of experiment it is.
+//! Comparison of executors: one request and one answer for both kinds of experiments.
 
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
@@ -13,7 +13,7 @@ use crate::compare::{self, Experiment, ExperimentError, Failures, Part, Results,
 use crate::perturbed::{self, PerturbedError, PerturbedExperiment, PerturbedResults};
 use crate::record::TrialRecords;
 
-/// An experiment of either kind.
+/// Experiment of either kind.
 #[derive(Clone, Debug)]
 pub enum AnyExperiment {
     /// On a clock: `docs/formats/experiment.md`.
@@ -22,16 +22,16 @@ pub enum AnyExperiment {
     Untimed(Box<PerturbedExperiment>),
 }
 
-/// Asks for the trials of an experiment, or for a part of them.
+/// Request for the trials of an experiment, or for a part of them.
 #[derive(Clone, Copy, Debug)]
 pub struct CompareRequest<'a> {
     /// The experiment.
     pub experiment: &'a AnyExperiment,
-    /// Which trials, and on how many threads.
+    /// The trials to run, and the number of threads.
     pub part: Part,
 }
 
-/// The results of an experiment: `docs/formats/results-json.md`.
+/// Results of an experiment: `docs/formats/results-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum CompareAnswer {
@@ -41,30 +41,30 @@ pub enum CompareAnswer {
     Untimed(PerturbedResults),
 }
 
-/// Row, column, and the position of a kind of failure in that cell's most frequent ones. In worlds
-/// without time, case, world and executor make the row, and the column is 0.
+/// Row, column, and the position of a kind of failure among the most frequent ones of that cell. In
+/// worlds without time, case, world and executor make the row, and the column is 0.
 pub type FailurePlace = (usize, usize, usize);
 
-/// A failed trial that stands for others.
+/// Failed trial, as an example of its kind of failure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FailedTrial {
-    /// Which others.
+    /// The kind of failure.
     pub place: FailurePlace,
     /// The trial.
     pub id: TrialId,
 }
 
-/// Why there is no answer.
+/// Error of a comparison.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompareError {
-    /// The experiment's file, or one that it names, is wrong.
+    /// The experiment file is invalid, or one that it names.
     #[error("{0}")]
     Text(Diagnostics),
-    /// Something else is: what, and what to do.
+    /// Another error, with a message for the user.
     #[error("{0}")]
     Other(String),
-    /// The results are of another experiment.
+    /// The results are those of another experiment.
     #[error(
         "these are results of another experiment; give those of its parts, made from the same files"
     )]
@@ -72,7 +72,7 @@ pub enum CompareError {
 }
 
 impl AnyExperiment {
-    /// Reads an experiment. `file` gives the text of a file that it names.
+    /// Reads an experiment. `file` returns the text of a file that it names.
     ///
     /// # Errors
     /// The first mistake, with its place.
@@ -89,7 +89,7 @@ impl AnyExperiment {
         }
     }
 
-    /// How many trials of each problem, case or column it asks for.
+    /// Returns the number of trials of each problem, case or column.
     pub fn trials(&self) -> u64 {
         match self {
             Self::Timed(experiment) => experiment.trials,
@@ -97,7 +97,7 @@ impl AnyExperiment {
         }
     }
 
-    /// Begins the dice elsewhere. Results with another seed are those of another experiment.
+    /// Sets the random seed. Results with another seed are those of another experiment.
     pub fn set_seed(&mut self, seed: u64) {
         match self {
             Self::Timed(experiment) => experiment.seed = seed,
@@ -105,8 +105,8 @@ impl AnyExperiment {
         }
     }
 
-    /// Whether a trial can be [made once more](Self::traces): not where executors believe in another world, as a
-    /// trace names one only.
+    /// Returns `true` if a trial can be [repeated](Self::traces). It cannot if executors believe in
+    /// another world, because a trace names only one.
     pub fn can_be_made_again(&self, failed: &FailedTrial) -> bool {
         match self {
             Self::Timed(experiment) => {
@@ -117,11 +117,11 @@ impl AnyExperiment {
         }
     }
 
-    /// Makes trials once more, for their traces (`docs/formats/trace.md`) or, in worlds without time,
-    /// their courses (`docs/formats/course.md`).
+    /// Repeats trials for their traces (`docs/formats/trace.md`) or, in worlds without time, their
+    /// courses (`docs/formats/course.md`).
     ///
     /// # Errors
-    /// When there is no such trial.
+    /// There is no such trial.
     pub fn traces(&self, failed: &[FailedTrial]) -> Result<Vec<String>, CompareError> {
         match self {
             Self::Timed(experiment) => {
@@ -141,7 +141,7 @@ impl AnyExperiment {
         }
     }
 
-    /// How many trials a part of it makes, all together.
+    /// Returns the total number of trials of a part.
     fn count(&self, part: Part) -> u64 {
         match self {
             Self::Timed(experiment) => part.count(experiment),
@@ -154,12 +154,11 @@ impl AnyExperiment {
     }
 }
 
-/// Makes the trials. When the watcher wants no more, what has been made until then is the answer
+/// Runs the trials. If the watcher stops it, the answer holds the trials so far
 /// ([`CompareAnswer::is_interrupted`]).
 ///
 /// # Errors
-/// When a problem cannot be read, has no plan to begin with, or is of a kind that there is no world
-/// for.
+/// A problem cannot be read, has no plan to begin with, or is of an unsupported kind.
 pub fn compare(
     request: CompareRequest<'_>,
     watcher: &mut (dyn Watcher + Send),
@@ -167,7 +166,7 @@ pub fn compare(
     compare_recorded(request, None, watcher)
 }
 
-/// The same, with a record of each trial.
+/// Runs the trials, with a record of each.
 ///
 /// # Errors
 /// As for [`compare()`].
@@ -204,7 +203,7 @@ impl CompareAnswer {
     /// Reads results as JSON.
     ///
     /// # Errors
-    /// When they are none, or of another experiment.
+    /// The text does not hold results, or those of another experiment.
     pub fn read(text: &str, experiment: &AnyExperiment) -> Result<Self, CompareError> {
         let (answer, is_of_it) = match experiment {
             AnyExperiment::Timed(experiment) => {
@@ -225,10 +224,10 @@ impl CompareAnswer {
         }
     }
 
-    /// Puts parts of one experiment together.
+    /// Merges parts of one experiment.
     ///
     /// # Errors
-    /// When there are none, they are parts of different experiments, or the same part comes twice.
+    /// There are no parts, they belong to different experiments, or a part occurs twice.
     pub fn merged(parts: &[Self]) -> Result<Self, CompareError> {
         let timed = parts.iter().map(|part| match part {
             Self::Timed(results) => Some(results.clone()),
@@ -247,8 +246,8 @@ impl CompareAnswer {
         Ok(Self::Untimed(PerturbedResults::merged(&untimed)?))
     }
 
-    /// The first trial of the most frequent kinds of failure: so many of each cell at most, and so many
-    /// of all, the most frequent first.
+    /// Returns the first trial of each of the most frequent kinds of failure: at most `of_a_cell`
+    /// for each cell, and at most `most` in total, the most frequent first.
     pub fn failed_trials(&self, of_a_cell: usize, most: usize) -> Vec<FailedTrial> {
         let mut found = Vec::new();
         let mut look = |row: usize, column: usize, failures: &Failures| {
@@ -289,7 +288,7 @@ impl CompareAnswer {
         }
     }
 
-    /// The first invalid trial of each cell, as one more kind of failure.
+    /// Returns the first invalid trial of each cell, as an additional kind of failure.
     fn invalid_trials(&self) -> Vec<FailedTrial> {
         let Self::Timed(results) = self else {
             return Vec::new();
@@ -305,7 +304,7 @@ impl CompareAnswer {
         found
     }
 
-    /// As JSON.
+    /// Returns the results as JSON.
     pub fn json(&self) -> serde_json::Value {
         match self {
             Self::Timed(results) => results.json(),
@@ -313,7 +312,7 @@ impl CompareAnswer {
         }
     }
 
-    /// Whether it was interrupted before all trials were made.
+    /// Returns `true` if it was interrupted before all trials had run.
     pub fn is_interrupted(&self) -> bool {
         match self {
             Self::Timed(results) => results.is_interrupted,
@@ -321,10 +320,10 @@ impl CompareAnswer {
         }
     }
 
-    /// The table.
+    /// Returns the table.
     ///
     /// # Errors
-    /// When the results are of another kind of experiment.
+    /// The results are those of another kind of experiment.
     pub fn table(&self, experiment: &AnyExperiment) -> Result<Table, CompareError> {
         match (self, experiment) {
             (Self::Timed(results), AnyExperiment::Timed(experiment)) => {
@@ -335,7 +334,7 @@ impl CompareAnswer {
         }
     }
 
-    /// The results for programs: a number in each cell, and names that occur once.
+    /// Returns the results for programs: a number in each cell, and unique names.
     pub fn records(&self) -> Table {
         match self {
             Self::Timed(results) => results.records(),
@@ -343,7 +342,7 @@ impl CompareAnswer {
         }
     }
 
-    /// The plots, by name.
+    /// Returns the plots, by name.
     pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
         match self {
             Self::Timed(results) => results.plots(),

@@ -1,10 +1,10 @@
-//! Comparing executors in many runs: the papers' tables.
+//! Comparison of executors in many runs: the papers' tables.
 //!
-//! An [`Experiment`] is a file (`docs/formats/experiment.md`): a problem with blanks and what to
-//! fill in, columns (worlds, and what is left open), and executors. [`run`] makes every trial with
-//! every executor in the same world (common random numbers), so that differences between them are
-//! no accident of the dice. Trials run in parallel; the results do not depend on how many at once,
-//! and the results of parts (shards) add up to those of the whole.
+//! An [`Experiment`] is a file (`docs/formats/experiment.md`): a problem with blanks and their
+//! values, columns (worlds and parameters), and executors. [`run`] runs every trial with every
+//! executor in the same world (common random numbers), so that differences between executors are
+//! not random. Trials run in parallel. The results do not depend on the number of threads, and the
+//! results of parts (shards) add up to those of the whole.
 
 mod beginnings;
 mod clairvoyant;
@@ -33,37 +33,37 @@ use trials::Setting;
 
 use crate::record::TrialRecords;
 
-/// The trials to make, and the number of threads.
+/// Trials to run, and the number of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// How many trials of each problem and column the whole has.
+    /// Number of trials of each problem and column in the whole experiment.
     pub trials: u64,
-    /// Which part of them: the trials whose number leaves this remainder…
+    /// Number of the part. It holds the trials whose number leaves this remainder…
     pub shard: u64,
     /// … when divided by this.
     pub shards: u64,
-    /// The number of threads; 0: as many as processors.
+    /// Number of threads; 0 for one per processor.
     pub jobs: usize,
 }
 
 impl Part {
-    /// The numbers of the trials.
+    /// Returns the numbers of the trials.
     pub(crate) fn numbers(self) -> impl Iterator<Item = u64> {
         (0..self.trials).filter(move |trial| trial % self.shards.max(1) == self.shard)
     }
 
-    /// How many trials that is for an experiment, all problems and columns together.
+    /// Returns the number of trials of an experiment, over all problems and columns.
     pub fn count(self, experiment: &Experiment) -> u64 {
         let settings = experiment.columns.len() * experiment.fillings().len();
         self.numbers().count() as u64 * settings as u64
     }
 }
 
-/// Makes the trials. `observe` is told how many are done, and says whether to go on. If not, what
-/// has been made until then is kept ([`Results::is_interrupted`]).
+/// Runs the trials. `observe` receives the number of finished trials, and returns `false` to stop.
+/// The results of finished trials are kept ([`Results::is_interrupted`]).
 ///
 /// # Errors
-/// When a problem cannot be read, has no plan to begin with, or a plan cannot be made ready.
+/// A problem cannot be read, has no plan to begin with, or a plan cannot be prepared.
 pub fn run(
     experiment: &Experiment,
     part: Part,
@@ -72,11 +72,11 @@ pub fn run(
     run_recorded(experiment, part, None, observe)
 }
 
-/// Makes one trial of an executor in a column once more: its trace (`docs/formats/trace.md`), which
+/// Repeats one trial of an executor in a column. Returns its trace (`docs/formats/trace.md`), which
 /// `elbowroom run --replay` plays and `elbowroom report` shows.
 ///
 /// # Errors
-/// When there is no such trial, or as for [`run`].
+/// There is no such trial, or as for [`run`].
 pub fn trace(
     experiment: &Experiment,
     (row, column): (usize, usize),
@@ -85,7 +85,7 @@ pub fn trace(
     let wrong = || ExperimentError::other("there is no such trial".to_owned());
     let executor = experiment.executors.get(row).ok_or_else(wrong)?;
     let column = experiment.columns.get(column).ok_or_else(wrong)?;
-    // No other plans are made ready.
+    // Plans for other executors and columns are not prepared.
     let alone = Experiment {
         executors: vec![executor.clone()],
         columns: vec![column.clone()],
@@ -103,7 +103,7 @@ pub fn trace(
     setting.trace(id.trial)
 }
 
-/// The same, with a record of each trial.
+/// Runs the trials, with a record of each.
 ///
 /// # Errors
 /// As for [`run`].
@@ -120,8 +120,8 @@ pub fn run_recorded(
         .build()
         .map_err(|error| ExperimentError::other(format!("cannot start threads: {error}")))?;
     let fillings = experiment.fillings();
-    // Trials of one problem have much in common; they are made one after the other unless there
-    // are more threads than problems. Results are sums, and do not depend on that.
+    // Trials of one problem share data, so they run one after the other unless there are more
+    // threads than problems. Results are sums, and do not depend on the order.
     let threads = pool.current_num_threads();
     let pieces = threads
         .div_ceil(fillings.len().max(1))
@@ -151,13 +151,13 @@ pub fn run_recorded(
             .map(|setting| setting.run(part, records, &told, &goes_on))
             .collect()
     });
-    // In the order of the settings, whichever was ready first.
+    // Added in the order of the settings, for reproducible results.
     let mut whole = Results::empty(experiment, part);
     whole.is_interrupted = done.load(Ordering::Relaxed) < part.count(experiment) && !goes_on();
     for part in parts {
         match part {
             Ok(part) => whole.add(&part),
-            // A planner that was stopped has no plan.
+            // An interrupted planner has no plan.
             Err(_) if whole.is_interrupted => {}
             Err(error) => return Err(error),
         }
@@ -169,7 +169,7 @@ pub fn run_recorded(
     Ok(whole)
 }
 
-/// How many threads each of so many pieces of work may have.
+/// Returns the number of threads for each of `pieces` pieces of work.
 fn for_each(threads: usize, pieces: usize) -> usize {
     (threads / pieces.max(1)).max(1)
 }

@@ -1,21 +1,21 @@
 //! Experiments that compare executors: those of the papers, and your own.
 //!
-//! In: an experiment file. Out: success rates and costs of each executor, as tables and plots. All
-//! executors meet the same worlds (common random numbers). Trials run in parallel, on threads of
-//! this crate; the results do not depend on how many there are, and the parts of an experiment that
-//! were made on several machines add up.
+//! The input is an experiment file. The output is the success rates and costs of each executor, as
+//! tables and plots. All executors run in the same worlds (common random numbers). Trials run in
+//! parallel on threads of this crate. The results do not depend on the number of threads, and parts
+//! of an experiment from several machines add up.
 //!
 //! - [`answer`]: an experiment of either kind as one request with one answer.
 //! - [`compare`]: temporal execution (`docs/experiments.md`).
-//! - [`perturbed`]: worlds without time, in which starts and effects fail and facts change by
-//!   themselves (`docs/perturbed-worlds.md`); the experiments of paper 2.
-//! - [`record`]: what came of each trial, as a table for other programs.
-//! - [`timed`]: what the best of all executors could reach on a clock, bounded from both sides.
+//! - [`perturbed`]: worlds without time, in which starts and effects fail and facts change
+//!   spontaneously (`docs/perturbed-worlds.md`); the experiments of paper 2.
+//! - [`record`]: the result of each trial, as a table for other programs.
+//! - [`timed`]: bounds on the value of the optimal policy on a clock.
 //! - [`untimed`]: executors for worlds without time, and the rules of a trial.
 //! - [`worlds`]: worlds without time.
 //!
-//! It stands above the library, so that programs which embed the library need neither its threads
-//! nor what only experiments need.
+//! This crate depends on the library, and not vice versa, so programs that embed the library need
+//! neither its threads nor its dependencies.
 //!
 //! ```
 //! use elbowroom_laboratory::perturbed::PerturbedExperiment;
@@ -34,7 +34,7 @@ pub mod worlds;
 
 pub use elbowroom::timed;
 
-/// Longer reading. Its code is compiled and run with the tests.
+/// Tutorial. Its code is compiled and run with the tests.
 pub mod tutorial {
     #[doc = include_str!("../docs/tutorial/05-experiments.md")]
     pub mod t05_experiments {}

@@ -1,9 +1,9 @@
-//! Comparing executors in perturbed worlds: the experiments of paper 2.
+//! Comparison of executors in perturbed worlds: the experiments of paper 2.
 //!
-//! A [`PerturbedExperiment`] is a file: a problem, likelihoods case by case, worlds and executors.
-//! [`run`] makes every trial with every executor; executors meet the same seeds. The dice of a
-//! trial depend on the experiment's seed, the case and the trial's number only, so results do not
-//! depend on how many trials run at once.
+//! A [`PerturbedExperiment`] is a file: a problem, likelihoods for each case, worlds and executors.
+//! [`run`] runs every trial with every executor; executors have the same seeds. The random numbers
+//! of a trial depend only on the experiment's seed, the case and the trial's number, so results do
+//! not depend on the number of threads.
 
 mod course;
 mod experiment;
@@ -42,19 +42,19 @@ use planner::EmbeddedPlans;
 
 /// Callbacks of the trials.
 struct Watch<'w> {
-    /// Whether to make another one.
+    /// Returns `false` to stop.
     goes_on: &'w (dyn Fn() -> bool + Sync),
-    /// One has been made.
+    /// Called after each trial.
     tell: &'w (dyn Fn() + Sync),
-    /// Where each is recorded.
+    /// Collector of trial records, if any.
     records: Option<&'w TrialRecords>,
 }
 
-/// One case, ready to be run.
+/// Case, prepared for its trials.
 struct Setting<'e> {
     experiment: &'e PerturbedExperiment,
     case: &'e Case,
-    /// Cases have dice of their own.
+    /// Number of the case, which is part of the seeds.
     number: u64,
     task: Arc<Task>,
     actions: Vec<Action>,
@@ -66,12 +66,12 @@ struct Setting<'e> {
     has_first_plan: OnceLock<bool>,
 }
 
-/// Makes the trials of each case, in each world, with each executor. `observe` is told how many are
-/// done, and says whether to go on. If not, what has been made until then is kept
+/// Runs the trials of each case, in each world, with each executor. `observe` receives the number
+/// of finished trials, and returns `false` to stop. The results of finished trials are kept
 /// ([`PerturbedResults::is_interrupted`]).
 ///
 /// # Errors
-/// When the problem or likelihoods cannot be read, or are of a kind that there is no world for.
+/// The problem or the likelihoods cannot be read, or are of an unsupported kind.
 pub fn run(
     experiment: &PerturbedExperiment,
     part: Part,
@@ -80,7 +80,7 @@ pub fn run(
     run_recorded(experiment, part, None, observe)
 }
 
-/// The same, with a record of each trial.
+/// Runs the trials, with a record of each.
 ///
 /// # Errors
 /// As for [`run`].
@@ -124,7 +124,7 @@ pub fn run_recorded(
     Ok(results)
 }
 
-/// The rows of the results, in order: case, world and executor.
+/// Returns the rows of the results, in order: case, world and executor.
 fn rows(
     experiment: &PerturbedExperiment,
 ) -> impl Iterator<Item = (usize, WorldKind, ExecutorName)> + '_ {
@@ -137,11 +137,11 @@ fn rows(
     })
 }
 
-/// Makes trials once more, each named by its row in the results and its number, and writes down what
-/// is done in them: `docs/formats/course.md`.
+/// Repeats trials, each given by its row in the results and its number, and records their steps:
+/// `docs/formats/course.md`.
 ///
 /// # Errors
-/// When there is no such row; as for [`run`] otherwise.
+/// There is no such row, or as for [`run`].
 pub fn courses(
     experiment: &PerturbedExperiment,
     trials: &[(usize, u64)],
@@ -152,7 +152,7 @@ pub fn courses(
         tell: &|| {},
         records: None,
     };
-    // Tables take long to make, and trials of one case share one.
+    // Trials of one case share a table, which takes long to compute.
     let mut settings: BTreeMap<usize, Setting<'_>> = BTreeMap::new();
     let mut texts = Vec::with_capacity(trials.len());
     for &(row, trial) in trials {
@@ -224,7 +224,7 @@ impl<'e> Setting<'e> {
         })
     }
 
-    /// The table of the sound world, made when it is first asked for.
+    /// Returns the table of the sound world, computed at its first use.
     fn table(&self) -> &Result<Foresighted, NoForesight> {
         self.foresight.get_or_init(|| {
             let settings = optimum::Settings {
@@ -237,7 +237,7 @@ impl<'e> Setting<'e> {
         })
     }
 
-    /// The optimum by other rules, as far as the experiment asks for it.
+    /// Returns the optima by the other rules that the experiment requests.
     fn other_optima(&self) -> &Result<BTreeMap<OptimumRules, f64>, PerturbedError> {
         self.other_optima.get_or_init(|| {
             let rules = self.case.also.iter().map(|&rules| {
@@ -260,8 +260,8 @@ impl<'e> Setting<'e> {
         })
     }
 
-    /// The value of a table at the beginning of a trial. A trial whose planner finds no first plan is lost, so
-    /// its optimum is 0.
+    /// Returns the value of a table at the beginning of a trial. A trial whose planner finds no
+    /// first plan is lost, so its optimum is 0.
     fn optimum_of(&self, foresight: &Foresighted) -> f64 {
         let find = || self.plans()(self.task.initial()).is_some();
         if *self.has_first_plan.get_or_init(find) {
@@ -272,7 +272,7 @@ impl<'e> Setting<'e> {
     }
 
     fn patience(&self) -> DeadEnds {
-        // The first plan takes a round; each step that ends in a dead end takes another.
+        // The first plan takes a round, and each step that ends in a dead end takes another.
         DeadEnds::Patience(self.experiment.rounds.saturating_sub(1).max(1))
     }
 
@@ -308,7 +308,7 @@ impl<'e> Setting<'e> {
         }
     }
 
-    /// The seed of a trial.
+    /// Returns the seed of a trial.
     fn seed(&self, trial: u64) -> u64 {
         (self.experiment.seed.wrapping_mul(1_000_003))
             .wrapping_add(self.number.wrapping_mul(1_000_000_007))
@@ -347,15 +347,15 @@ impl<'e> Setting<'e> {
         }
     }
 
-    /// The name of an action.
+    /// Returns the name of an action.
     fn name(&self, (schema, arguments): &ActionName) -> String {
         let mut actions = self.actions.iter();
         let own = actions.find(|it| it.schema == *schema && it.arguments == *arguments);
         own.map(|action| action.name.clone()).unwrap_or_default()
     }
 
-    /// The trials of these numbers; what is done in the last of them is written down where somebody
-    /// wants to read it.
+    /// Runs the trials of these numbers. The steps of the last one are recorded in `course`, if
+    /// given.
     fn row(
         &self,
         (world, kind): (WorldKind, ExecutorName),
@@ -368,7 +368,7 @@ impl<'e> Setting<'e> {
         }
         let is_for_reading = course.is_some();
         let mut executor = self.executor(kind)?;
-        // The table is of the sound world; elsewhere it promises nothing.
+        // The table is that of the sound world, and has no meaning elsewhere.
         let foresight = match world {
             WorldKind::Sound => Some(self.foresight()?),
             WorldKind::AsPublished => None,

@@ -1,36 +1,37 @@
-//! What came of each trial: tidy rows, one for each trial and executor.
+//! Results of trials: tidy rows, one for each trial and executor.
 
 use std::sync::{Mutex, PoisonError};
 
 use elbowroom_report::table::Table;
 
-/// The result of one trial with one executor.
+/// Result of one trial with one executor.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TrialRecord {
-    /// The position of the case and of the column in the experiment, for the order of the rows.
+    /// Positions of the case and the column in the experiment, which determine the order of the
+    /// rows.
     pub(crate) place: (usize, usize),
-    /// The number of the trial.
+    /// Number of the trial.
     pub trial: u64,
-    /// The position of the executor.
+    /// Position of the executor.
     pub(crate) row: usize,
-    /// The seed of its world: the same for all executors, so that they can be compared in pairs.
+    /// Seed of its world. It is the same for all executors, for comparisons in pairs.
     pub seed: u64,
-    /// The case, or what was filled in: `early = 420, late = 800`.
+    /// The case, or the values of the blanks: `early = 420, late = 800`.
     pub case: String,
-    /// The column; the world, where there is no time.
+    /// The column, or the world in experiments without time.
     pub column: String,
     /// The executor.
     pub executor: String,
-    /// How it ended: `goal-reached`, or another word of `docs/formats/run-json.md`; where there is
-    /// no time, `goal-reached` or `failed`.
+    /// Verdict: `goal-reached`, or another word of `docs/formats/run-json.md`; in experiments
+    /// without time, `goal-reached` or `failed`.
     pub verdict: String,
-    /// The world's time at the end, in seconds; `None` where there is no time.
+    /// Time of the world at the end, in seconds; `None` in experiments without time.
     pub time: Option<String>,
-    /// How many new plans were made.
+    /// Number of new plans.
     pub replans: usize,
 }
 
-/// Gathers the records of trials that are made in any order.
+/// Collector of trial records, which may arrive in any order.
 #[derive(Debug, Default)]
 pub struct TrialRecords(Mutex<Vec<TrialRecord>>);
 
@@ -40,7 +41,7 @@ impl TrialRecords {
         records.push(record);
     }
 
-    /// The records in the order of the experiment, whoever was ready first.
+    /// Returns the records in the order of the experiment.
     pub fn table(self) -> Table {
         let mut records = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
         records.sort();

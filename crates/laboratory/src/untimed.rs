@@ -1,23 +1,23 @@
-//! Executing plans where there is no time: the experiments of paper 2.
+//! Execution of plans in worlds without time: the experiments of paper 2.
 //!
-//! A world without time goes on when something is done in it, and only then. A *step* is the
-//! attempt to start an action, or its end. Facts are seen as they are after every step. The rules
-//! of a trial are those of the published experiments (Ribeiro et al., TIME 2021, section 3):
+//! A world without time changes only when the executor makes a step. A *step* is the attempt to
+//! start an action, or its end. The state is fully observed after every step. The rules of a trial
+//! are those of the published experiments (Ribeiro et al., TIME 2021, section 3):
 //!
-//! - a trial has so many planning *rounds* (ten there: a plan, and nine replans);
-//! - in each round a plan is made from what holds, and executed until the executor has done all of
-//!   it, or gives it up;
-//! - the trial succeeds if the goal holds when an execution ends, given up or not; what is still
-//!   under way then counts as let go;
-//! - where there is no plan, all rounds that are left are lost, as nothing changes between rounds.
+//! - a trial has a limited number of planning *rounds* (ten there: a plan and nine replans);
+//! - in each round a plan is made from the current state, and executed until the executor has
+//!   completed or abandoned it;
+//! - the trial succeeds if the goal holds when an execution ends, whether or not the plan was
+//!   completed; actions that are still running then count as cancelled;
+//! - if there is no plan, all remaining rounds are lost, because nothing changes between rounds.
 //!
-//! One rule is ours, and holds only where somebody looks out for dead ends ([`Game::dead_ends`]): a
-//! step that ends where there is no plan uses up a round, as asking for a plan there would. Without
-//! it an executor could do something, no matter what, until what is broken mends itself, and how
-//! often executors succeed would say how stubborn they are.
+//! One rule is not from the paper, and applies only if dead ends are detected
+//! ([`Game::dead_ends`]): a step that ends where there is no plan uses up a round, as a planning
+//! request would do there. Without this rule, an executor could repeat arbitrary steps until a
+//! broken thing repairs itself, and the success rate would depend on its persistence.
 //!
-//! Executors here choose steps, not times, and so are of another kind than
-//! [`Executor`](elbowroom_execution::Executor): there is nothing to wait for.
+//! Executors here choose steps instead of times, so they do not implement
+//! [`Executor`](elbowroom_execution::Executor). They never wait.
 
 mod adaptable;
 mod course;
@@ -42,46 +42,46 @@ pub use published::AsPublished;
 pub use registry::{EXECUTORS, ExecutorName, Means, Registered, UnknownExecutor};
 pub use shortest::Shortest;
 
-/// A world without time: a port.
+/// World without time (a port).
 pub trait UntimedWorld {
-    /// The true state.
+    /// Returns the true state.
     fn state(&self) -> &State;
 
-    /// Tries to start an action whose start condition holds; says whether it has started. An
+    /// Tries to start an action whose start condition holds. Returns `true` if it has started. An
     /// instantaneous action is then done.
     fn attempt(&mut self, action: &Action) -> bool;
 
-    /// Ends an action that has started and whose end condition holds; says whether that has
-    /// succeeded. It is no longer under way in any case.
+    /// Ends a running action whose end condition holds. Returns `true` if it has succeeded. It is
+    /// not running afterwards in either case.
     fn end(&mut self, action: &Action) -> bool;
 }
 
-/// An executor for worlds without time.
+/// Executor for worlds without time.
 pub trait UntimedExecutor {
-    /// Forgets the trial before. What has been calculated may be kept.
+    /// Resets the state of the previous trial. Cached results may be kept.
     fn begin(&mut self) {}
 
-    /// Executes a plan until it is done, or does not work any more.
+    /// Executes a plan until it is completed or infeasible.
     fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>);
 }
 
-/// A planner: from a state to a plan, `None` if there is none.
+/// Planner: returns a plan from a state, or `None` if there is none.
 ///
-/// The same plan should be the same `Arc`: executors remember what they have made of it.
+/// The same plan should be the same `Arc`, because executors cache results by plan.
 pub type Plans<'a> = dyn FnMut(&State) -> Option<Arc<TimeTriggeredPlan>> + 'a;
 
 /// Limits of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Planning rounds.
+    /// Maximum number of planning rounds.
     pub rounds: usize,
-    /// Steps.
+    /// Maximum number of steps.
     pub steps: usize,
 }
 
 impl Default for Limits {
-    /// The ten rounds of the experiments. The steps are only there so that an action that never
-    /// starts is not tried for ever.
+    /// Returns the ten rounds of the experiments. The limit of steps only ends trials in which an
+    /// action never starts.
     fn default() -> Self {
         Self {
             rounds: 10,
@@ -90,57 +90,57 @@ impl Default for Limits {
     }
 }
 
-/// Says whether a state is a dead end while these actions are under way: whether the goal could not
-/// be reached from it even if nothing went wrong any more.
+/// Returns `true` if a state with these running actions is a dead end: the goal cannot be reached
+/// from it even if nothing else goes wrong.
 pub type DeadEndWatch<'a> = dyn Fn(&State, &[ActionName]) -> bool + 'a;
 
-/// A ground action: its schema and its arguments.
+/// Ground action: its schema and its arguments.
 pub type ActionName = (SchemaId, Vec<ObjectId>);
 
-/// The components of a trial.
+/// Components of a trial.
 pub struct Game<'g> {
     /// The problem.
     pub task: &'g Task,
-    /// The plans, with their planner.
+    /// The planner.
     pub plans: &'g mut Plans<'g>,
-    /// Who looks out for dead ends, if somebody does; then each step that ends in one uses up a
-    /// round, and the trial is lost with the last one.
+    /// Detection of dead ends, if any. Each step that ends in one uses up a round, and the trial is
+    /// lost with the last round.
     pub dead_ends: Option<&'g DeadEndWatch<'g>>,
-    /// When it is over in any case.
+    /// Limits of the trial.
     pub limits: Limits,
-    /// Where the steps of the next trial are written down, if somebody wants to read them.
+    /// Record of the steps of the next trial, if any.
     pub course: Option<&'g mut Course>,
 }
 
 /// Counts of the steps in a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Actions that have started.
+    /// Number of actions that have started.
     pub starts: u64,
-    /// Actions that have ended, well or not; of those that take time.
+    /// Number of durative actions that have ended, with success or not.
     pub ends: u64,
-    /// Attempts to start that failed.
+    /// Number of failed attempts to start an action.
     pub failed_starts: u64,
 }
 
 impl Tally {
-    /// Starts and ends: what the experiments send as messages.
+    /// Returns the number of starts and ends, which are messages in the experiments.
     pub fn messages(self) -> u64 {
         self.starts + self.ends
     }
 
-    /// Executed actions as the experiments count them: messages and failed starts.
+    /// Returns the number of executed actions as in the experiments: messages and failed starts.
     pub fn steps(self) -> u64 {
         self.messages() + self.failed_starts
     }
 }
 
-/// How a trial ended that did not succeed.
+/// Ending of a failed trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Ending {
     /// The planner found no plan.
     NoPlan,
-    /// All rounds were used up by plans that did not lead to the goal.
+    /// All rounds were used up by plans that did not reach the goal.
     RoundsUsedUp,
     /// The last round was used up by a step that ended in a dead end.
     DeadEnd,
@@ -149,7 +149,7 @@ pub enum Ending {
 }
 
 impl Ending {
-    /// The word in results.
+    /// Returns the word used in results.
     pub fn name(self) -> &'static str {
         match self {
             Self::NoPlan => "no-plan",
@@ -160,86 +160,86 @@ impl Ending {
     }
 }
 
-/// How a trial failed.
+/// Failure of a trial.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lost {
-    /// How it ended.
+    /// Its ending.
     pub ending: Ending,
     /// Its last step; `None` if there was none.
     pub last: Option<(StepKind, ActionName)>,
 }
 
-/// The result of a trial.
+/// Result of a trial.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trial {
-    /// How it failed; `None` if the goal held when an execution ended.
+    /// Its failure; `None` if the goal held when an execution ended.
     pub lost: Option<Lost>,
-    /// Executions without success: 0 if the first plan led to the goal. Where the trial has failed,
-    /// all rounds.
+    /// Number of executions without success: 0 if the first plan reached the goal. In a failed
+    /// trial, the number of all rounds.
     pub replans: usize,
-    /// The work done.
+    /// Counts of its steps.
     pub tally: Tally,
 }
 
 impl Trial {
-    /// Whether the goal held when an execution ended.
+    /// Returns `true` if the goal held when an execution ended.
     pub fn is_success(&self) -> bool {
         self.lost.is_none()
     }
 }
 
-/// A world as an executor is given it: it counts what is done.
+/// World in the view of an executor, with counts of the steps.
 pub struct Stage<'w> {
     task: &'w Task,
     world: &'w mut dyn UntimedWorld,
     tally: Tally,
     most_steps: u64,
     dead_ends: Option<&'w DeadEndWatch<'w>>,
-    /// Actions that have started in this execution and not ended; known only where dead ends are
-    /// looked for.
+    /// Running actions of this execution; maintained only if dead ends are detected.
     running: Vec<ActionName>,
     rounds_left: usize,
     is_dead_end: bool,
     is_lost: bool,
     last: Option<(StepKind, ActionName)>,
-    /// What is written down, and the state before the step that is being made.
+    /// The record, and the state before the current step.
     course: Option<(&'w mut Course, State)>,
 }
 
 impl Stage<'_> {
-    /// The facts and numbers that hold.
+    /// Returns the current state.
     pub fn state(&self) -> &State {
         self.world.state()
     }
 
-    /// Whether a condition holds.
+    /// Returns `true` if a condition holds.
     pub fn holds(&self, condition: &Condition) -> bool {
         holds(condition, self.state())
     }
 
-    /// Whether the goal holds.
+    /// Returns `true` if the goal holds.
     pub fn is_goal(&self) -> bool {
         self.holds(self.task.goal())
     }
 
-    /// Whether nothing may be done any more: all steps are used up ([`Limits::steps`]), or, in a
-    /// dead end, all rounds.
+    /// Returns `true` if no step is allowed any more: all steps are used up ([`Limits::steps`]),
+    /// or, in a dead end, all rounds.
     pub fn is_over(&self) -> bool {
         self.is_lost || self.tally.steps() >= self.most_steps
     }
 
-    /// Whether the last step has ended in a dead end; `None` if dead ends are not watched for.
+    /// Returns `true` if the last step has ended in a dead end, or `None` if dead ends are not
+    /// detected.
     pub fn is_dead_end(&self) -> Option<bool> {
         self.dead_ends.map(|_| self.is_dead_end)
     }
 
-    /// The number of more steps that may end in a dead end; the next one after these loses the
-    /// trial.
+    /// Returns the number of further steps that may end in a dead end. The next one after these
+    /// loses the trial.
     pub fn patience(&self) -> usize {
         self.rounds_left.saturating_sub(1)
     }
 
-    /// Tries to start an action whose start condition holds.
+    /// Tries to start an action whose start condition holds. Returns `true` if it has started.
     pub fn attempt(&mut self, action: &Action) -> bool {
         let has_started = self.world.attempt(action);
         if has_started {
@@ -259,8 +259,7 @@ impl Stage<'_> {
         has_started
     }
 
-    /// Ends an action that has started and whose end condition holds; says whether that has
-    /// succeeded.
+    /// Ends a running action whose end condition holds. Returns `true` if it has succeeded.
     pub fn end(&mut self, action: &Action) -> bool {
         let has_succeeded = self.world.end(action);
         self.tally.ends += 1;
@@ -277,16 +276,16 @@ impl Stage<'_> {
         has_succeeded
     }
 
-    /// Lets an action go that has started: it will not be ended. That is no step.
+    /// Abandons a running action, which will not be ended. This is not a step.
     pub fn let_go(&mut self, action: &Action) {
         let name = name_of(action);
         self.running.retain(|other| *other != name);
     }
 
-    /// After a step.
+    /// Records a step.
     fn done(&mut self, kind: StepKind, action: &Action) {
         self.look_out();
-        // In place: there are very many steps, and few of them are the last.
+        // In place, because there are very many steps and few of them are the last.
         let (last_kind, (schema, arguments)) = self
             .last
             .get_or_insert_with(|| (kind, (action.schema, Vec::new())));
@@ -299,7 +298,7 @@ impl Stage<'_> {
         }
     }
 
-    /// Asks whether the step has ended in a dead end, and what that costs.
+    /// Updates the dead-end state after a step, and deducts a round in a dead end.
     fn look_out(&mut self) {
         let Some(dead_ends) = self.dead_ends else {
             return;
@@ -316,7 +315,7 @@ fn name_of(action: &Action) -> ActionName {
     (action.schema, action.arguments.clone())
 }
 
-/// Makes a trial.
+/// Runs a trial.
 pub fn trial(
     game: &mut Game<'_>,
     world: &mut dyn UntimedWorld,
@@ -383,8 +382,8 @@ pub fn trial(
     }
 }
 
-/// Whether a condition holds; one on numbers never does, as there are none
-/// ([`all_actions`] refuses them).
+/// Returns `true` if a condition holds. A numeric condition never does, because there are no
+/// numbers ([`all_actions`] rejects them).
 fn holds(condition: &Condition, state: &State) -> bool {
     match condition {
         Condition::Fact(fact) => state.facts.contains(fact),
@@ -395,7 +394,7 @@ fn holds(condition: &Condition, state: &State) -> bool {
     }
 }
 
-/// Needed at the start; all that an instantaneous action needs.
+/// Returns the start of an action, or the whole of an instantaneous one.
 fn start_of(action: &Action) -> &SnapAction {
     match &action.body {
         Body::Instantaneous(snap) => snap,
@@ -403,7 +402,7 @@ fn start_of(action: &Action) -> &SnapAction {
     }
 }
 
-/// Applies the effects of a snap action, if nothing goes wrong; additions win over deletions.
+/// Applies all effects of a snap action; additions win over deletions.
 fn apply(snap: &SnapAction, state: &mut State) {
     for effect in &snap.effects {
         if let Change::Delete(fact) = effect.change {

@@ -1,9 +1,9 @@
-//! Perturbed worlds: starts and effects fail, and facts change by themselves (paper 2).
+//! Perturbed worlds: starts and effects fail, and facts change spontaneously (paper 2).
 //!
-//! Two models of the same likelihoods, one file each:
+//! There are two models of the same likelihoods, one file each:
 //!
-//! - [`SoundWorld`]: what the likelihoods say, all draws independent of each other;
-//! - [`PublishedWorld`]: what the authors' programs did when the paper's results were made.
+//! - [`SoundWorld`]: independent draws with the given likelihoods;
+//! - [`PublishedWorld`]: the behaviour of the authors' programs that made the paper's results.
 
 mod chances;
 mod published;

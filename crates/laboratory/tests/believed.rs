@@ -1,4 +1,4 @@
-//! Executors that go by another world than the one in which they run.
+//! Executors that believe in another world than that of their runs.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -36,7 +36,7 @@ fn experiment(name: &str, executors: &[&str]) -> Experiment {
     }
 }
 
-/// How often the first executor reaches the goal, in percent, by column.
+/// Returns the percentage of trials in which the first executor reaches the goal, by column.
 fn reached(experiment: &Experiment, trials: u64) -> Vec<f64> {
     let part = Part {
         trials,
@@ -52,7 +52,8 @@ fn reached(experiment: &Experiment, trials: u64) -> Vec<f64> {
         .collect()
 }
 
-/// So many logs of runs with plans of different actions, by turns; the first run has this seed.
+/// Returns `count` logs of runs that alternate between plans with different actions. `first` is the
+/// seed of the first run.
 fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
     let world = &experiment.columns[0].world;
     let source = |text: &str| Source::new("test", text);
@@ -109,10 +110,12 @@ fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
     logs.collect()
 }
 
-/// `policy` goes by what was learnt from so many logs; the world goes on as it is. What it loses by that differs
-/// from logs to logs: in `rendezvous`, five points, if a tenth of failures looks like a sixth. The mean counts.
+/// `policy` believes in a model that was learnt from a few logs, while the world stays the same.
+/// The loss depends on the logs: in `rendezvous`, it is five points if a tenth of failures looks
+/// like a sixth. The test checks the mean.
 ///
-/// The table of docs/learning.md, by hand: `ELBOWROOM_LEARNT=20 cargo test --workspace --test believed what_was -- --nocapture`.
+/// For the table of docs/learning.md: `ELBOWROOM_LEARNT=20 cargo test --workspace --test believed
+/// what_was -- --nocapture`.
 #[test]
 fn what_was_learnt_from_few_logs_is_as_good_as_the_truth() {
     let times: Option<u64> = std::env::var("ELBOWROOM_LEARNT")
@@ -160,7 +163,7 @@ fn what_was_learnt_from_few_logs_is_as_good_as_the_truth() {
     }
 }
 
-/// Who believes that nobody slips takes the slide.
+/// An executor that believes that nothing slips takes the slide.
 #[test]
 fn executors_go_by_what_they_believe() {
     let mut experiment = experiment("vase", &["policy"]);

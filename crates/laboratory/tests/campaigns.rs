@@ -1,9 +1,9 @@
-//! Experiments: the same result for any number of threads, and parts that add up.
+//! Experiments have the same result for any number of threads, and parts add up.
 
 use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
 use elbowroom_num::Rational;
 
-/// A file of the project, by its path from the root.
+/// Reads a file of the project, by its path from the root.
 fn read(path: &str) -> String {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     std::fs::read_to_string(root.join(path)).expect("a correct test")
@@ -33,7 +33,7 @@ fn results_do_not_depend_on_the_number_of_threads_and_parts_add_up() {
     let make = |part| run(&experiment, part, &|_| true).expect("a correct test");
     let whole = make(WHOLE);
     assert_eq!(whole, make(Part { jobs: 3, ..WHOLE }));
-    // More threads than there are trials: the planner has the rest.
+    // More threads than trials: the planner has the rest.
     let one = Part { trials: 1, ..WHOLE };
     assert_eq!(make(one), make(Part { jobs: 7, ..one }));
     let parts = [0, 1, 2].map(|shard| {
@@ -61,14 +61,14 @@ fn mistakes_in_an_experiment_have_their_line() {
     assert!(error.starts_with(&format!("text:{line}:")), "{error}");
 }
 
-/// `clumsy.toml` with few trials.
+/// Returns `clumsy.toml` with few trials.
 fn clumsy(change: &dyn Fn(&str) -> String) -> Result<Experiment, String> {
     let file = |name: &str| Ok(read(&format!("experiments/{name}")));
     let text = change(&read("experiments/clumsy.toml"));
     Experiment::read(&text, &file).map_err(|error| error.to_string())
 }
 
-/// Three starts in ten fail, which no executor can know but by the likelihoods.
+/// Three starts in ten fail, which executors can only know from the likelihoods.
 #[test]
 fn a_column_says_how_likely_everything_is() {
     let told = clumsy(&str::to_owned).expect("a correct test");
@@ -82,7 +82,7 @@ fn a_column_says_how_likely_everything_is() {
         trials: 60,
         ..WHOLE
     };
-    // What the best could do takes minutes to find, and is not asked here.
+    // The optimum takes minutes, and is not tested here.
     let make = |experiment| {
         let experiment = Experiment {
             optimum: false,
@@ -94,8 +94,8 @@ fn a_column_says_how_likely_everything_is() {
     let (told, untold) = (make(told), make(untold));
     let row = |name: &str| told.rows.iter().position(|row| row == name).unwrap();
     let (adaptable, failing) = (row("adaptable"), 1);
-    // Told, it tries failed starts again; untold, a start is certain, and so a failure is a reason
-    // to plan anew.
+    // With likelihoods, it retries failed starts. Without them, starts are certain, and a failure
+    // is a reason to replan.
     assert_eq!(told.cells[adaptable][failing].replans, 0);
     assert!(untold.cells[adaptable][failing].replans > 30);
     for other in ["esterel", "stn", "guarded", "live"].map(row) {
@@ -135,7 +135,7 @@ fn mistakes_about_likelihoods_are_told_with_their_place() {
     assert!(error.contains("unlokced"), "{error}");
 }
 
-/// What results are kept under must not change with how the program is written.
+/// Stored results contain the fingerprint, so it must not change with the program.
 #[test]
 fn the_fingerprint_of_an_experiment_depends_on_what_it_says_and_stays() {
     let made = |change: &dyn Fn(&mut Experiment)| {
@@ -159,8 +159,8 @@ fn the_fingerprint_of_an_experiment_depends_on_what_it_says_and_stays() {
     assert_eq!(different.len(), others.len() + 1);
 }
 
-/// An executor that was not made ready as it should be, without the table of `policy` or with another first plan,
-/// says nothing about executors.
+/// An executor whose preparation was interrupted lacks the table of `policy` or has another first
+/// plan. Its trials would not be comparable.
 #[test]
 fn who_is_interrupted_while_getting_ready_makes_no_trial() {
     let experiment = experiment();
@@ -172,7 +172,7 @@ fn who_is_interrupted_while_getting_ready_makes_no_trial() {
     assert!(cells.all(|cell| cell.runs == 0), "{:?}", results.cells);
 }
 
-/// The towers of Hanoi with seven discs, which take more than a few states.
+/// Towers of Hanoi with seven discs, which need more than a few states.
 const HANOI: &str = "(define (domain hanoi) (:requirements :durative-actions)
   (:predicates (clear ?x) (on ?x ?y) (fits ?x ?y) (hand))
   (:durative-action move :parameters (?disc ?from ?to) :duration (= ?duration 1)
@@ -181,7 +181,7 @@ const HANOI: &str = "(define (domain hanoi) (:requirements :durative-actions)
     :effect (and (at start (not (hand))) (at end (hand)) (at start (not (on ?disc ?from)))
       (at end (clear ?from)) (at start (not (clear ?to))) (at end (on ?disc ?to)))))";
 
-/// The problem of [`HANOI`]: all discs lie on `p`, and belong on `r`.
+/// Returns the problem of [`HANOI`]: all discs lie on `p`, and belong on `r`.
 fn hanoi() -> String {
     let smaller_on_larger = |disc: u32| format!("(on d{disc} d{})", disc + 1);
     let tower: Vec<String> = (1..7).map(smaller_on_larger).collect();
@@ -218,7 +218,7 @@ fn missing_first_plan_names_the_limit_as_the_file_does() {
     assert!(budget.contains("(`planning_budget`)"), "{budget}");
 }
 
-/// After an interruption, a search for a plan ends without one, which says nothing about executors.
+/// An interrupted search ends without a plan. This is not a failure of the executor.
 #[test]
 fn interrupted_trial_does_not_count() {
     let experiment = experiment();

@@ -1,7 +1,7 @@
-//! What choosing the first plan by its probability is worth, in the worlds of `experiments`.
+//! Benefit of choosing the first plan by its probability, in the worlds of `experiments`.
 //!
-//! `ELBOWROOM_TRIALS=2000` makes that many trials of each world, and the table is printed
-//! (`--nocapture`); `ELBOWROOM_WORLDS="clumsy vase"` names other ones.
+//! `ELBOWROOM_TRIALS=2000` sets the number of trials of each world, and the table is printed
+//! (`--nocapture`); `ELBOWROOM_WORLDS="clumsy vase"` selects worlds.
 
 #![allow(clippy::print_stdout, reason = "the table is worth seeing")]
 
@@ -52,7 +52,7 @@ fn likelier_first_plans_lose_nothing_to_the_shortest_and_gain_much_where_these_f
         let all = |first_plan| {
             let read = experiment(name, first_plan);
             let executors: Vec<String> = read.executors.iter().map(ToString::to_string).collect();
-            // The policy's table takes long, and no plan decides what it does.
+            // The policy's table takes long, and the policy does not depend on the plan.
             let named: Vec<&str> = executors.iter().map(String::as_str).collect();
             let named: Vec<&str> = named.into_iter().filter(|it| *it != "policy").collect();
             only(read, &named)
@@ -70,8 +70,8 @@ fn likelier_first_plans_lose_nothing_to_the_shortest_and_gain_much_where_these_f
                 );
                 #[allow(clippy::cast_precision_loss, reason = "there are few trials")]
                 let (lost, all) = (before as f64 - after as f64, trials as f64);
-                // The samples of the choice are not those of the trials: three points, and three
-                // standard errors of a difference.
+                // The choice and the trials have different samples. The tolerance is three points
+                // and three standard errors of a difference.
                 let doubt = 0.03 * all + 3.0 * (all * 0.25).sqrt();
                 assert!(lost <= doubt, "{name}: {executor} {before} to {after}");
                 if ["counter", "weld"].contains(&name) && executor.to_string() == "live" {
@@ -109,7 +109,7 @@ const EXPERIMENT: &str = r#"
     world = "w"
 "#;
 
-/// The experiment with this plan: `quick` always fails.
+/// Returns the experiment with this plan; `quick` always fails.
 fn with_plan(plan: &str) -> Experiment {
     let file = |name: &str| {
         Ok(match name {

@@ -1,4 +1,4 @@
-//! Paper 2's experiments.
+//! Experiments of paper 2.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::fs;
@@ -11,7 +11,7 @@ use elbowroom_laboratory::perturbed::{
 };
 use elbowroom_laboratory::record::TrialRecords;
 
-/// Without optima by other rules, which take long.
+/// Reads an experiment without optima by other rules, which take long.
 fn experiment(name: &str) -> PerturbedExperiment {
     let mut experiment = whole_experiment(name);
     for case in &mut experiment.cases {
@@ -54,7 +54,7 @@ fn conditions_over_all_matter_only_where_what_is_lost_comes_back() {
             row.optimum.unwrap(),
             row.other_optima[&OptimumRules::OverAllKept],
         );
-        // A machine that has broken works again only in these two.
+        // Only in these two can a broken machine work again.
         let comes_back = ["SF3 p6", "SF3 p7"].contains(&row.case.as_str());
         assert_eq!(kept < optimum - 1e-9, comes_back, "{row:?}");
         assert!(kept <= optimum + 1e-9, "{row:?}");
@@ -71,10 +71,11 @@ fn the_optimum_depends_on_what_becomes_of_dead_ends() {
     let row = &results.rows[0];
     let by = |rules| row.other_optima[&rules];
     let lost = by(OptimumRules::DeadEndsLost);
-    // A third of it is luck in dead ends; both figures have been confirmed by other programs.
+    // A third of it comes from spontaneous changes in dead ends. Both figures have been confirmed
+    // by other programs.
     assert!((row.optimum.unwrap() - 0.287).abs() < 0.0005, "{row:?}");
     assert!((lost - 0.196).abs() < 0.0005, "{row:?}");
-    // What is lost stays lost here, and each end asks for what was asked over all.
+    // In this case lost facts never return, and each end requires the over-all condition.
     assert!((by(OptimumRules::DeadEndsLostOverAllKept) - lost).abs() < 1e-9);
     let table = perturbed::table(&results);
     assert!(
@@ -147,14 +148,14 @@ fn where_ends_fail_the_lookahead_succeeds_as_often_as_its_table_says_and_nobody_
         }
         shares.push((row.case, row.executor.name().to_owned(), share));
     }
-    // What is undone can be done again; what has fallen has to be lifted, and may break.
+    // An undone effect can be repeated. A fallen object must be lifted, and may break.
     let share = |case: &str, executor: &str| {
         let mut all = shares.iter();
         let found = all.find(|(own, by, _)| own == case && by == executor);
         found.unwrap().2
     };
     assert!(share("undone", "adaptable") > share("it may fall", "adaptable") + 0.03);
-    // Who lifts what has fallen, or takes more care, does not think of it by chance.
+    // Only `lookahead` plans to lift fallen objects or to be more careful.
     assert!(share("it may fall", "lookahead") > share("it may fall", "adaptable") + 0.01);
 }
 
@@ -198,7 +199,8 @@ fn olisipo_succeeds_more_often_than_esterel_in_a_sound_world_and_no_more_often_t
     }
 }
 
-/// The whole is the same for any number of threads, and the sum of its parts, in any order.
+/// Checks that the results are the same for any number of threads, and the sum of the parts in any
+/// order.
 fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> PerturbedResults {
     let run = |part| perturbed::run(experiment, part, &|_| true).unwrap();
     let whole = run(part(trials, 1));
@@ -226,12 +228,12 @@ fn results_do_not_depend_on_how_many_run_at_once_and_parts_add_up() {
     }
 }
 
-/// Two cases of one of the experiments, with plans of the embedded planner.
+/// Returns two cases of one of the experiments, with plans of the embedded planner.
 fn with_embedded_plans(name: &str) -> PerturbedExperiment {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
     let file = |name: &str| fs::read_to_string(folder.join(name)).map_err(|e| e.to_string());
     let text = file(name).unwrap();
-    // What stands behind a table's heading belongs to the table.
+    // Members after a table heading would belong to that table.
     let text = text.replacen("\ntrials", "\nplanner = \"embedded\"\ntrials", 1);
     let mut read = PerturbedExperiment::read(&text, &file).unwrap();
     assert_eq!(read.planner, PlannerKind::Embedded);
@@ -245,7 +247,7 @@ fn plans_of_the_embedded_planner_are_the_same_for_any_number_of_threads_and_in_p
     for (name, has_other_plans) in [("olisipo_sf3.toml", false), ("olisipo_af3.toml", true)] {
         let experiment = with_embedded_plans(name);
         let whole = parts_add_up(&experiment, 60);
-        // In SF3, the shortest plan is the only one that does nothing in vain.
+        // In SF3, the shortest plan is the only one without a useless action.
         let other = PerturbedExperiment {
             planner: PlannerKind::Shortest,
             ..experiment
@@ -254,7 +256,7 @@ fn plans_of_the_embedded_planner_are_the_same_for_any_number_of_threads_and_in_p
         assert!((whole.rows != shortest.rows) == has_other_plans, "{name}");
         assert_ne!(whole.fingerprint, shortest.fingerprint);
         assert!(PerturbedResults::merged(&[whole.clone(), shortest.clone()]).is_err());
-        // Who does not go by a plan, does the same whoever plans.
+        // An executor that does not use plans has the same results with any planner.
         let foresighted = |results: &PerturbedResults| {
             let rows = results.rows.iter();
             let rows = rows
@@ -314,7 +316,7 @@ fn failures_are_counted_by_kind_and_the_first_trial_of_each_can_be_made_once_mor
         }
     }
     assert!(endings.len() > 1, "{endings:?}");
-    // Trials that reached the goal do so again.
+    // Repeated trials reach the goal again.
     let table = records.table().csv();
     assert!(table.contains("goal-reached"));
     let row = &made.rows[0];
@@ -370,7 +372,7 @@ fn optimum_is_0_where_the_trials_find_no_first_plan() {
                      :condition (at start (ready)) :effect (at end (done))))"
             }
             "p" => "(define (problem p) (:domain d) (:init) (:goal (done)))",
-            // The facts change by themselves, so an agent that waits may be lucky.
+            // Facts change spontaneously, so waiting may help.
             _ => {
                 "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\nbecomes_true = 0.1\n\
                  becomes_false = 0.1\nstart = 1.0\neffect = 1.0\nend = 1.0\n"

@@ -1,7 +1,7 @@
-//! `policy` beside the timed optimum and beside all other executors, in the worlds of `experiments`
-//! and in random small ones.
+//! Comparison of `policy` with the timed optimum and with all other executors, in the worlds of
+//! `experiments` and in small random ones.
 //!
-//! `ELBOWROOM_TRIALS=2000` makes that many trials of each world, and the table is printed
+//! `ELBOWROOM_TRIALS=2000` sets the number of trials of each world, and the table is printed
 //! (`--nocapture`).
 
 #![allow(clippy::print_stdout, reason = "the table is worth seeing")]
@@ -57,7 +57,7 @@ fn results(name: &str, jobs: usize, trials: u64) -> Results {
     results
 }
 
-/// Three standard errors of a share.
+/// Returns three standard errors of a share.
 #[allow(clippy::cast_precision_loss, reason = "there are few trials")]
 fn doubt(share: f64, trials: u64) -> f64 {
     let share = share.clamp(0.0, 1.0);
@@ -78,7 +78,7 @@ fn is_near_the_optimum_and_above_all_others(name: &str) {
         share >= optimum.upper - 0.02 - doubt && share <= optimum.upper + doubt,
         "{name}: {share} beside {optimum:?}"
     );
-    // In the same worlds, whoever is not worse loses about as often as it wins.
+    // In the same worlds, an executor that is not worse loses about as often as it wins.
     let rows = results.rows.iter().enumerate();
     for (row, name) in rows.filter(|(_, name)| *name != "clairvoyant") {
         let pair = results.pairs[row][0];
@@ -110,7 +110,7 @@ fn a_key_is_fetched_from_behind_a_door() {
     is_near_the_optimum_and_above_all_others("door");
 }
 
-/// What slips falls or jams the gripper, and costs more than grasping with care.
+/// A slipping parcel falls or jams the gripper, which costs more than a careful grasp.
 #[test]
 fn a_parcel_that_may_fall_is_grasped_with_care() {
     is_near_the_optimum_and_above_all_others("spill");
@@ -121,7 +121,7 @@ fn machines_are_maintained_all_at_once() {
     is_near_the_optimum_and_above_all_others("machines");
 }
 
-/// Their likelihoods are rates per second, so that it costs something to do one thing after the other.
+/// The likelihoods are rates per second, so sequential execution has a cost.
 #[test]
 fn who_goes_by_likelihoods_maintains_machines_as_parallel_as_who_does_not() {
     let results = results("machines", 0, 100);
@@ -146,29 +146,29 @@ fn the_same_seed_leads_to_the_same_runs_on_any_number_of_threads() {
     assert_eq!(one.json(), two.json());
 }
 
-/// A world with a plan to begin with, as text.
+/// World with a first plan, as text.
 struct Small<'a> {
     domain: &'a str,
     problem: &'a str,
     world: &'a str,
-    /// `None`: the planner's.
+    /// First plan; `None` for the planner's.
     plan: Option<&'a str>,
     ends: Rational,
 }
 
-/// What `policy` makes of a world: its table's bounds, and the runs.
+/// Results of `policy` in a world: the bounds of its table, and the runs.
 struct Made {
     lower: f64,
     upper: f64,
     reports: Vec<Report>,
-    /// Those of executors that do not weigh moves, in the same worlds.
+    /// Runs of executors that do not evaluate moves, in the same worlds.
     others: Vec<Vec<Report>>,
 }
 
-/// Executors that do not go by likelihood.
+/// Executors that do not use likelihoods.
 const BASELINES: [&str; 5] = ["esterel", "stn", "guarded", "live", "fixed:100"];
 
-/// `None` if there is no plan: whoever has none does not begin.
+/// Returns the results in a world, or `None` if there is no plan to begin with.
 fn made_of(small: &Small<'_>, runs: u64) -> Option<Made> {
     let source = |text: &str| Source::new("test", text);
     let read = read_problem(&source(small.domain), &source(small.problem));
@@ -211,18 +211,19 @@ fn made_of(small: &Small<'_>, runs: u64) -> Option<Made> {
     })
 }
 
-/// Run in the world that it knows, it succeeds as often as its table and the plain recursion say,
-/// but for the dice: in worlds in which one can be sure, in those that are left to chance, in
-/// those in which facts change at rates, and in those in which failures leave something behind and
-/// take time. It is between the bounds of its table, and no executor that does not weigh moves is better in the same
-/// worlds, but for the dice and the two points.
+/// In the world that it knows, `policy` succeeds as often as its table and the plain recursion
+/// predict, up to sampling error. The worlds include deterministic and random ones, facts that
+/// change at rates, and failures with outcomes and delays. The success rate lies between the bounds
+/// of its table. No executor that does not evaluate moves is better in the same worlds, up to
+/// sampling error and two points.
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
 fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
     const RUNS: u64 = 200;
     const OF_EACH_KIND: usize = 10;
     let mut tried = [0; 4];
-    // Of all worlds, by baseline: runs that only it wins, and that only `policy` wins.
+    // Over all worlds, by baseline: the number of runs that only the baseline wins, and that only
+    // `policy` wins.
     let mut pairs = [(0.0_f64, 0.0_f64); BASELINES.len()];
     for number in 0..800 {
         let mut rng = ChaCha8Rng::seed_from_u64(number);
@@ -256,8 +257,7 @@ fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
             reports,
             others,
         } = made;
-        // What happens one after another is ε apart, so that the last second's end is a little
-        // late.
+        // Successive happenings are ε apart, so that the end in the last second is slightly late.
         let ends = &small.ends + Rational::new(1, 10);
         let is_won =
             |report: &&Report| report.verdict == Verdict::GoalReached && report.time <= ends;
@@ -302,8 +302,8 @@ fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
     }
 }
 
-/// A door closes once in ten seconds and opens again within five on average. Whoever fails at it
-/// begins anew as soon as it is open, and begins nothing while it is shut.
+/// A door closes once in ten seconds and opens again within five on average. After a failure, the
+/// executor starts again as soon as the door is open, and never while it is closed.
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
 fn a_door_that_opens_and_closes_at_rates_is_tried_as_often_as_there_is_time() {
@@ -335,8 +335,7 @@ fn a_door_that_opens_and_closes_at_rates_is_tried_as_often_as_there_is_time() {
     );
 }
 
-/// The plan passes through the goal, loses it again, and fails half of the time on the way back to
-/// it.
+/// The plan passes through the goal, loses it again, and fails half of the time on the way back.
 #[test]
 fn what_is_under_way_is_let_go_when_the_goal_holds() {
     let small = Small {
@@ -360,8 +359,8 @@ fn what_is_under_way_is_let_go_when_the_goal_holds() {
     }
 }
 
-/// Six things at once, each of which takes as long as it likes, and one after them: the whole process has too
-/// many states, that of whoever keeps to these seven has few. The plan to begin with is another one that is quicker
+/// Six concurrent actions of random duration, and one after them. The full process has too many
+/// states; that of these seven actions has few. The first plan has other actions; it is quicker,
 /// and fails half of the time.
 #[test]
 fn where_a_plan_nearly_always_succeeds_it_goes_by_the_table_of_its_actions() {
@@ -438,7 +437,7 @@ fn where_a_plan_nearly_always_succeeds_it_goes_by_the_table_of_its_actions() {
             .with_outlook(Some(Arc::clone(&outlook)));
         let report = execution.run_in(&mut *model.world(&task, seed));
         assert_eq!(report.verdict, Verdict::GoalReached, "{seed}: {report:#?}");
-        // Nobody was asked for a plan.
+        // The planner was not called.
         assert_eq!(report.replans, 0, "{seed}: {report:#?}");
     }
 }

@@ -1,8 +1,8 @@
-//! `policy` without its table: what can be done is tried out in samples of the world.
+//! `policy` without its table: it evaluates moves by rollouts in samples of the world.
 //!
-//! `ELBOWROOM_TRIALS=400` makes that many trials of each world, and the table is printed
-//! (`--nocapture`); `ELBOWROOM_WORLDS="clumsy vase"` names other ones, and
-//! `ELBOWROOM_EXECUTORS="policy live"` other executors.
+//! `ELBOWROOM_TRIALS=400` sets the number of trials of each world, and the table is printed
+//! (`--nocapture`); `ELBOWROOM_WORLDS="clumsy vase"` selects worlds, and
+//! `ELBOWROOM_EXECUTORS="policy live"` executors.
 
 #![allow(clippy::print_stdout, reason = "the table is worth seeing")]
 
@@ -10,14 +10,14 @@ use elbowroom::execute::FirstPlan;
 use elbowroom_laboratory::compare::{Column, Experiment, Part, Results, run};
 use elbowroom_pddl::Source;
 
-/// `policy`, and whom it must not be below.
+/// `policy`, and the executors for comparison.
 const EXECUTORS: &str = "policy live:5 adaptable guarded esterel";
 
 fn told(name: &str, default: &str) -> String {
     std::env::var(name).unwrap_or_else(|_| default.to_owned())
 }
 
-/// An experiment in which `policy` has no table.
+/// Returns an experiment in which `policy` has no table.
 fn experiment(name: &str) -> Experiment {
     let folder = format!("{}/../../experiments", env!("CARGO_MANIFEST_DIR"));
     let file = |path: &str| {
@@ -49,8 +49,8 @@ fn results(experiment: &Experiment, jobs: usize, trials: u64) -> Results {
     run(experiment, part, &|_| true).expect("it runs")
 }
 
-/// The best that anybody reaches without foresight, by the bounds in docs/experiments.md, and how much
-/// less is near: three standard errors of 40 trials, and five points.
+/// Optimum without foresight, by the bounds in docs/experiments.md, minus a tolerance of three
+/// standard errors of 40 trials and five points.
 const NEAR: [(&str, f64); 2] = [("weld", 0.957 - 0.15), ("vase", 0.976 - 0.13)];
 
 #[test]

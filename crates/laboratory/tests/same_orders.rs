@@ -1,5 +1,5 @@
-//! Our domains of tables 1 and 2 mean what the authors' files mean: the same deadlines, and the
-//! judge says the same of the same plans.
+//! Our domains of tables 1 and 2 have the same meaning as the authors' files: the same deadlines,
+//! and the same verdicts of the validator on the same plans.
 
 mod shared;
 
@@ -13,7 +13,7 @@ use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan, read_problem};
 use shared::number;
 
-/// Their words and ours.
+/// Names in the authors' domains and in ours.
 const WORDS: &[(&str, &str)] = &[
     ("goto_waypoint", "go"),
     ("collect_order", "collect"),
@@ -31,7 +31,7 @@ const WORDS: &[(&str, &str)] = &[
     (" ow1", " back"),
 ];
 
-/// A plan in their words, step after step; the steps of the base begin side by side.
+/// Plan with the authors' names, step after step; the steps of the base begin concurrently.
 #[derive(Default)]
 struct Script {
     text: String,
@@ -85,7 +85,8 @@ impl Script {
     }
 }
 
-/// Plans that exercise every action, condition and deadline. `ring` is how long a ring takes.
+/// Generates plans that exercise every action, condition and deadline. `ring` is the duration of
+/// mounting a ring.
 fn scripts(steps: &[i64], ring: i64) -> Vec<Script> {
     let new = Script::default;
     let simple = |script: Script| script.after_the_base("o0", "ow0", ring);
@@ -94,23 +95,23 @@ fn scripts(steps: &[i64], ring: i64) -> Vec<Script> {
     let mut scripts = vec![
         simple(new().until_the_base("o0", steps)),
         fancy(new().until_the_base("o1", steps)),
-        // An order is dropped, and the other one delivered.
+        // An order is abandoned, and the other one delivered.
         fancy(
             new()
                 .until_the_base("o0", &half)
                 .thrown_away("o0")
                 .until_the_base("o1", steps),
         ),
-        // A base that is not done.
+        // An incomplete base.
         simple(new().until_the_base("o0", &half)),
-        // Another order's window, and another order's rings.
+        // The window or the rings of another order.
         new()
             .until_the_base("o0", steps)
             .after_the_base("o0", "ow1", ring),
         new()
             .until_the_base("o0", steps)
             .after_the_base("o0", "ow0", 3 * ring),
-        // A second order while the first is held.
+        // A second order while the first one is held.
         new()
             .until_the_base("o0", steps)
             .then("(goto_waypoint r0 bs0 s0)", 20)
@@ -125,7 +126,7 @@ fn scripts(steps: &[i64], ring: i64) -> Vec<Script> {
     scripts
 }
 
-/// What the judge says of a plan: its end, if it is valid.
+/// Validates a plan. Returns its end, if it is valid.
 fn judged(task: &Task, text: &str) -> Option<Rational> {
     let (plan, _): (TimeTriggeredPlan, _) =
         read_plan(&Source::new("plan", text), task).expect("a readable plan");
@@ -149,7 +150,7 @@ fn translated(text: &str) -> String {
     text
 }
 
-/// Our problems of a table, in the order of the file.
+/// Reads our problems of a table, in the order of the file.
 fn our_problems(table: &str) -> Vec<Task> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
     let file = |name: &str| std::fs::read_to_string(folder.join(name)).map_err(|e| e.to_string());
@@ -172,7 +173,7 @@ fn their_problems(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).expect("a folder of problems");
     let paths = entries.map(|entry| entry.expect("readable").path());
     let mut paths: Vec<_> = paths.filter(|path| path.extension().is_some()).collect();
-    // lp0.95 before lp1.05, whatever the alphabet says.
+    // lp0.95 must come before lp1.05, against the alphabetical order.
     paths.sort();
     paths
 }
@@ -184,7 +185,8 @@ fn deadlines(task: &Task) -> Vec<Rational> {
         .collect()
 }
 
-/// Two tables of the same problems: the same deadlines to a thousandth, and the same verdicts.
+/// Compares two tables of the same problems: deadlines agree to a thousandth, and verdicts are the
+/// same.
 fn compare(table: &str, folder: &Path, domain: &str, steps: [&[i64]; 2], ring: i64) {
     let mut ours = our_problems(table);
     let theirs = their_problems(&folder.join("problems"));
@@ -218,8 +220,8 @@ fn compare(table: &str, folder: &Path, domain: &str, steps: [&[i64]; 2], ring: i
     assert!(valid > 500 && invalid > 500, "{valid} valid, {invalid} not");
 }
 
-/// The domain that the authors published for table 1 has four steps of the base; with five
-/// uncertain ones it must have had the six of table 2.
+/// The domain that the authors published for table 1 has four steps of the base. With five
+/// uncertain steps, it must have had the six of table 2.
 #[test]
 fn table_1_has_the_authors_deadlines_durations_and_actions() {
     let Some(data) = shared::data() else { return };
@@ -244,8 +246,8 @@ fn table_2_has_the_authors_deadlines_durations_and_actions() {
 }
 
 /// In the authors' domain, throwing a workpiece away exchanges two numbers: the battery gets 150
-/// whatever its capacity, and the order gets the capacity as its weight, which is too much ever to
-/// be delivered. Ours follows the description: a full battery, and no weight.
+/// whatever its capacity, and the order gets the capacity as its weight, which is too heavy for a
+/// delivery. Ours follows the description: a full battery, and no weight.
 #[test]
 fn an_order_that_was_thrown_away_can_be_made_again_only_in_our_table_2() {
     let Some(data) = shared::data() else { return };

@@ -1,5 +1,4 @@
-//! Storm, reading the processes that are exported, says the same as the optima that are calculated
-//! here.
+//! Storm confirms the optima that are computed here, from the exported processes.
 //!
 //! `ELBOWROOM_STORM` is the Python that has stormpy.
 
@@ -34,7 +33,7 @@ use serde::Deserialize;
 use skipped::skipped;
 use twin::SmallWorld;
 
-/// What `testing/storm.py` says of a file.
+/// Output of `testing/storm.py` for a file.
 #[derive(Debug, Deserialize)]
 struct Said {
     value: f64,
@@ -46,8 +45,8 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// What Storm says of each text, of the last ones, from `exact` on, in fractions; `None` where there
-/// is no Storm.
+/// Returns the results of Storm for each text. Those from `exact` on are computed with fractions.
+/// `None` if Storm is not available.
 fn storm(test: &str, texts: &[String], exact: usize) -> Option<Vec<Said>> {
     let Some(python) = std::env::var_os("ELBOWROOM_STORM") else {
         skipped("ELBOWROOM_STORM names no Python with stormpy");
@@ -88,7 +87,7 @@ fn task(domain: &str, problem: &str) -> Task {
     Task::new(problem)
 }
 
-/// The best value in a world without time.
+/// Returns the optimum in a world without time.
 fn best(task: &Task, likelihoods: &Likelihoods, settings: &without_time::Settings) -> f64 {
     let task = Arc::new(task.clone());
     let actions = all_actions_under(&task, likelihoods).expect("there is no time in it");
@@ -121,7 +120,7 @@ fn the_optima_of_paper_2_are_those_of_storm() {
     let experiment = experiment.expect("an experiment");
     assert_eq!(experiment.cases.len(), 18);
     let (mut names, mut ours, mut texts) = (Vec::new(), Vec::new(), Vec::new());
-    // Where nothing that is broken works again, fractions take seconds.
+    // If no broken machine works again, fractions take only seconds.
     let is_quick = |name: &str| name == "SF3 p1";
     let mut cases: Vec<_> = experiment.cases.iter().collect();
     cases.sort_by_key(|case| is_quick(&case.name));
@@ -144,7 +143,7 @@ fn the_optima_of_paper_2_are_those_of_storm() {
             ours.push(best(&task, &likelihoods, rules));
             texts.push(untimed(&task, &likelihoods, rules).expect("it can be written"));
         };
-        // Those of the trials: the first plan is one of ten rounds.
+        // The rules of the trials: the first plan is one of ten rounds.
         add(&rules(DeadEnds::Patience(9), false), "rounds");
         add(&rules(DeadEnds::Lost, false), "lost");
         if ["SF3 p6", "SF3 p7"].contains(&case.name.as_str()) {
@@ -240,7 +239,7 @@ fn worlds_in_which_ends_fail_are_those_of_storm() {
             }
         }
     }
-    // What is said of failures matters.
+    // The outcomes of failures make a difference.
     assert!(ours[0].1 > ours[4].1 + 0.01, "{ours:?}");
     let Some(said) = storm("grasp", &texts, texts.len()) else {
         return;
@@ -250,7 +249,7 @@ fn worlds_in_which_ends_fail_are_those_of_storm() {
     }
 }
 
-/// Our bounds on one grid.
+/// Returns our bounds on one grid.
 fn grid(task: &Task, world: &WorldModel, settings: &Settings, cells: usize) -> TimedOptimum {
     let settings = Settings {
         first_cells: cells,
@@ -313,7 +312,7 @@ fn bounds_of_the_timed_optimum_are_those_of_storm() {
             ..Settings::default()
         };
         let ours = grid(&task, &world, &settings, 4);
-        // Where something is left to chance, or to the order.
+        // Only worlds in which chance or the order matters.
         if ours.lower < 0.99 && ours.upper > 0.01 {
             add(format!("small world {number}"), task, world, ends, 4);
             chancy += 1;

@@ -1,9 +1,9 @@
-//! The timed optimum of problems of the published tables.
+//! Timed optimum for problems of the published tables.
 
 use elbowroom_laboratory::compare::{ColumnOptimum, Experiment, Part, run};
 use elbowroom_pddl::Source;
 
-/// The optimum of a table's columns, of the problem that one gets with the first of what may be filled in.
+/// Returns the optimum of a table's columns for the first problem.
 fn of_first_problem(name: &str) -> Vec<ColumnOptimum> {
     let mut experiment = experiment(name);
     for (_, values) in &mut experiment.blanks {
@@ -40,8 +40,8 @@ fn optimum_of(experiment: &Experiment) -> Vec<ColumnOptimum> {
     run(experiment, part, &|_| true).expect("it runs").optimum
 }
 
-/// Both windows close as early as they do in any problem. Whoever goes for the far one is nearly always in
-/// time, however many steps vary.
+/// Both windows close at the earliest time of all problems. A policy that aims at the later one is
+/// nearly always in time, however many steps vary.
 #[test]
 fn in_the_tightest_problem_of_table_1_hardly_anything_need_be_lost() {
     let columns = of_first_problem("table1");
@@ -52,13 +52,14 @@ fn in_the_tightest_problem_of_table_1_hardly_anything_need_be_lost() {
     }
 }
 
-/// Whoever makes one workpiece after the other reaches 89.9 %. But what is too light may get more material after
-/// the rings: the model lets one pick a workpiece up again that has been thrown away while it was picked up.
+/// Making one workpiece after the other reaches 89.9 %. In addition, a workpiece that is too light
+/// may get more material after the rings, because the model allows a workpiece to be picked up
+/// again that was thrown away while it was being picked up.
 #[test]
 fn in_a_problem_of_table_2_the_bounds_are_a_point_apart() {
     let mut experiment = experiment("table2_optimum");
     experiment.columns.truncate(1);
-    // With the largest battery there is one plan only, and what is done when it has failed.
+    // With the largest battery there is only one plan, and its recovery.
     for group in &mut experiment.together {
         group.rows.drain(..group.rows.len() - 1);
     }
@@ -66,7 +67,8 @@ fn in_a_problem_of_table_2_the_bounds_are_a_point_apart() {
     assert_eq!(columns.len(), 1);
     let optimum = &columns[0];
     assert!(optimum.upper - optimum.lower <= 0.01, "{optimum:?}");
-    // Too heavy, and then wrong, is the end. Draws are normal, with mean 85 and deviation 25; wrong is below 60 or above 110.
+    // The run is lost if the weight is too high and the next one is wrong. Draws are normal with
+    // mean 85 and deviation 25; wrong is below 60 or above 110.
     let (heavy, wrong) = (0.1587, 0.3173);
     let least = heavy * wrong;
     assert!(

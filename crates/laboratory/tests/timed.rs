@@ -1,4 +1,4 @@
-//! The timed optimum: worlds worked by hand, and a plain recursion over small ones.
+//! Timed optimum of worlds computed by hand, and of small ones computed by a plain recursion.
 
 #[path = "timed/enclosed.rs"]
 mod enclosed;
@@ -41,7 +41,7 @@ fn of_experiment(name: &str, settings: &Settings) -> TimedOptimum {
     )
 }
 
-/// With nothing that happens by itself there is only this to be late for.
+/// Sets the horizon, the only deadline in worlds without events.
 fn until(horizon: i64) -> Settings {
     Settings {
         horizon: Some(horizon.into()),
@@ -71,8 +71,8 @@ fn machines_are_best_maintained_all_at_once() {
     assert_eq!(found.stop, Stop::Close);
 }
 
-/// Six things at once, each of which takes as long as it likes, and one after them. Whoever may begin each
-/// at any time, and let it go, has too many states; whoever begins all when that can be done has few.
+/// Six concurrent actions of random duration, and one after them. Free start and cancel times have
+/// too many states. Starting each action as soon as it is possible has few.
 #[test]
 fn many_things_at_once_are_bounded_from_below_within_a_plan() {
     let names = ["a", "b", "c", "d", "e", "f"];
@@ -111,15 +111,16 @@ fn many_things_at_once_are_bounded_from_below_within_a_plan() {
         ..Settings::default()
     };
     let found = bounds(&domain, &problem, world, &settings);
-    // Each is done by 10 with 0.98, all six with its sixth power.
+    // Each is done by 10 with probability 0.98, all six with its sixth power.
     let by_hand = 0.98_f64.powi(6);
     assert_encloses(&found, by_hand);
     assert!(found.within.is_some(), "{found:?}");
     assert!(found.lower > by_hand - 0.05, "{found:?}");
 }
 
-/// A vase is to be carried home before dark, and may be knocked over on the way, if it is not carried with
-/// care. Where there are too many states, the bound from above is that of a world in which nobody does so.
+/// A vase is to be carried home before dark, and may be knocked over on the way if it is not
+/// carried with care. If there are too many states, the upper bound is that of a world without this
+/// failure.
 #[test]
 fn with_too_many_states_the_bound_from_above_is_that_of_a_kinder_world() {
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
@@ -157,8 +158,9 @@ fn with_too_many_states_the_bound_from_above_is_that_of_a_kinder_world() {
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few steps")]
 fn a_door_that_opens_and_closes_at_rates_is_gone_through_when_it_lets_one() {
-    // It stands open at first, closes once in ten seconds and opens once in five; going through
-    // takes 4, and at 12 the day is over. Whoever fails begins again as soon as it is open.
+    // The door is open at first, closes once in ten seconds and opens once in five. Going through
+    // takes 4, and the day is over at 12. After a failure, the best policy starts again as soon as
+    // the door is open.
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
         (:predicates (open) (day) (through))
         (:durative-action go :parameters () :duration (= ?duration 4)
@@ -172,8 +174,8 @@ fn a_door_that_opens_and_closes_at_rates_is_gone_through_when_it_lets_one() {
         ..Settings::default()
     };
     let found = bounds(domain, problem, world, &settings);
-    // With s seconds left and the door open: through with exp(-0.4), or else it closes after t, and
-    // is open again after u more. Backwards on a fine grid, by the midpoint rule.
+    // With s seconds left and the door open: success with exp(-0.4), or else it closes after t, and
+    // is open again after u more. Computed backwards on a fine grid by the midpoint rule.
     let steps_per_second = 200_u32;
     let step = 1.0 / f64::from(steps_per_second);
     let needed = 4 * steps_per_second as usize;
@@ -203,8 +205,8 @@ fn a_door_that_opens_and_closes_at_rates_is_gone_through_when_it_lets_one() {
 
 #[test]
 fn what_is_taken_away_and_given_back_in_one_cell_is_there_after_it() {
-    // The door closes at 2.5 and opens again at 3, and going through takes 4. Seen on a coarse
-    // grid both happen in one cell, and nobody knows in which order.
+    // The door closes at 2.5 and opens again at 3, and going through takes 4. On a coarse grid both
+    // happen in one cell, in an unknown order.
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
         (:predicates (open) (day) (through))
         (:durative-action go :parameters () :duration (= ?duration 4)
@@ -225,8 +227,8 @@ fn what_is_taken_away_and_given_back_in_one_cell_is_there_after_it() {
 
 #[test]
 fn who_waits_for_the_door_goes_through_it() {
-    // The door opens at 3 for certain, and closes at a time in [5, 9]; going through takes 2. Who
-    // waits at the door is through at 5.
+    // The door opens at 3 for certain, and closes at a time in [5, 9]; going through takes 2. A
+    // policy that waits at the door is through at 5.
     let domain = "(define (domain d) (:requirements :durative-actions)
         (:predicates (open) (through))
         (:durative-action go :parameters () :duration (= ?duration 2)
@@ -241,9 +243,9 @@ fn who_waits_for_the_door_goes_through_it() {
 
 #[test]
 fn light_that_goes_out_early_is_no_gain() {
-    // A match burns 4 or 8, each half of the time, and mending takes 5 in its light: rounding the
-    // match down or the mending up would both be wrong. There is one match, and it must burn down:
-    // who could drop it would have light for ever.
+    // A match burns 4 or 8, each half of the time, and mending takes 5 in its light. Rounding the
+    // duration of the match down or that of mending up would both be wrong. There is one match, and
+    // it must burn down: if it could be dropped, there would be light forever.
     let domain = "(define (domain d) (:requirements :durative-actions)
         (:predicates (unused) (light) (burnt) (mended) (day) (done))
         (:action finish :parameters () :precondition (and (mended) (burnt) (day)) :effect (done))
@@ -337,10 +339,10 @@ fn a_goal_that_a_timed_initial_changes_is_refused() {
 
 #[test]
 fn what_a_failure_leaves_behind_and_costs_is_worth_what_hand_says() {
-    // A grasp takes 4 and fails half of the time; then half of the parcels fall, from where they are
-    // picked up in 3, and the others jam the gripper for 2 more. The counter closes at 10.5. At 4:
-    // half are there; a quarter have fallen, and are there at 7; a quarter is on the shelf at 6, and
-    // half of these are there at 10.
+    // A grasp takes 4 and fails half of the time. Then half of the parcels fall, and can be picked
+    // up in 3; the others jam the gripper for 2 more. The counter closes at 10.5. At 4, half are
+    // held, a quarter have fallen and are held at 7, and a quarter is on the shelf at 6, of which
+    // half are held at 10.
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
         (:predicates (shelf) (floor) (open) (held) (done))
         (:durative-action grasp :parameters () :duration (= ?duration 4)
@@ -358,7 +360,7 @@ fn what_a_failure_leaves_behind_and_costs_is_worth_what_hand_says() {
     let found = bounds(domain, problem, world, &Settings::default());
     assert_encloses(&found, 0.5 + 0.25 + 0.125);
     assert_eq!(found.stop, Stop::Close);
-    // A second more, and it is too late for another attempt.
+    // With one more second, it is too late for another attempt.
     let late = world.replace("delay = 2", "delay = 3");
     let found = bounds(domain, problem, &late, &Settings::default());
     assert_encloses(&found, 0.75);
@@ -383,8 +385,8 @@ fn being_quick_at_everything_is_no_match_for_taking_care() {
     assert!(shortest.upper < best.lower, "{shortest:?} {best:?}");
 }
 
-/// A key lies where a step begins that is only done at the press. The step leaves it behind when it starts, and breaks
-/// off at once anywhere else.
+/// A key lies where a step begins that can only be done at the press. The step leaves it behind
+/// when it starts, and fails at once anywhere else.
 #[test]
 fn nobody_starts_what_breaks_off_at_once() {
     let domain = |initial: &str| {
@@ -409,8 +411,8 @@ fn nobody_starts_what_breaks_off_at_once() {
     assert!(found.upper < 1e-6, "{found:?}");
 }
 
-/// Two times something between 0 and 80 is added, and 60 are enough: what is too little by itself may be enough
-/// together.
+/// An amount between 0 and 80 is added twice, and 60 are enough. Two insufficient amounts may be
+/// enough together.
 #[test]
 fn what_is_drawn_twice_is_cut_where_half_of_it_decides() {
     let domain = "(define (domain d) (:requirements :durative-actions :fluents)
@@ -440,7 +442,7 @@ fn what_is_drawn_twice_is_cut_where_half_of_it_decides() {
     );
     let found = bounds(domain, problem, &world, &until(20));
     assert_encloses(&found, 1.0 - 60.0 * 60.0 / 2.0 / (80.0 * 80.0));
-    // Cut at 60 alone, nothing but a draw of 60 or more is known to be enough.
+    // Cut at 60 alone, only a draw of 60 or more is known to be enough.
     assert!(found.lower > 1.0 - 0.75 * 0.75 + 0.1, "{found:?}");
     assert!(found.upper < 0.9, "{found:?}");
 }

@@ -1,16 +1,18 @@
-//! Who must be there before time begins.
+//! Waiting for performers before time begins.
 
 use std::time::Duration;
 
 use crate::Hub;
 
-/// Performers say once a second that they are there: so long after the first one, all have been heard.
+/// Time from the first performer until all performers have been heard. Each one reports once a
+/// second.
 const A_ROUND: Duration = Duration::from_millis(1200);
-/// So long after the first one, those that are still missing are not waited for: a plan may do without them.
+/// Time from the first performer until missing ones are ignored. A plan may not need them.
 const STRAGGLERS: Duration = Duration::from_secs(3);
 
-/// Waits for performers: for those of the actions that are needed; where none are named, for those of all actions of the
-/// domain; and where these are not known either, for the first one and those that are heard soon after.
+/// Waits for performers. The names of needed actions have priority. Without them, it waits for a
+/// performer of each action of the domain. If the domain is unknown as well, it waits for the first
+/// performer, and for those that follow soon.
 #[derive(Debug)]
 pub struct Census {
     needs: Vec<String>,
@@ -20,7 +22,8 @@ pub struct Census {
 }
 
 impl Census {
-    /// `needs` are names of actions in lower case; `within` is how long to wait, from the hub's time 0.
+    /// Creates a census. `needs` are names of actions in lower case. `within` is the time limit,
+    /// from the hub's time 0.
     pub fn new(needs: Vec<String>, within: Duration) -> Self {
         Self {
             needs,
@@ -30,20 +33,20 @@ impl Census {
         }
     }
 
-    /// These are the actions of the domain, in lower case.
+    /// Sets the actions of the domain, in lower case.
     pub fn know(&mut self, domain: Vec<String>) {
         self.domain = domain;
     }
 
-    /// The actions of the domain that nobody performs, as far as has been heard. A plan may do without them.
+    /// Returns the actions of the domain without a performer so far. A plan may not need them.
     pub fn unattended(&self, hub: &Hub, now: Duration) -> Vec<&str> {
         missing(&self.domain, hub, now)
     }
 
-    /// Whether time can begin.
+    /// Returns `true` if time can begin.
     ///
     /// # Errors
-    /// The time to wait is over, and an action that is needed has no performer.
+    /// The time limit has passed, and a needed action has no performer.
     pub fn is_over(&mut self, hub: &Hub, now: Duration) -> Result<bool, String> {
         if !hub.performers(now).is_empty() {
             self.first.get_or_insert(now);
@@ -52,7 +55,7 @@ impl Census {
         let first = self.first;
         let is_since = |round| first.is_some_and(|at| now.saturating_sub(at) >= round);
         let are_all_there = if self.needs.is_empty() {
-            // More than one may perform an action.
+            // Several performers may offer the same action.
             let is_attended = || self.unattended(hub, now).is_empty();
             is_since(STRAGGLERS) || is_since(A_ROUND) && is_attended()
         } else {
@@ -76,7 +79,7 @@ impl Census {
     }
 }
 
-/// Those of the actions that nobody performs.
+/// Returns the actions without a performer.
 fn missing<'a>(actions: &'a [String], hub: &Hub, now: Duration) -> Vec<&'a str> {
     let performers = hub.performers(now);
     let is_there = |wanted: &&String| {
@@ -128,7 +131,7 @@ mod tests {
         assert_eq!(census.is_over(&hub, seconds(0)), Ok(false));
         assert_eq!(census.is_over(&hub, seconds(2)), Ok(false));
         assert_eq!(census.unattended(&hub, seconds(2)), ["pick"]);
-        // A plan may do without.
+        // A plan may not need the missing action.
         assert_eq!(census.is_over(&hub, seconds(3)), Ok(true));
         let mut census = Census::new(vec![], seconds(10));
         census.know(vec!["move".into()]);

@@ -1,4 +1,4 @@
-//! The goals of an action of ROS, one at a time.
+//! Goals of a ROS action, one at a time.
 
 use std::collections::VecDeque;
 
@@ -8,10 +8,10 @@ use crate::interface::{
 };
 use crate::message::Stamp;
 
-/// So many results are kept for who asks late.
+/// Number of results kept for late requests.
 const KEPT: usize = 16;
 
-/// The goal that is pursued and those that have ended. `R` says who has asked.
+/// The open goal and the last ones that have ended. `R` identifies a client.
 #[derive(Debug)]
 pub struct Goals<R> {
     open: Option<GoalInfo>,
@@ -32,12 +32,12 @@ impl<R> Default for Goals<R> {
 }
 
 impl<R> Goals<R> {
-    /// The goal that is pursued.
+    /// Returns the open goal.
     pub fn open(&self) -> Option<GoalId> {
         self.open.map(|it| it.goal_id)
     }
 
-    /// Accepts a goal, if none is pursued and its number is new.
+    /// Accepts a goal if none is open and its number is new.
     pub fn accept(&mut self, goal_id: GoalId, stamp: Stamp) -> bool {
         let is_new = self.open.is_none() && self.ended.iter().all(|(it, _)| it.goal_id != goal_id);
         if is_new {
@@ -46,8 +46,8 @@ impl<R> Goals<R> {
         is_new
     }
 
-    /// Whether the open goal is to be given up, and the answer: by its number, all up to a time, or, where both are
-    /// zero, all.
+    /// Cancels the open goal if the request selects it: by its number, by a latest time, or, with
+    /// both zero, always. Returns `true` if it is selected, and the answer.
     pub fn cancel(&mut self, request: &CancelRequest) -> (bool, CancelResponse) {
         let GoalInfo { goal_id, stamp } = request.goal_info;
         let (is_any, is_ever) = (goal_id == GoalId::default(), stamp == Stamp::default());
@@ -72,7 +72,8 @@ impl<R> Goals<R> {
         (is_given_up, response)
     }
 
-    /// Somebody asks for a result: it comes back, with who has asked, if it is known; else when the goal ends.
+    /// Requests a result. Returns the client and the result, or `None` if the goal is open. Its
+    /// result is then returned by [`Self::end`].
     pub fn ask(&mut self, goal_id: GoalId, who: R) -> Option<(R, ResultResponse)> {
         if self.open() == Some(goal_id) {
             self.asked.push(who);
@@ -89,7 +90,7 @@ impl<R> Goals<R> {
         ))
     }
 
-    /// The open goal has ended; what is to be answered to whom.
+    /// Ends the open goal. Returns its result for each waiting client.
     pub fn end(
         &mut self,
         is_reached: bool,
@@ -119,7 +120,7 @@ impl<R> Goals<R> {
             .collect()
     }
 
-    /// How all goals stand.
+    /// Returns the status of each known goal.
     pub fn statuses(&self) -> GoalStatuses {
         let ended = self
             .ended

@@ -1,4 +1,4 @@
-//! The executor's part on `PlanSys2`'s topic `actions_hub`.
+//! Executor's side of `PlanSys2`'s topic `actions_hub`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem;
@@ -6,89 +6,88 @@ use std::time::Duration;
 
 use crate::message::{ActionExecution, ActionPerformerStatus, kind, state};
 
-/// A request may be lost while nodes find each other; it is repeated after so long.
+/// Interval between repetitions of a request, which may be lost during discovery.
 const ASK_EVERY: Duration = Duration::from_secs(1);
-/// An action that nobody has answered for so long has failed.
+/// Time limit for an answer to a request. Then the action has failed.
 const GIVE_UP_ASKING: Duration = Duration::from_secs(30);
-/// A performer whose status came every second, and has not come for so long, is lost.
+/// Time without a status after which a performer is lost. It reports once a second.
 const LOST_AFTER: Duration = Duration::from_secs(5);
-/// A performer that has said for so long that it does nothing is not going to say how its action ended:
-/// either it was never told to begin, or its last word is lost.
+/// Time for which a performer must report that it is idle until its action has failed. Either it
+/// never received the confirmation, or its result was lost.
 const IDLE_AFTER: Duration = Duration::from_secs(3);
 
-/// The number of a start. It never comes again within a run.
+/// Number of a start, unique within a run.
 pub type Ticket = u64;
 
-/// An action that is to be done.
+/// Action to execute.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Action {
-    /// Which start it is.
+    /// Number of this start.
     pub ticket: Ticket,
     /// Its name.
     pub name: String,
-    /// Its objects.
+    /// Its arguments.
     pub arguments: Vec<String>,
-    /// Whether it takes no time: then it has started when it is done.
+    /// `true` if it is instantaneous. Then its start is reported when it is done.
     pub is_instantaneous: bool,
 }
 
-/// What is to be done after something was heard.
+/// Output of the hub.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// This is to be published on `actions_hub`.
+    /// Message to publish on `actions_hub`.
     Send(ActionExecution),
-    /// This has become of an action.
+    /// Report about an action.
     Tell(Ticket, Told),
-    /// People should know.
+    /// Message for the user.
     Remark(String),
 }
 
-/// What has become of an action.
+/// Report about an action.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Told {
-    /// It has started; if it takes no time, it is done.
+    /// It has started. An instantaneous action is also done.
     Started,
-    /// It goes on.
+    /// It is running.
     Feedback {
-        /// How far it has come, from 0 to 1.
+        /// Completed share, from 0 to 1.
         completion: f32,
-        /// What the performer says about that.
+        /// Text of the performer.
         note: String,
     },
-    /// It has ended as it should.
+    /// It has succeeded.
     Succeeded,
-    /// It has ended otherwise, and why.
+    /// It has failed, for this reason.
     Failed(String),
-    /// It does not run any more, as it was told to.
+    /// It has stopped after a cancel request.
     Cancelled,
 }
 
-/// One action, and who does it. Messages carry no number of the execution: the name and the arguments
-/// are all there is to go by.
+/// Ground action, by its name and arguments. Messages have no other identification.
 type Key = (String, Vec<String>);
 
 #[derive(Debug)]
 struct Deal {
     action: Action,
-    /// When it was last asked for.
+    /// Time of the last request.
     asked: Option<Duration>,
-    /// When something last happened.
+    /// Time of the last event.
     since: Duration,
     performer: Option<String>,
-    /// Since when the performer has said that it does nothing.
+    /// Time since which the performer has reported that it is idle.
     idle: Option<Duration>,
     is_cancelled: bool,
 }
 
-/// A performer that was heard of.
+/// Last status of a performer.
 #[derive(Debug)]
 struct Heard {
     at: Duration,
     action: String,
 }
 
-/// The executor's side of `actions_hub`: finds a performer for each action, follows it, and notices who is
-/// lost. Times are since any moment, the same for all calls, and do not go back.
+/// Executor's side of `actions_hub`. It finds a performer for each action, follows its progress,
+/// and detects lost performers. Times must have a common origin and never decrease.
 #[derive(Debug)]
 pub struct Hub {
     name: String,
@@ -99,7 +98,7 @@ pub struct Hub {
 }
 
 impl Hub {
-    /// A hub that calls itself so on the topic.
+    /// Creates a hub with this node name on the topic.
     pub fn new(name: &str) -> Self {
         Self {
             name: name.to_owned(),
@@ -110,12 +109,13 @@ impl Hub {
         }
     }
 
-    /// What is to be done since this was last asked, in this order.
+    /// Takes the outputs since the last call, in their order.
     pub fn effects(&mut self) -> Vec<Effect> {
         mem::take(&mut self.effects)
     }
 
-    /// Looks for a performer. A second one of the same action could not be told from the first, and fails.
+    /// Requests a performer. Fails if the same ground action is already running, because messages
+    /// could not distinguish the two.
     pub fn begin(&mut self, action: Action, now: Duration) {
         let key = (lower(&action.name), lower_all(&action.arguments));
         if let Some(there) = self.deals.get(&key) {
@@ -139,7 +139,7 @@ impl Hub {
         self.tick(now);
     }
 
-    /// Has the performer stop. It does not answer: that it is ready again shows that it has.
+    /// Asks the performer to stop. It sends no answer; its status shows when it has stopped.
     pub fn cancel(&mut self, ticket: Ticket) {
         let mut deals = self.deals.iter_mut();
         let its = |(_, it): &(&Key, &mut Deal)| it.action.ticket == ticket && !it.is_cancelled;
@@ -157,7 +157,7 @@ impl Hub {
         }
     }
 
-    /// Takes what came on `actions_hub`, its own messages included.
+    /// Takes a message of `actions_hub`. The hub's own messages are ignored.
     pub fn message(&mut self, message: &ActionExecution, now: Duration) {
         let key = key_of(message);
         match message.kind {
@@ -169,7 +169,7 @@ impl Hub {
         }
     }
 
-    /// Two executors would both choose performers, each for itself.
+    /// Warns about another executor. Both would choose performers independently.
     fn asked_by_others(&mut self, message: &ActionExecution) {
         if message.node_id != self.name && self.others.insert(message.node_id.clone()) {
             self.effects.push(Effect::Remark(format!(
@@ -194,7 +194,7 @@ impl Hub {
                     self.tell(ticket, Told::Started);
                 }
             }
-            // Whoever has answered waits for a word, also when the action was given up.
+            // A performer that has answered waits for a decision, even if the action was abandoned.
             _ => self.effects.push(Effect::Send(ActionExecution {
                 kind: kind::REJECT,
                 node_id: node.clone(),
@@ -238,7 +238,7 @@ impl Hub {
         self.tell(ticket, told);
     }
 
-    /// Takes what came on `performers_status`.
+    /// Takes a message of `performers_status`.
     pub fn status(&mut self, status: &ActionPerformerStatus, now: Duration) {
         let node = &status.node_name;
         let action = status.action.clone();
@@ -280,7 +280,7 @@ impl Hub {
         }
     }
 
-    /// Those that were heard of lately, each with the action that it performs.
+    /// Returns the performers with a recent status, each with its action.
     pub fn performers(&self, now: Duration) -> Vec<(&str, &str)> {
         let lately = self.heard.iter();
         lately
@@ -289,7 +289,7 @@ impl Hub {
             .collect()
     }
 
-    /// Asks again, and notices who is lost. To be called a few times a second.
+    /// Repeats requests, and detects lost performers. To be called a few times a second.
     pub fn tick(&mut self, now: Duration) {
         let mut lost = Vec::new();
         for (key, deal) in &mut self.deals {
@@ -327,7 +327,7 @@ impl Hub {
         )
     }
 
-    /// Those that were heard of lately, for people: `robot1 (move), gripper (pick)`.
+    /// Lists the performers with a recent status, for the user: `robot1 (move), gripper (pick)`.
     pub fn listed(&self, now: Duration) -> String {
         let each = |(name, action): (&str, &str)| match action {
             "" => name.to_owned(),
@@ -341,7 +341,7 @@ impl Hub {
         }
     }
 
-    /// The deal, if it is with this performer.
+    /// Returns the deal if its performer is `node`.
     fn deal_of(&mut self, key: &Key, node: &str) -> Option<&mut Deal> {
         let deal = self.deals.get_mut(key);
         deal.filter(|deal| deal.performer.as_deref() == Some(node))
@@ -352,7 +352,7 @@ impl Hub {
             return;
         };
         if let Some(performer) = &deal.performer {
-            // In case it is there all the same.
+            // The performer may still be running.
             let message = say(kind::CANCEL, performer, &deal.action);
             self.effects.push(Effect::Send(message));
         }
@@ -374,7 +374,8 @@ fn say(kind: i16, node: &str, action: &Action) -> ActionExecution {
     }
 }
 
-/// What a message is about. `PlanSys2` 2.0 sends an action without arguments as its own argument.
+/// Returns the ground action of a message. `PlanSys2` 2.0 sends an action without arguments as its
+/// own argument.
 fn key_of(message: &ActionExecution) -> Key {
     let name = lower(&message.action);
     let mut arguments = lower_all(&message.arguments);

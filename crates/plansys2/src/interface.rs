@@ -1,5 +1,5 @@
-//! Requests, answers and messages of `PlanSys2`'s planner and executor, and those of actions and managed nodes that
-//! come with them, field by field in the order of the wire.
+//! Messages of `PlanSys2`'s planner and executor, and those of ROS actions and managed nodes.
+//! Fields are in the order of the wire format.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,11 +15,11 @@ pub struct Plan {
 /// `plansys2_msgs/msg/PlanItem`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanItem {
-    /// When it starts, in seconds.
+    /// Start time, in seconds.
     pub time: f32,
     /// `(move r a b)`.
     pub action: String,
-    /// How long it takes, in seconds.
+    /// Duration, in seconds.
     pub duration: f32,
 }
 
@@ -28,42 +28,42 @@ pub struct PlanItem {
 pub struct ActionExecutionInfo {
     /// One of [`execution`].
     pub status: i8,
-    /// When it was begun.
+    /// Start time.
     pub start_stamp: Stamp,
-    /// When this became so.
+    /// Time of the last change.
     pub status_stamp: Stamp,
-    /// `(move r a b):2001`: with the start in the plan, in milliseconds.
+    /// `(move r a b):2001`: with the planned start, in milliseconds.
     pub action_full_name: String,
     /// `move`.
     pub action: String,
     /// `r`, `a`, `b`.
     pub arguments: Vec<String>,
-    /// How long the plan has it take.
+    /// Planned duration.
     pub duration: Stamp,
-    /// How far it has come, from 0 to 1.
+    /// Completed share, from 0 to 1.
     pub completion: f32,
-    /// What there is to say about it.
+    /// Text of the performer, or the reason of a failure.
     pub message_status: String,
 }
 
-/// How an action stands, in [`ActionExecutionInfo::status`].
+/// Values of [`ActionExecutionInfo::status`].
 pub mod execution {
-    /// It has not begun.
+    /// It has not started.
     pub const NOT_EXECUTED: i8 = 1;
-    /// It is under way.
+    /// It is running.
     pub const EXECUTING: i8 = 2;
     /// It has failed.
     pub const FAILED: i8 = 3;
-    /// It has ended as it should.
+    /// It has succeeded.
     pub const SUCCEEDED: i8 = 4;
-    /// It was stopped.
+    /// It was cancelled.
     pub const CANCELLED: i8 = 5;
 }
 
-/// A request without fields has this one.
+/// Request without fields.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Empty {
-    /// Of no meaning.
+    /// Without meaning.
     pub structure_needs_at_least_one_member: u8,
 }
 
@@ -79,11 +79,11 @@ pub struct PlanRequest {
 /// The answer of `plansys2_msgs/srv/GetPlan`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanResponse {
-    /// Whether there is a plan.
+    /// `true` if there is a plan.
     pub success: bool,
     /// The plan.
     pub plan: Plan,
-    /// Why there is none.
+    /// Reason of a failure.
     pub error_info: String,
 }
 
@@ -97,73 +97,73 @@ pub struct ValidateRequest {
 /// The answer of `plansys2_msgs/srv/ValidateDomain`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ValidateResponse {
-    /// Whether it can be read.
+    /// `true` if the domain is valid.
     pub success: bool,
-    /// What is wrong with it.
+    /// Messages about an invalid domain.
     pub error_info: String,
 }
 
-/// The number of a goal; zeros stand for all of them.
+/// Number of a goal. Zeros mean all goals.
 pub type GoalId = [u8; 16];
 
 /// The request of `execute_plan/_action/send_goal`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GoalRequest {
-    /// Which goal it shall be.
+    /// Number of the new goal.
     pub goal_id: GoalId,
     /// The plan to be executed.
     pub plan: Plan,
 }
 
-/// The answer to it.
+/// Answer to a [`GoalRequest`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GoalResponse {
-    /// Whether it will be pursued.
+    /// `true` if the plan will be executed.
     pub accepted: bool,
-    /// Since when.
+    /// Time of acceptance.
     pub stamp: Stamp,
 }
 
 /// The request of `execute_plan/_action/get_result`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ResultRequest {
-    /// Of which goal.
+    /// The goal.
     pub goal_id: GoalId,
 }
 
-/// The answer to it, when the goal has ended.
+/// Answer to a [`ResultRequest`], once the goal has ended.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ResultResponse {
     /// One of [`goal`].
     pub status: i8,
-    /// Whether the plan has reached its goal.
+    /// `true` if the plan has reached its goal.
     pub success: bool,
-    /// How each action stands.
+    /// Status of each action.
     pub action_execution_status: Vec<ActionExecutionInfo>,
 }
 
 /// The message of `execute_plan/_action/feedback`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Feedback {
-    /// About which goal.
+    /// The goal.
     pub goal_id: GoalId,
-    /// How each action stands.
+    /// Status of each action.
     pub action_execution_status: Vec<ActionExecutionInfo>,
 }
 
-/// How a goal stands.
+/// Status of a goal.
 pub mod goal {
-    /// There is none of that number.
+    /// No goal has this number.
     pub const UNKNOWN: i8 = 0;
-    /// It is pursued.
+    /// Its plan is being executed.
     pub const EXECUTING: i8 = 2;
-    /// It is being given up.
+    /// It is being cancelled.
     pub const CANCELING: i8 = 3;
     /// It was reached.
     pub const SUCCEEDED: i8 = 4;
-    /// It was given up on request.
+    /// It was cancelled.
     pub const CANCELED: i8 = 5;
-    /// It cannot be reached any more.
+    /// Its plan has failed.
     pub const ABORTED: i8 = 6;
 }
 
@@ -172,37 +172,37 @@ pub mod goal {
 pub struct GoalInfo {
     /// Its number.
     pub goal_id: GoalId,
-    /// When it was accepted.
+    /// Time of acceptance.
     pub stamp: Stamp,
 }
 
 /// The request of `execute_plan/_action/cancel_goal`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CancelRequest {
-    /// Which goals, as `action_msgs/srv/CancelGoal` has it.
+    /// Selected goals, as in `action_msgs/srv/CancelGoal`.
     pub goal_info: GoalInfo,
 }
 
-/// The answer to it.
+/// Answer to a [`CancelRequest`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CancelResponse {
-    /// 0: done; 2: there is no such goal; 3: it has ended.
+    /// 0: accepted; 2: unknown goal; 3: the goal has already ended.
     pub return_code: i8,
-    /// Those that are being given up.
+    /// Goals that are being cancelled.
     pub goals_canceling: Vec<GoalInfo>,
 }
 
 /// `action_msgs/msg/GoalStatusArray`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GoalStatuses {
-    /// Each goal that is known.
+    /// Known goals.
     pub status_list: Vec<GoalStatus>,
 }
 
 /// `action_msgs/msg/GoalStatus`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GoalStatus {
-    /// Which goal.
+    /// The goal.
     pub goal_info: GoalInfo,
     /// One of [`goal`].
     pub status: i8,
@@ -220,20 +220,20 @@ pub struct Named {
 /// The answer of `lifecycle_msgs/srv/GetState`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StateResponse {
-    /// In which state the node is.
+    /// State of the node.
     pub current_state: Named,
 }
 
 /// The request of `lifecycle_msgs/srv/ChangeState`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ChangeRequest {
-    /// By its number, or, where that is 0, by its name.
+    /// The transition, by its number, or, if that is 0, by its name.
     pub transition: Named,
 }
 
-/// An answer that says yes or no.
+/// Answer with a Boolean result.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Success {
-    /// Yes or no.
+    /// `true` if the request succeeded.
     pub success: bool,
 }

@@ -1,5 +1,5 @@
-//! Requests and answers of `PlanSys2`'s problem expert, and the trees in which it has conditions, field by field in the
-//! order of the wire.
+//! Messages of `PlanSys2`'s problem expert, and its trees of conditions. Fields are in the order of
+//! the wire format.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ pub struct Param {
     /// Its type.
     #[serde(rename = "type")]
     pub kind: String,
-    /// The types below that.
+    /// Subtypes of that type.
     pub sub_types: Vec<String>,
 }
 
@@ -20,37 +20,37 @@ pub struct Param {
 pub struct Node {
     /// One of [`node`].
     pub node_type: u8,
-    /// Of expressions: which one.
+    /// Operator of an expression.
     pub expression_type: u8,
-    /// Of effects: which one.
+    /// Operator of a numeric effect.
     pub modifier_type: u8,
-    /// Its place in its tree.
+    /// Position in its tree.
     pub node_id: u32,
-    /// The places of its parts.
+    /// Positions of its parts.
     pub children: Vec<u32>,
-    /// Of facts and functions.
+    /// Name of a fact or a fluent.
     pub name: String,
-    /// Of facts and functions.
+    /// Arguments of a fact or a fluent.
     pub parameters: Vec<Param>,
-    /// Of functions and numbers.
+    /// Value of a fluent or a number.
     pub value: f64,
-    /// Whether an odd number of negations is around it.
+    /// `true` if an odd number of negations encloses it.
     pub negate: bool,
 }
 
-/// What a [`Node`] is. These numbers are the same in all versions.
+/// Types of a [`Node`]. These numbers are the same in all versions.
 pub mod node {
-    /// All of its parts.
+    /// Conjunction.
     pub const AND: u8 = 1;
-    /// One of its parts.
+    /// Disjunction.
     pub const OR: u8 = 2;
-    /// Not its part.
+    /// Negation.
     pub const NOT: u8 = 3;
     /// A fact.
     pub const PREDICATE: u8 = 5;
     /// A fluent.
     pub const FUNCTION: u8 = 6;
-    /// A comparison, or a sum.
+    /// A comparison, or an arithmetic expression.
     pub const EXPRESSION: u8 = 7;
     /// A number.
     pub const NUMBER: u8 = 9;
@@ -59,44 +59,44 @@ pub mod node {
 /// `plansys2_msgs/msg/Tree`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tree {
-    /// The root comes first.
+    /// The nodes, root first.
     pub nodes: Vec<Node>,
 }
 
 /// The answer of `plansys2_msgs/srv/GetOrderedSubGoals`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SubGoalsResponse {
-    /// Whether there are any to be told.
+    /// `true` if the subgoals are known.
     pub success: bool,
-    /// In the order in which they are reached.
+    /// Subgoals, sorted by the time at which the plan reaches them.
     pub sub_goals: Vec<Tree>,
-    /// Why there are none.
+    /// Reason of a failure.
     pub error_info: String,
 }
 
 /// The request of `plansys2_msgs/srv/AffectNode`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AffectRequest {
-    /// What to add, to remove, or to change.
+    /// Fact or fluent to add, remove or change.
     pub node: Node,
 }
 
 /// The answer of `plansys2_msgs/srv/AffectNode`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AffectResponse {
-    /// Whether that was done.
+    /// `true` if the change was made.
     pub success: bool,
-    /// Why it was not.
+    /// Reason of a failure.
     pub error_info: String,
 }
 
 /// The answer of `plansys2_msgs/srv/GetStates`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StatesResponse {
-    /// Whether they are told.
+    /// `true` if the state was returned.
     pub success: bool,
-    /// All facts that are true, or all fluents with their values.
+    /// All true facts, or all fluents with their values.
     pub states: Vec<Node>,
-    /// Why they are not.
+    /// Reason of a failure.
     pub error_info: String,
 }

@@ -1,17 +1,20 @@
-//! Elbowroom with `PlanSys2`, but for the network: two conversations as plain functions of what was heard and
-//! what time it is.
+//! Elbowroom with `PlanSys2`: both protocols as pure functions of messages and time, without the
+//! network.
 //!
-//! [`World`] is the side of Elbowroom: the [world protocol](https://github.com/elbowroom/elbowroom/blob/main/docs/formats/world-protocol.md),
-//! JSON Lines. [`Hub`] is the side of the robots: the executor's part on `PlanSys2`'s topic `actions_hub`. The
-//! program `elbowroom-plansys2` connects the two with standard input and output and with DDS; it is built
-//! with the feature `dds`.
+//! [`World`] is Elbowroom's side, the [world
+//! protocol](https://github.com/elbowroom/elbowroom/blob/main/docs/formats/world-protocol.md) in
+//! JSON Lines. [`Hub`] is the robots' side, the executor's part on `PlanSys2`'s topic
+//! `actions_hub`. The program `elbowroom-plansys2` connects the two with standard input and output
+//! and with DDS. It is built with the feature `dds`.
 //!
-//! [`Mirror`] is the side of `PlanSys2`'s problem expert: what a run changes is told there, and what others change there is
-//! seen by the run. [`Goals`], [`Lifecycle`], [`Progress`] and [`sub_goal`] are what it takes to stand in for `PlanSys2`'s planner and executor.
+//! [`Mirror`] synchronizes `PlanSys2`'s problem expert with a run, in both directions. [`Goals`],
+//! [`Lifecycle`], [`Progress`] and [`sub_goal`] are for the replacement of `PlanSys2`'s planner and
+//! executor.
 //!
-//! Nothing here has a clock, a thread or a socket: time comes in as an argument, and what is to be said
-//! comes out as a value. `docs/plansys2.md` has the table of what happens when; each row is a test, and
-//! the same scripts are played to the `Hub` of `examples/plansys2_world.py`, which must do the same.
+//! The library has no clock, no thread and no socket: time is an argument, and messages are return
+//! values. `docs/plansys2.md` has the table of events and reactions. Each row is a test, and the
+//! same scripts are played to the `Hub` of `examples/plansys2_world.py`, which must react in the
+//! same way.
 //!
 //! ```
 //! use std::time::Duration;

@@ -1,9 +1,9 @@
-//! What a manager of nodes wants to hear of the planner and the executor.
+//! Lifecycle of the planner and the executor as managed nodes.
 
 use crate::interface::Named;
 
-/// The states of a managed node. It serves from the beginning, in case nobody manages it; once it was managed, it
-/// serves while it is active.
+/// State of a managed node. It serves from the beginning, for systems without a lifecycle manager.
+/// After its first transition, it serves only while it is active.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lifecycle {
     state: State,
@@ -18,7 +18,7 @@ enum State {
     Finalized,
 }
 
-/// From where, which number, by which name, to where.
+/// Transitions: source, number, name, target.
 const TRANSITIONS: [(State, u8, &str, State); 7] = [
     (State::Unconfigured, 1, "configure", State::Inactive),
     (State::Inactive, 2, "cleanup", State::Unconfigured),
@@ -39,7 +39,7 @@ impl Default for Lifecycle {
 }
 
 impl Lifecycle {
-    /// The state, as `lifecycle_msgs/msg/State` has it.
+    /// Returns the state, as in `lifecycle_msgs/msg/State`.
     pub fn state(&self) -> Named {
         let (id, label) = match self.state {
             State::Unconfigured => (1, "unconfigured"),
@@ -51,7 +51,8 @@ impl Lifecycle {
         Named { id, label }
     }
 
-    /// Makes a transition of `lifecycle_msgs/msg/Transition`; `false` where there is none from this state.
+    /// Makes a transition of `lifecycle_msgs/msg/Transition`. Returns `false` if the state does not
+    /// have it.
     pub fn change(&mut self, transition: &Named) -> bool {
         let found = TRANSITIONS.iter().find(|(from, id, label, _)| {
             *from == self.state
@@ -65,7 +66,7 @@ impl Lifecycle {
         true
     }
 
-    /// Whether it does what it is asked for.
+    /// Returns `true` if the node serves requests.
     pub fn serves(&self) -> bool {
         !self.is_managed || self.state == State::Active
     }

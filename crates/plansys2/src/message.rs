@@ -1,57 +1,57 @@
-//! The messages of `PlanSys2` that are spoken here, field by field in the order of the wire.
+//! Messages of `PlanSys2`'s performers. Fields are in the order of the wire format.
 
 use serde::{Deserialize, Serialize};
 
-/// `plansys2_msgs/msg/ActionExecution`, on the topic `actions_hub`: reliable, the last 100 kept, both
-/// sides publish and hear.
+/// `plansys2_msgs/msg/ActionExecution`, on the topic `actions_hub`: reliable, the last 100 kept.
+/// Both sides publish and subscribe.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ActionExecution {
-    /// What is said, one of [`kind`].
+    /// Type of the message, one of [`kind`].
     #[serde(rename = "type")]
     pub kind: i16,
-    /// Whose message it is, or to whom it is said.
+    /// Sender of the message, or its receiver.
     pub node_id: String,
     /// The name of the action.
     pub action: String,
-    /// Its objects.
+    /// Its arguments.
     pub arguments: Vec<String>,
-    /// Whether it has succeeded, in [`kind::FINISH`].
+    /// `true` if the action has succeeded, in [`kind::FINISH`].
     pub success: bool,
-    /// How far it has come, from 0 to 1.
+    /// Completed share, from 0 to 1.
     pub completion: f32,
-    /// A text for people.
+    /// Text for the user.
     pub status: String,
 }
 
-/// What an [`ActionExecution`] says.
+/// Types of an [`ActionExecution`].
 pub mod kind {
-    /// The executor asks who can do an action.
+    /// The executor requests a performer of an action.
     pub const REQUEST: i16 = 1;
-    /// A performer can.
+    /// A performer offers to execute it.
     pub const RESPONSE: i16 = 2;
-    /// The executor chooses the performer that answered first.
+    /// The executor chooses this performer, which answered first.
     pub const CONFIRM: i16 = 3;
-    /// The executor does not need this performer.
+    /// The executor rejects this performer.
     pub const REJECT: i16 = 4;
-    /// A performer says how far it has come.
+    /// A performer reports its progress.
     pub const FEEDBACK: i16 = 5;
-    /// A performer has ended.
+    /// A performer reports its result.
     pub const FINISH: i16 = 6;
-    /// The executor tells a performer to stop; there is no answer.
+    /// The executor cancels the action; there is no answer.
     pub const CANCEL: i16 = 7;
 }
 
-/// `plansys2_msgs/msg/ActionPerformerStatus`, on the topic `performers_status`: each performer says it
-/// once a second.
+/// `plansys2_msgs/msg/ActionPerformerStatus`, on the topic `performers_status`. Each performer
+/// publishes it once a second.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ActionPerformerStatus {
-    /// When, by the performer's clock.
+    /// Time of the status, by the performer's clock.
     pub status_stamp: Stamp,
     /// One of [`state`].
     pub state: i8,
     /// The action that it performs.
     pub action: String,
-    /// Arguments for which alone it does so; empty ones stand for any.
+    /// Arguments to which the performer is restricted. An empty argument matches any object.
     pub specialized_arguments: Vec<String>,
     /// Its name.
     pub node_name: String,
@@ -62,15 +62,15 @@ pub struct ActionPerformerStatus {
 pub struct Stamp {
     /// Seconds.
     pub sec: i32,
-    /// Nanoseconds after them.
+    /// Nanoseconds within the second.
     pub nanosec: u32,
 }
 
-/// What a performer is doing.
+/// States of a performer.
 pub mod state {
     /// It is not configured.
     pub const NOT_READY: i8 = 0;
-    /// It could begin.
+    /// It is ready to begin.
     pub const READY: i8 = 1;
     /// It performs an action.
     pub const RUNNING: i8 = 2;

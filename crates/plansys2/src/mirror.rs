@@ -1,4 +1,4 @@
-//! What the run believes and what the problem expert has, kept the same.
+//! Synchronization of a run's beliefs with the problem expert.
 
 mod change;
 #[cfg(test)]
@@ -11,13 +11,13 @@ use crate::knowledge::Node;
 pub use change::{Key, Seen};
 use change::{State, Value, change_of};
 
-/// The number of a [`Call`]; each is used once.
+/// Number of a [`Call`], unique.
 pub type CallId = u64;
 
-/// How long an answer of the problem expert is waited for.
+/// Time limit for an answer of the problem expert.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Something that the problem expert is asked for.
+/// Request to the problem expert.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Call {
     /// `problem_expert/get_problem_predicates`.
@@ -28,7 +28,7 @@ pub enum Call {
     Add(Node),
     /// `problem_expert/remove_problem_predicate`.
     Remove(Node),
-    /// `problem_expert/add_problem_function`, for a fluent that has no value there.
+    /// `problem_expert/add_problem_function`, for a fluent without a value there.
     Define(Node),
     /// `problem_expert/update_problem_function`.
     Update(Node),
@@ -36,44 +36,47 @@ pub enum Call {
     Forget(Node),
 }
 
-/// What the problem expert has answered; why not, where it has refused.
+/// Answer of the problem expert, or the reason of a refusal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// To the first two of [`Call`].
+    /// Answer to [`Call::Predicates`] and [`Call::Functions`].
     States(Result<Vec<Node>, String>),
-    /// To the others.
+    /// Answer to the other calls.
     Done(Result<(), String>),
 }
 
-/// Keeps a problem expert and a run of one opinion.
+/// Synchronizes a problem expert with a run.
 ///
-/// What the run has changed is told, in order, one call at a time. What others have changed there is read whenever it says
-/// that something has changed, and is [seen](Self::seen). Three rules decide who wins:
+/// Changes by the run are written in their order, one call at a time. Whenever the problem expert
+/// reports a change, its state is read, and the changes of others are [reported to the
+/// run](Self::seen). Three rules resolve conflicts:
 ///
-/// 1. At the beginning of a run the problem expert does: where it is otherwise than the problem, that is seen. But a problem
-///    expert that has nothing at all of what the problem says is about something else, and is left alone.
-/// 2. What the run has changed and has not yet told wins over what is read meanwhile.
-/// 3. Otherwise the last change wins, in the order in which the problem expert has them.
+/// 1. At the beginning of a run, the problem expert wins: its differences from the problem are
+///    reported. A problem expert without any fact or fluent of the problem is about another
+///    problem, and is ignored.
+/// 2. A change by the run that has not been written yet wins over a state that is read meanwhile.
+/// 3. Otherwise the last change wins, in the order of the problem expert.
 ///
-/// A change that the problem expert refuses stays the run's own: it is said, and neither told again nor taken back.
+/// If the problem expert refuses a change, the run keeps it. The refusal is reported to the user,
+/// and the change is neither written again nor undone.
 #[derive(Debug, Default)]
 pub struct Mirror {
     is_there: bool,
     said: Said,
     following: Following,
-    /// As the run believes it; `None` before it has said anything.
+    /// Beliefs of the run; `None` before its first report.
     believed: Option<State>,
-    /// As the problem expert has it, as far as is known; `None` before it was read.
+    /// Last known state of the problem expert; `None` before the first read.
     held: Option<State>,
-    /// How it writes each word.
+    /// Spelling of each word in the problem expert.
     spelling: BTreeMap<String, String>,
-    /// To be told, oldest first.
+    /// Changes to write, oldest first.
     untold: VecDeque<(Key, Value)>,
     writing: Option<Writing>,
-    /// What it was told, and may have or not: that was not answered.
+    /// Keys whose last write was not answered, so the problem expert may or may not have it.
     unsure: BTreeSet<Key>,
     reading: Option<Reading>,
-    /// Something may have changed since it was read last.
+    /// `true` if the state may have changed since the last read.
     is_stale: bool,
     last: CallId,
     calls: Vec<(CallId, Call)>,
@@ -81,24 +84,24 @@ pub struct Mirror {
     remarks: Vec<String>,
 }
 
-/// What people have been told already.
+/// Messages that the user has already received.
 #[derive(Clone, Copy, Debug, Default)]
 struct Said {
-    /// That there is no problem expert.
+    /// There is no problem expert.
     is_missing: bool,
-    /// That it does not answer.
+    /// It does not answer.
     is_silent: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Following {
-    /// No run is under way.
+    /// No run is active.
     #[default]
     Nothing,
-    /// Whether it is about the same problem is not known yet.
+    /// Its first state is being read, to find out whether it is about the same problem.
     Asking,
     Yes,
-    /// It is about something else.
+    /// It is about another problem.
     No,
 }
 
@@ -117,12 +120,12 @@ struct Reading {
     facts: Option<Vec<Node>>,
     numbers: Option<Vec<Node>>,
     since: Duration,
-    /// What the run has changed since it was asked for.
+    /// Keys that the run has changed since the read began.
     touched: BTreeSet<Key>,
 }
 
 impl Mirror {
-    /// A run begins; `text` is its problem, for the spelling of its words, or empty.
+    /// Starts a run. `text` is its problem, for the spelling of its words, or empty.
     pub fn begin(&mut self, text: &str) {
         let is_word = |it: char| !(it == '(' || it == ')' || it.is_whitespace());
         let words = text.split(|it: char| !is_word(it));
@@ -136,7 +139,7 @@ impl Mirror {
         self.seen.clear();
     }
 
-    /// The run is over. What it has changed is still told.
+    /// Ends the run. Its pending changes are still written.
     pub fn end(&mut self) {
         if self.following == Following::Asking {
             self.untold.clear();
@@ -146,18 +149,18 @@ impl Mirror {
         self.seen.clear();
     }
 
-    /// The problem expert was found, or is gone.
+    /// Sets whether the problem expert is available.
     pub fn found(&mut self, is_there: bool) {
         self.is_stale |= is_there && !self.is_there;
         self.is_there = is_there;
     }
 
-    /// It says that something has changed.
+    /// Takes a change notification of the problem expert.
     pub fn notified(&mut self) {
         self.is_stale = true;
     }
 
-    /// The run says what it believes: at first all of it, later what has changed. Names are in brackets.
+    /// Takes beliefs of the run: all of them at first, changes later. Names are in brackets.
     pub fn believe(&mut self, facts: &[(String, bool)], values: &[(String, Option<f64>)]) {
         let facts = facts
             .iter()
@@ -192,12 +195,12 @@ impl Mirror {
         }
     }
 
-    /// Nothing is left to be told to anybody.
+    /// Returns `true` if no change is pending, or if the problem expert is unavailable.
     pub fn is_idle(&self) -> bool {
         !self.is_there || (self.untold.is_empty() && self.writing.is_none())
     }
 
-    /// An answer has come.
+    /// Takes an answer.
     pub fn answered(&mut self, call: CallId, answer: Answer) {
         match answer {
             Answer::Done(outcome) => {
@@ -244,15 +247,15 @@ impl Mirror {
         }
     }
 
-    /// Time passes. To be called a few times a second, and after everything else; then [`Self::calls`], [`Self::seen`] and
-    /// [`Self::remarks`] have what is to be done.
+    /// Advances the time. To be called a few times a second and after all other methods, before
+    /// [`Self::calls`], [`Self::seen`] and [`Self::remarks`].
     pub fn tick(&mut self, now: Duration) {
         if !self.is_there {
             if self.believed.is_some() && !std::mem::replace(&mut self.said.is_missing, true) {
                 let text = "there is no problem expert: changes by runs are not reported";
                 self.remarks.push(text.to_owned());
             }
-            // Whoever comes back is asked anew; what it was asked for last may be lost.
+            // A problem expert that returns is read again, because the pending answer may be lost.
             (self.reading, self.is_stale) = (None, true);
             return;
         }
@@ -263,7 +266,7 @@ impl Mirror {
         }
         if let Some(late) = self.writing.take_if(|it| is_late(it.since)) {
             self.unsure.insert(late.key.clone());
-            // It does no harm to be told the same twice.
+            // Repeating a write is harmless.
             if self.untold.iter().all(|(key, _)| *key != late.key) {
                 self.untold.push_front((late.key, late.value));
             }
@@ -286,7 +289,7 @@ impl Mirror {
             });
         }
         let may_read = match self.following {
-            // What the run has changed since its beginning waits for this answer.
+            // Changes that the run has made since its beginning wait for this answer.
             Following::Asking => self.believed.is_some(),
             Following::Yes => self.writing.is_none() && self.untold.is_empty(),
             Following::Nothing | Following::No => false,
@@ -309,17 +312,17 @@ impl Mirror {
         }
     }
 
-    /// What the problem expert is to be asked for now.
+    /// Takes the calls that are due.
     pub fn calls(&mut self) -> Vec<(CallId, Call)> {
         std::mem::take(&mut self.calls)
     }
 
-    /// What others have changed there, for the run.
+    /// Takes the changes of others, for the run.
     pub fn seen(&mut self) -> Vec<Seen> {
         std::mem::take(&mut self.seen)
     }
 
-    /// For people.
+    /// Takes the messages for the user.
     pub fn remarks(&mut self) -> Vec<String> {
         std::mem::take(&mut self.remarks)
     }
@@ -330,7 +333,7 @@ impl Mirror {
         self.last
     }
 
-    /// Once, until it answers again.
+    /// Reports a missing answer, once until the next answer.
     fn complain(&mut self) {
         if !std::mem::replace(&mut self.said.is_silent, true) {
             self.remarks.push(format!(
@@ -374,7 +377,7 @@ impl Mirror {
                 || self.untold.iter().any(|(other, _)| *other == key)
                 || self.writing.as_ref().is_some_and(|it| it.key == key);
             if is_ours {
-                // Whatever was read is older than what was changed, or may be.
+                // The state that was read may be older than the change.
                 if !is_first {
                     now_held.insert(key.clone(), value_in(&before, &key));
                 }

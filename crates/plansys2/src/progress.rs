@@ -1,4 +1,4 @@
-//! How each action of a plan stands, as `PlanSys2`'s executor tells it.
+//! Status of each action of a plan, as reported by `PlanSys2`'s executor.
 
 use std::collections::BTreeMap;
 
@@ -6,16 +6,16 @@ use crate::interface::{ActionExecutionInfo, Plan, PlanItem, execution};
 use crate::message::Stamp;
 use crate::{Action, Ticket, Told};
 
-/// The actions of a plan, and what has become of them; actions of later plans come behind.
+/// Actions of a plan with their status. Actions of later plans are appended.
 #[derive(Clone, Debug, Default)]
 pub struct Progress {
     infos: Vec<ActionExecutionInfo>,
-    /// Which entry a start is.
+    /// Entry of each start.
     entries: BTreeMap<Ticket, usize>,
 }
 
 impl Progress {
-    /// Nothing has begun.
+    /// Creates the progress of a plan, none of whose actions has started.
     pub fn new(plan: &Plan) -> Self {
         let infos = plan.items.iter().map(|item| {
             let (name, arguments) = words(&item.action);
@@ -34,13 +34,13 @@ impl Progress {
         }
     }
 
-    /// How each action stands.
+    /// Returns the status of each action.
     pub fn infos(&self) -> &[ActionExecutionInfo] {
         &self.infos
     }
 
-    /// What is left of the plan that this is the progress of: the actions that have not ended well, as
-    /// they stand there.
+    /// Returns the remaining steps of `plan`, whose progress this is: the actions that have not
+    /// succeeded.
     pub fn rest_of(&self, plan: &Plan) -> Plan {
         let with_infos = plan.items.iter().zip(&self.infos);
         let left = with_infos.filter(|(_, info)| info.status != execution::SUCCEEDED);
@@ -49,7 +49,7 @@ impl Progress {
         }
     }
 
-    /// An action is asked for.
+    /// Adds a start of an action.
     pub fn begin(&mut self, action: &Action) {
         let is_its = |it: &ActionExecutionInfo| {
             it.status == execution::NOT_EXECUTED
@@ -76,7 +76,7 @@ impl Progress {
         self.entries.insert(action.ticket, entry);
     }
 
-    /// Something has become of it.
+    /// Takes a report about an action.
     pub fn tell(&mut self, ticket: Ticket, told: &Told, now: Stamp) {
         let Some(&entry) = self.entries.get(&ticket) else {
             return;
@@ -106,13 +106,14 @@ impl Progress {
     }
 }
 
-/// A plan as `elbowroom` reads it: `0.000: (move r a b) [2.000]`, line by line. Times are 32-bit floats on the wire, and
-/// are written as the shortest decimals that mean the same.
+/// Returns a plan in the format that `elbowroom` reads: `0.000: (move r a b) [2.000]`, line by
+/// line. Times are 32-bit floats in messages, and are written as the shortest decimals with the
+/// same value.
 pub fn plan_text(plan: &Plan) -> String {
     let line = |item: &PlanItem| {
         let (name, arguments) = words(&item.action);
         let action = [vec![name], arguments].concat().join(" ");
-        // What takes no time has no duration there.
+        // An instantaneous action has no duration in that format.
         let duration = (item.duration > 0.0).then(|| format!(" [{}]", item.duration));
         format!(
             "{}: ({action}){}\n",
@@ -182,7 +183,7 @@ mod tests {
             progress.begin(&action(ticket, "(move r a b)"));
             progress.tell(ticket, &told, now);
         }
-        // An action that is no part of it changes nothing.
+        // An action outside the plan does not count.
         progress.begin(&action(3, "(jump r)"));
         progress.tell(3, &Told::Succeeded, now);
         assert_eq!(left(&progress), plan().items[1..]);

@@ -1,19 +1,21 @@
-//! Conditions as the trees of `PlanSys2`.
+//! Conditions as trees of `PlanSys2`.
 
 use crate::knowledge::{Node, Param, Tree, node};
 
-/// The expressions, in the order of their numbers; the first has the number 13. That is so since 2.0.10; before, there were three
-/// types of nodes less, and the numbers were lower by as many.
+/// Operators of expressions, in the order of their numbers. The first one has the number 13 since
+/// version 2.0.10; older versions had three fewer types of nodes, and the numbers were lower by
+/// three.
 const EXPRESSIONS: [&str; 9] = ["=", ">=", ">", "<=", "<", "*", "/", "+", "-"];
 const FIRST_EXPRESSION: u8 = 13;
 
-/// A text of PDDL with its brackets resolved.
+/// Parsed PDDL text.
 enum Form {
     Word(String),
     List(Vec<Form>),
 }
 
-/// A part of a goal as `PlanSys2`'s executor tells it: `(and PART)`; `None` where the text is no condition.
+/// Returns a subgoal in the form of `PlanSys2`'s executor: `(and PART)`. Returns `None` if the text
+/// is not a condition.
 pub fn sub_goal(text: &str) -> Option<Tree> {
     let mut tree = Tree {
         nodes: vec![Node {
@@ -44,7 +46,7 @@ fn read(text: &str) -> Option<Form> {
     forms.pop().filter(|_| forms.is_empty())
 }
 
-/// Adds a condition, and what belongs to it; says where it is.
+/// Adds a condition with its parts, and returns its position.
 fn condition(form: &Form, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u32> {
     let (name, parts) = headed(form)?;
     let node_type = match name {
@@ -85,7 +87,7 @@ fn expression(form: &Form, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u3
     Some(place)
 }
 
-/// A fact or a fluent.
+/// Adds a fact or a fluent.
 fn named(form: &Form, node_type: u8, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u32> {
     let (name, objects) = headed(form)?;
     let object = |form: &Form| match form {
@@ -127,7 +129,7 @@ fn add(nodes: &mut Vec<Node>, node_type: u8, negate: bool) -> Option<u32> {
 mod tests {
     use super::*;
 
-    /// As PDDL again, by the numbers of the nodes alone.
+    /// Converts a tree to PDDL, using only the numbers of the nodes.
     fn text(tree: &Tree, place: u32) -> String {
         let it = &tree.nodes[place as usize];
         assert_eq!(it.node_id, place);

@@ -1,4 +1,4 @@
-//! The side of Elbowroom: the world protocol, version 2, on a clock that comes in as an argument.
+//! Elbowroom's side: version 2 of the world protocol, with the time as an argument.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -7,14 +7,14 @@ use serde_json::{Value, json};
 
 use crate::{Action, Seen, Ticket, Told};
 
-/// What Elbowroom wants to be done.
+/// Command of Elbowroom.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
-    /// This action is to begin.
+    /// Start this action.
     Begin(Action),
-    /// It is to stop.
+    /// Cancel this action.
     Cancel(Ticket),
-    /// This is believed: at first all that is so, later what has changed. Names are in brackets.
+    /// Beliefs: all of them at first, changes later. Names are in brackets.
     Believe {
         /// Facts.
         facts: Vec<(String, bool)>,
@@ -25,19 +25,19 @@ pub enum Command {
     Stop,
 }
 
-/// A world on the wall clock. Its time begins with the first thing to do, so that what is prepared before
-/// takes none.
+/// World on the wall clock. Its time begins with the first command or question, so preparation
+/// takes no time.
 #[derive(Debug)]
 pub struct World {
     name: String,
-    /// How many of its seconds pass in one real second.
+    /// Seconds of the world per real second.
     speed: f64,
     zero: Option<Duration>,
     speaks: u64,
     begun: BTreeMap<Ticket, Begun>,
     news: Vec<Value>,
     question: Option<Question>,
-    /// Whether it wants to hear what is believed.
+    /// `true` if beliefs are requested and changes by others reported.
     is_following: bool,
 }
 
@@ -51,12 +51,13 @@ struct Begun {
 #[derive(Debug)]
 struct Question {
     number: Value,
-    /// In seconds of the world; `None` where the answer is due at once.
+    /// Time limit in seconds of the world; `None` if the answer is due at once.
     until: Option<f64>,
 }
 
 impl World {
-    /// A world of that name, `speed` of whose seconds pass in one real second; more than 0, and finite.
+    /// Creates a world of that name. `speed` is the number of its seconds per real second, positive
+    /// and finite.
     pub fn new(name: &str, speed: f64) -> Self {
         Self {
             name: name.to_owned(),
@@ -70,7 +71,7 @@ impl World {
         }
     }
 
-    /// The same, which is told what is believed, and sees things by itself.
+    /// Requests the beliefs of the run, and announces that facts may change by themselves.
     #[must_use]
     pub fn following(self) -> Self {
         Self {
@@ -79,8 +80,8 @@ impl World {
         }
     }
 
-    /// Takes a line that Elbowroom has said. What is to be done comes back; what is to be said is appended to
-    /// `said`. What is not known is passed over, as the protocol has it.
+    /// Takes a line of Elbowroom. Returns the command, and appends answers to `said`. Unknown
+    /// messages are ignored, as the protocol requires.
     ///
     /// # Errors
     /// The line is not a JSON object.
@@ -142,7 +143,7 @@ impl World {
         self
     }
 
-    /// What is said twice is done once.
+    /// Returns the action to start, or `None` if its ticket was used before.
     fn start(
         &mut self,
         ticket: Option<u64>,
@@ -169,7 +170,7 @@ impl World {
         Some(action)
     }
 
-    /// Notes what has become of an action; each start and each end once, and in this order.
+    /// Takes a report about an action. Each start and each end is reported once, in this order.
     pub fn tell(&mut self, ticket: Ticket, told: &Told, now: Duration) {
         let time = self.time(now);
         let speaks = self.speaks;
@@ -188,7 +189,7 @@ impl World {
                 return;
             }
             Told::Feedback { completion, note } => {
-                // Version 1 has no word for it.
+                // Version 1 has no feedback.
                 if speaks >= 2 {
                     let part = completion
                         .is_finite()
@@ -213,7 +214,7 @@ impl World {
         begun.has_ended = true;
     }
 
-    /// Something was seen that others have changed.
+    /// Takes a change that others have made.
     pub fn see(&mut self, seen: &Seen, now: Duration) {
         let time = self.time(now);
         self.news.push(match seen {
@@ -226,7 +227,7 @@ impl World {
         });
     }
 
-    /// The answer to the open question, line by line, if it is due.
+    /// Returns the answer to the open question, line by line, if it is due.
     pub fn answer(&mut self, now: Duration) -> Vec<String> {
         if self.due_in(now) != Some(Duration::ZERO) {
             return Vec::new();
@@ -243,8 +244,8 @@ impl World {
         lines
     }
 
-    /// In how much real time the answer to the open question is due if nothing happens; `None` where no
-    /// question is open.
+    /// Returns the real time until the answer to the open question is due if nothing happens, or
+    /// `None` if no question is open.
     pub fn due_in(&self, now: Duration) -> Option<Duration> {
         let question = self.question.as_ref()?;
         let left = question
@@ -253,18 +254,18 @@ impl World {
         Some(if !self.news.is_empty() || left <= 0.0 {
             Duration::ZERO
         } else {
-            // Rounded up, so that the time has really come. A year stands for whatever is longer.
+            // Rounded up, so that the time limit has passed. At most a year.
             Duration::from_secs_f64(left.min(3.2e7)) + Duration::from_nanos(1)
         })
     }
 
-    /// The tickets of what has been begun and has not ended.
+    /// Returns the tickets of the running actions.
     pub fn running(&self) -> Vec<Ticket> {
         let open = self.begun.iter().filter(|(_, it)| !it.has_ended);
         open.map(|(ticket, _)| *ticket).collect()
     }
 
-    /// What time it is, in seconds.
+    /// Returns the time of the world, in seconds.
     fn time(&self, now: Duration) -> f64 {
         self.zero.map_or(0.0, |zero| {
             now.saturating_sub(zero).as_secs_f64() * self.speed
@@ -286,7 +287,7 @@ fn believed(message: &serde_json::Map<String, Value>) -> Command {
     }
 }
 
-/// A number as Elbowroom writes it; what decides is exact on its side.
+/// Returns a number of Elbowroom as a float. Elbowroom itself computes with the exact value.
 fn number(value: &Value) -> Option<f64> {
     value.get("decimal").unwrap_or(value).as_f64()
 }

@@ -1,5 +1,5 @@
-//! Performers that die, forget and repeat, on a network that delays, loses, doubles and reorders: whatever they
-//! do, nothing is begun twice and every action gets exactly one outcome.
+//! Performers that crash, forget and repeat, on a network that delays, loses, duplicates and
+//! reorders messages. No action is started twice, and each has exactly one outcome.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -9,14 +9,14 @@ use elbowroom_plansys2::{Action, Effect, Hub, Ticket, Told};
 use rand::{Rng as _, SeedableRng as _, seq::IndexedRandom as _};
 use rand_chacha::ChaCha8Rng;
 
-/// How many runs, if the environment's `ELBOWROOM_BAD_PEERS` does not say otherwise.
+/// Default number of runs, overridden by the environment's `ELBOWROOM_BAD_PEERS`.
 const RUNS: u64 = 1_000;
-/// Milliseconds between two moments.
+/// Time step, in milliseconds.
 const STEP: u64 = 200;
-/// Actions are begun up to then, in milliseconds.
+/// Time after which no action is begun, in milliseconds.
 const BUSY: u64 = 40_000;
-/// By then the last one has its outcome: 30 s without an answer, 12 s of work, and what it takes to notice
-/// that a word was lost.
+/// Latest time of the last outcome: 30 s without an answer, 12 s of work, and the time to detect a
+/// lost message.
 const END: u64 = BUSY + 30_000 + 12_000 + 20_000;
 
 const ACTIONS: [(&str, &[&str]); 4] = [
@@ -26,7 +26,7 @@ const ACTIONS: [(&str, &[&str]); 4] = [
     ("beep", &[]),
 ];
 
-/// What is on its way.
+/// Message in transit.
 #[derive(Clone)]
 enum Packet {
     ToHub(ActionExecution),
@@ -34,7 +34,7 @@ enum Packet {
     Status(ActionPerformerStatus),
 }
 
-/// A performer as `PlanSys2` has them, but for its misfortunes.
+/// Performer of `PlanSys2`, with faults.
 struct Performer {
     name: String,
     action: &'static str,
@@ -44,7 +44,7 @@ struct Performer {
     is_deaf: bool,
 }
 
-/// How badly the network and the performers behave in a run.
+/// Fault rates of the network and the performers in a run.
 struct Misery {
     loss: f64,
     doubling: f64,
@@ -97,7 +97,7 @@ impl Adversary {
         }
     }
 
-    /// What arrives now, in any order.
+    /// Takes the messages that arrive by now, in random order.
     fn landed(&mut self, now: u64) -> Vec<Packet> {
         let (mut landed, flying): (Vec<_>, Vec<_>) =
             self.flying.drain(..).partition(|(at, _)| *at <= now);
@@ -106,7 +106,7 @@ impl Adversary {
         landed.into_iter().map(|(_, packet)| packet).collect()
     }
 
-    /// A message of the executor reaches the performers.
+    /// Delivers a message of the executor to the performers.
     fn told(&mut self, message: &ActionExecution, now: u64) {
         let mut said = vec![];
         for it in self.performers.iter_mut().filter(|it| !it.is_dead) {
@@ -132,7 +132,7 @@ impl Adversary {
         }
     }
 
-    /// Time passes for the performers.
+    /// Advances the time of the performers.
     fn live(&mut self, now: u64) {
         let mut said = vec![];
         for it in &mut self.performers {
@@ -144,8 +144,8 @@ impl Adversary {
                 (it.is_dead, it.promised, it.doing) = (true, false, None);
                 continue;
             }
-            // A promise that nobody takes up would bind it for ever; PlanSys2 has none of that, but a
-            // rejection may be lost here.
+            // A performer whose offer is never answered would be blocked forever. PlanSys2 has no
+            // time-out for offers, but a rejection may be lost here.
             it.promised &= !self.rng.random_bool(0.01);
             if let Some((action, until)) = it.doing.clone() {
                 if now >= until {
@@ -186,7 +186,7 @@ fn said_by(name: &str, kind: i16, about: &ActionExecution) -> ActionExecution {
     }
 }
 
-/// What is known of a start.
+/// Known events of a start.
 #[derive(Debug, Default)]
 struct Course {
     confirmed: Option<String>,
@@ -194,12 +194,12 @@ struct Course {
     outcome: Option<Told>,
 }
 
-/// Watches what the hub does, and says what it should not have done.
+/// Checks the outputs of the hub.
 #[derive(Default)]
 struct Judge {
     names: BTreeMap<Ticket, String>,
     courses: BTreeMap<Ticket, Course>,
-    /// The start under way of each ground action.
+    /// Running start of each ground action.
     open: BTreeMap<String, Ticket>,
 }
 
@@ -242,13 +242,14 @@ fn joined(name: &str, arguments: &[String]) -> String {
     format!("{name} {}", arguments.join(" "))
 }
 
-/// One run; how many actions came to which end.
+/// Runs one simulation. Returns the number of actions by outcome.
 fn run(seed: u64) -> BTreeMap<&'static str, u64> {
     let mut adversary = Adversary::new(seed);
     let mut hub = Hub::new("elbowroom");
     let mut judge = Judge::default();
     for it in 0..adversary.performers.len() {
-        // They were heard of before: `docs/plansys2.md` says what is otherwise.
+        // Each performer has reported once. `docs/plansys2.md` describes the behaviour for unknown
+        // ones.
         let node_name = adversary.performers[it].name.clone();
         hub.status(
             &ActionPerformerStatus {
@@ -318,7 +319,7 @@ fn run(seed: u64) -> BTreeMap<&'static str, u64> {
     ends
 }
 
-/// The executor begins something or cancels it, now and then.
+/// Begins or cancels a random action now and then, as the executor.
 fn act(adversary: &mut Adversary, hub: &mut Hub, judge: &mut Judge, now: u64) {
     let rng = &mut adversary.rng;
     if now < BUSY && rng.random_bool(0.1) {
@@ -344,7 +345,7 @@ fn act(adversary: &mut Adversary, hub: &mut Hub, judge: &mut Judge, now: u64) {
     }
 }
 
-/// Passes on what the hub does, past the judge; what it has sent comes back.
+/// Checks and distributes the outputs of the hub. Returns the messages that it has sent.
 fn settle(
     adversary: &mut Adversary,
     hub: &mut Hub,
@@ -379,7 +380,7 @@ fn whatever_peers_do_nothing_begins_twice_and_everything_ends_once() {
         }
     }
     println!("{runs} runs: {ends:?}");
-    // Each end came about, or it was not tried.
+    // Each outcome must occur at least once.
     let all = [
         "succeeded",
         "cancelled",

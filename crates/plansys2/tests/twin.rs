@@ -1,4 +1,5 @@
-//! The same scripts, played to the hub and to that of `examples/plansys2_world.py`: they must do the same.
+//! Plays the same scripts to the hub and to that of `examples/plansys2_world.py`. Both must react
+//! in the same way.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -23,7 +24,8 @@ const ACTIONS: [(&str, &[&str]); 4] = [
     ("beep", &[]),
 ];
 
-/// What happens, with enough order in it that conversations come about, and enough disorder that they fail.
+/// Generates events, with enough order for successful conversations and enough disorder for
+/// failures.
 fn script(seed: u64) -> Vec<Value> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut quarters = 0_u32;
@@ -43,7 +45,7 @@ fn script(seed: u64) -> Vec<Value> {
                 json!({"at": at, "what": "cancel", "ticket": rng.random_range(1..=tickets)})
             }
             5..13 => {
-                // A response most often, or nothing would ever begin.
+                // Mostly responses, because no action would begin without one.
                 let kind = *[2, 2, 2, 5, 5, 6, 6, 1, 3, 4, 7].choose(&mut rng).expect("some");
                 let is_loud = rng.random_bool(0.1);
                 let action = if is_loud { action.to_uppercase() } else { action.to_owned() };
@@ -68,7 +70,7 @@ fn script(seed: u64) -> Vec<Value> {
     steps.collect()
 }
 
-/// What the hub does at each step of a script.
+/// Returns the outputs of the hub at each step of a script.
 fn play(script: &[Value]) -> Vec<Vec<Value>> {
     let mut hub = Hub::new("elbowroom");
     let mut names = vec![String::new()];
@@ -120,7 +122,7 @@ fn joined(name: &str, arguments: &[String]) -> String {
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// As `hub_twin.py` writes it.
+/// Converts an output to the format of `hub_twin.py`.
 fn written(effect: Effect, names: &[String]) -> Value {
     match effect {
         Effect::Send(it) => json!([
@@ -145,13 +147,13 @@ fn written(effect: Effect, names: &[String]) -> Value {
     }
 }
 
-/// Which of several actions comes first when one moment decides about them is of no account.
+/// Sorts outputs by action, because the order of simultaneous outputs is irrelevant.
 fn in_order(mut effects: Vec<Value>) -> Vec<Value> {
     effects.sort_by_key(|it| it[0].to_string());
     effects
 }
 
-/// `None` where there is no Python.
+/// Plays scripts to the Python hub. Returns `None` if Python is not installed.
 fn played_by_python(scripts: &[Vec<Value>]) -> Option<Vec<Vec<Vec<Value>>>> {
     let program = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/hub_twin.py");
     let mut child = Command::new("python3")
@@ -204,7 +206,7 @@ fn the_hub_does_what_that_of_the_example_does() {
             }
         }
     }
-    // Scripts in which nothing happens would show nothing.
+    // The random scripts must contain enough events.
     assert!(
         outcomes.iter().all(|(_, count)| *count > 50),
         "{outcomes:?}"

@@ -1,4 +1,4 @@
-//! Problems with less time, or with less to begin with.
+//! Variants of problems with less time, or with fewer initial facts.
 
 use std::time::Duration;
 
@@ -11,10 +11,10 @@ use crate::sums::Sums;
 
 const LIMIT: Duration = Duration::from_secs(1);
 
-/// The most initial facts that are left out, one in each variant.
+/// Maximum number of initial facts to remove, one in each variant.
 const MOST_FACTS: usize = 8;
 
-/// Asks for each variant of a problem that has a plan.
+/// Plans for each variant of a problem that has a plan.
 pub(crate) fn each(name: &str, task: &Task, sums: &mut Sums) {
     let whole = first_plan(task, &Situation::initial(task), LIMIT);
     if !matches!(whole, Answer::Plan { .. }) {
@@ -35,7 +35,7 @@ pub(crate) fn each(name: &str, task: &Task, sums: &mut Sums) {
     }
     let facts = task.problem().initial_facts.len();
     for number in 0..facts.min(MOST_FACTS) {
-        // Spread over all of them.
+        // Distributed evenly over all facts.
         let left_out = number * facts / facts.min(MOST_FACTS);
         let mut problem = task.problem().clone();
         let (predicate, objects) = problem.initial_facts.remove(left_out);

@@ -1,14 +1,14 @@
-//! How many answers that no plan exists have a certificate, of which kind, how large, and how long it
-//! takes to make and to check.
+//! Statistics of no-plan certificates: how many answers that no plan exists have one, by kind, with
+//! their size and the times to make and check them.
 //!
 //! ```text
-//! certified problems FOLDER [TEXT]…    each problem of a folder with a manifest.csv
-//! certified changed FOLDER [TEXT]…     the same with timed initials sooner, or an initial fact less
-//! certified from-here FOLDER           situations in the middle of plans for delivery and RCLL problems
+//! certified problems FOLDER [TEXT]… each problem of a folder with a manifest.csv
+//! certified changed FOLDER [TEXT]…  the same with timed initials sooner, or an initial fact less
+//! certified from-here FOLDER     situations in the middle of plans for delivery and RCLL problems
 //! ```
 //!
-//! Prints a line for each answer that no plan exists, and sums. Of a folder, the lines of its manifest
-//! that contain one of the texts count. Each problem has two seconds.
+//! Prints a line for each answer that no plan exists, and sums. If there are texts, only lines of
+//! the manifest that contain one of them are used. The time limit of each problem is two seconds.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,
@@ -34,7 +34,7 @@ use elbowroom::planner::{Answer, Settings, plan};
 use elbowroom::text::Source;
 use sums::Sums;
 
-/// For how long a plan is looked for.
+/// Time limit of the planner.
 const LIMIT: Duration = Duration::from_secs(2);
 
 fn main() -> ExitCode {

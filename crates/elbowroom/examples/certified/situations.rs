@@ -1,4 +1,4 @@
-//! Situations in the middle of plans, with running actions that last up to a half longer than planned.
+//! Situations in the middle of plans. Running actions are up to a half longer than planned.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ const SITUATIONS: usize = 1000;
 
 const LIMIT: Duration = Duration::from_secs(5);
 
-/// Asks from a thousand situations.
+/// Plans from a thousand situations.
 pub(crate) fn all(folder: &Path) -> Result<(), String> {
     let mut random = ChaCha8Rng::seed_from_u64(7);
     let mut plans: Vec<(&str, Task, TimeTriggeredPlan)> = Vec::new();
@@ -63,7 +63,7 @@ pub(crate) fn all(folder: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Where the plan is at the time; `None` if something happens just then.
+/// Returns the situation at that time of the plan, or `None` if there is a happening at that time.
 fn situation_at(
     task: &Task,
     plan: &TimeTriggeredPlan,

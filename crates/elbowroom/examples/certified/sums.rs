@@ -1,4 +1,4 @@
-//! What is counted.
+//! Statistics of answers and certificates.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -8,10 +8,10 @@ use elbowroom::model::{Situation, Task};
 use elbowroom::planner::{Answer, Proof};
 use elbowroom::verify::no_plan::verify_no_plan_from;
 
-/// For how long a certificate is looked for.
+/// Time limit for a certificate.
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// Answers by what became of them.
+/// Counts of answers by kind.
 #[derive(Default)]
 pub(crate) struct Sums {
     plans: usize,
@@ -21,7 +21,7 @@ pub(crate) struct Sums {
 }
 
 impl Sums {
-    /// Counts an answer; certifies and checks it if it says that there is no plan.
+    /// Counts an answer. If it says that there is no plan, certifies and checks it.
     pub(crate) fn note(&mut self, name: &str, task: &Task, situation: &Situation, answer: &Answer) {
         let proof = match answer {
             Answer::Plan { .. } => {

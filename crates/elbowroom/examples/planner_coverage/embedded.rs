@@ -1,4 +1,4 @@
-//! The embedded planner as a process that prints its plans like any other.
+//! The embedded planner as a process that prints its plans like any other planner.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -9,7 +9,7 @@ use elbowroom::model::{Situation, Task};
 use elbowroom::pddl::{Source, read_problem, write_plan};
 use elbowroom::planner::{Answer, Progress, Settings, plan};
 
-/// `embedded DOMAIN PROBLEM SECONDS MB`
+/// Runs `embedded DOMAIN PROBLEM SECONDS MB`.
 #[allow(clippy::disallowed_methods, reason = "a process keeps its own time")]
 pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
     let begin = Instant::now();
@@ -26,18 +26,18 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
     let (problem, _) = read_problem(&source(domain)?, &source(problem)?)
         .map_err(|diagnostics| diagnostics.to_string())?;
     let task = Task::new(problem);
-    // Plans are written in the terms of the task; its names are all that is needed for that.
+    // A plan is written with the names of the task.
     let names = task.clone();
     let situation = Situation::initial(&task);
     let settings = Settings {
-        // What else the process needs should fit beside the search.
+        // The rest is for other data of the process.
         max_memory: (megabytes << 20) / 10 * 8,
         ..Settings::default()
     };
     let mut observe = |progress: &Progress| {
         if let Some(found) = &progress.plan {
             println!("; Plan found\n{}", write_plan(&names, &found.plan));
-            // Whoever reads may have gone; then so may we.
+            // Stops if the reader has closed the pipe.
             if std::io::stdout().flush().is_err() {
                 return ControlFlow::Break(());
             }

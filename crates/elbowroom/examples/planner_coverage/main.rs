@@ -1,27 +1,27 @@
-//! Which planner solves which benchmark, and how fast.
+//! Coverage and speed of planners on benchmarks.
 //!
 //! ```text
 //! planner_coverage run --data FOLDER --planner NAME … -o FILE.csv
-//!                      [--time S] [--memory MB] [--jobs N] [--only TEXT] [--every K] [--first]
-//!                      [--val PROGRAM]
+//!       [--time S] [--memory MB] [--jobs N] [--only TEXT] [--every K] [--first]
+//!       [--val PROGRAM]
 //! planner_coverage table FILE.csv [--first]
 //! ```
 //!
-//! `run` has each planner (`embedded`, those of the registry, `up:ENGINE`, or a command line) plan
-//! for each temporal instance of `FOLDER/manifest.csv`, and appends one line for each to the file.
-//! The manifest's first line names its columns: `domain`, `instance`, `domain_file` and
-//! `problem_file` must be among them; `collection`, `durative_actions`, `domain_features` and
-//! `problem_features` may. Lines that are there already are not run again, so an interrupted run
-//! goes on where it was. `--only` keeps instances whose line in the manifest has the text in it;
-//! `--every` each Kth of a domain; `--first` ends a planner at its first plan; `--val` has VAL's `Validate` judge the
-//! last plan, too. `table` makes Markdown of the file, with
-//! `--first` without scores.
+//! `run` runs each planner (`embedded`, those of the registry, `up:ENGINE`, or a command line) on
+//! each temporal instance of `FOLDER/manifest.csv`, and appends one line for each to the file. The
+//! manifest's first line names its columns. The columns `domain`, `instance`, `domain_file` and
+//! `problem_file` are required; `collection`, `durative_actions`, `domain_features` and
+//! `problem_features` are optional. Runs that are already in the file are skipped, so an
+//! interrupted run can be continued. `--only` selects instances whose line in the manifest contains
+//! the text; `--every` selects each Kth instance of a domain; `--first` stops a planner at its
+//! first plan; `--val` also validates the last plan with VAL's `Validate`. `table` converts the
+//! file to Markdown, with `--first` without scores.
 //!
-//! `--time` is processor time, so that a busy machine does not change the results.
+//! `--time` is processor time, so that the load of the machine does not change the results.
 //!
-//! All planners run as processes under the same supervision, the embedded one too (this program
-//! calls itself for that), so times include the start of the process, and memory is measured in the
-//! same way. Only plans that the judge accepts count.
+//! All planners run as processes under the same supervision, including the embedded one (this
+//! program calls itself). So times include the start of the process, and memory is measured in the
+//! same way. Only plans that the validator accepts count.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,

@@ -1,10 +1,10 @@
-//! The list of instances of a folder of benchmarks.
+//! Manifest of a folder of benchmark instances.
 
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-/// A line of a manifest, its columns by name; what is not there is empty.
+/// Line of a manifest, with its columns by name; missing ones are empty.
 #[derive(Debug, Deserialize)]
 struct Line {
     #[serde(default)]
@@ -13,7 +13,7 @@ struct Line {
     instance: String,
     domain_file: String,
     problem_file: String,
-    /// How many durative actions the domain has.
+    /// Number of durative actions in the domain.
     #[serde(default)]
     durative_actions: String,
     #[serde(default)]
@@ -22,31 +22,31 @@ struct Line {
     problem_features: String,
 }
 
-/// An instance of a benchmark.
+/// Benchmark instance.
 #[derive(Debug)]
 #[allow(
     clippy::struct_field_names,
     reason = "the manifest's own name for its column"
 )]
 pub(crate) struct Instance {
-    /// The manifest's, or the folder's name where it has none.
+    /// The manifest's collection, or the folder's name without one.
     pub(crate) collection: String,
     pub(crate) domain: String,
     pub(crate) instance: String,
     pub(crate) domain_file: PathBuf,
     pub(crate) problem_file: PathBuf,
-    /// Whether it has durative actions, as far as the manifest knows.
+    /// `true` if it has durative actions, or if the manifest does not say.
     pub(crate) is_temporal: bool,
-    /// Features of domain and problem, joined by spaces.
+    /// Features of domain and problem, separated by spaces.
     pub(crate) features: String,
-    /// The line as it stands, to be searched.
+    /// Unparsed line, for text search.
     pub(crate) line: String,
 }
 
-/// The instances of `FOLDER/manifest.csv`.
+/// Returns the instances of `FOLDER/manifest.csv`.
 ///
 /// # Errors
-/// When the manifest cannot be read, or a column is missing.
+/// The manifest cannot be read, or a column is missing.
 pub(crate) fn read(folder: &Path) -> Result<Vec<Instance>, String> {
     // `.` has no name.
     let folder = folder.canonicalize();

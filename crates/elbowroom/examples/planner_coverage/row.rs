@@ -1,42 +1,42 @@
-//! A line of the results.
+//! Line of the results.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-/// What became of one instance with one planner. Times in seconds; empty where there is nothing to
-/// say.
+/// Result of one planner on one instance. Times are in seconds; missing values are empty.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Row {
     pub(crate) planner: String,
     /// `collection/domain`
     pub(crate) domain: String,
     pub(crate) instance: String,
-    /// `deadlines`, `numbers`, `concurrency`, joined by spaces.
+    /// `deadlines`, `numbers`, `concurrency`, separated by spaces.
     pub(crate) kinds: String,
-    /// [`Outcome::name`](elbowroom::external::Outcome::name).
+    /// Outcome, as [`Outcome::name`](elbowroom::external::Outcome::name).
     pub(crate) outcome: String,
     pub(crate) first_seconds: String,
     pub(crate) first_makespan: String,
     pub(crate) best_makespan: String,
     pub(crate) plans: String,
-    /// Plans that the judge refused.
+    /// Number of plans that the validator rejected.
     pub(crate) refused: String,
-    /// Whether the times of the last plan had to be repaired.
+    /// `true` if the times of the last plan had to be repaired.
     pub(crate) repaired: String,
     /// Processor time of all its processes.
     pub(crate) seconds: String,
     pub(crate) megabytes: String,
-    /// The value of the problem's metric in the best plan by it, where there is one that is not the makespan.
+    /// Best value of the problem's metric over its plans, if there is a metric other than the
+    /// makespan.
     #[serde(default)]
     pub(crate) best_metric: String,
-    /// `less` or `more`: what is better of the metric.
+    /// Better direction of the metric: `less` or `more`.
     #[serde(default)]
     pub(crate) better: String,
-    /// What VAL says of the last plan: `valid`, `failed`, `error`; empty where it was not asked.
+    /// VAL's verdict on the last plan: `valid`, `failed`, `error`; empty if VAL was not used.
     #[serde(default)]
     pub(crate) val: String,
-    /// What else is to be said.
+    /// Message.
     pub(crate) note: String,
 }
 
@@ -45,7 +45,7 @@ impl Row {
         self.outcome == "plan"
     }
 
-    /// What makes it the same run.
+    /// Returns the identity of the run.
     pub(crate) fn key(&self) -> (String, String, String) {
         (
             self.planner.clone(),
@@ -55,7 +55,7 @@ impl Row {
     }
 }
 
-/// The rows of a file. A last line that an interrupted run left unfinished is passed over.
+/// Returns the rows of a file. An incomplete last line of an interrupted run is ignored.
 pub(crate) fn read(path: &Path) -> Result<Vec<Row>, String> {
     let reader = csv::Reader::from_path(path);
     let reader = reader.map_err(|error| format!("{}: {error}", path.display()))?;

@@ -1,4 +1,4 @@
-//! Runs planners on instances, and writes down what became of them.
+//! Runs of planners on instances, and the file of their results.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, OpenOptions};
@@ -24,15 +24,15 @@ struct Options {
     data: PathBuf,
     planners: Vec<String>,
     output: PathBuf,
-    /// Processor time.
+    /// Limit of processor time.
     seconds: u64,
     megabytes: u64,
     jobs: usize,
     only: Option<String>,
     every: usize,
-    /// Whether a planner is ended at its first plan.
+    /// `true` to stop a planner at its first plan.
     first: bool,
-    /// VAL's `Validate`, to judge the last plan, too.
+    /// VAL's `Validate`, to validate the last plan.
     val: Option<PathBuf>,
 }
 
@@ -139,7 +139,7 @@ fn options(arguments: &[String]) -> Result<Options, String> {
     Ok(options)
 }
 
-/// The runs that a file has already.
+/// Returns the runs that are already in a file.
 fn done(path: &Path) -> Result<BTreeSet<(String, String, String)>, String> {
     if !path.exists() {
         return Ok(BTreeSet::new());
@@ -147,7 +147,7 @@ fn done(path: &Path) -> Result<BTreeSet<(String, String, String)>, String> {
     Ok(row::read(path)?.iter().map(Row::key).collect())
 }
 
-/// All planners on the temporal instances, instance by instance.
+/// Returns the runs of all planners on the temporal instances, instance by instance.
 fn jobs(options: &Options) -> Result<Vec<Job>, String> {
     let mut jobs = Vec::new();
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
@@ -180,9 +180,9 @@ fn jobs(options: &Options) -> Result<Vec<Job>, String> {
     Ok(jobs)
 }
 
-/// What makes an instance hard in a way that interests us.
+/// Returns the difficult features of an instance.
 fn kinds(domain: &str, features: &str) -> String {
-    /// Domains in which no plan does one thing after the other.
+    /// Domains without sequential plans.
     const CONCURRENT: &[&str] = &["match", "tms", "driverlogshift", "concurrency"];
     let features: BTreeSet<&str> = features.split_whitespace().collect();
     let mut kinds = Vec::new();
@@ -224,7 +224,7 @@ fn run(job: &Job, options: &Options) -> Row {
     };
     let settings = Settings {
         work_limit: Some(Duration::from_secs(options.seconds)),
-        // For a planner that waits for nothing.
+        // Wall-clock limit, for a planner that hangs.
         time_limit: Some(Duration::from_secs(options.seconds * 6)),
         memory_limit: Some(options.megabytes << 20),
         ..Settings::default()
@@ -261,7 +261,8 @@ fn run(job: &Job, options: &Options) -> Row {
             .unwrap_or_default()
     };
     row.first_makespan = shown(makespans.first());
-    // Not the last plan's: planners can go on for a metric that has nothing to do with time.
+    // The last plan may have a larger makespan, because planners may optimize a metric without
+    // time.
     row.best_makespan = shown(makespans.iter().min());
     if let Some(metric) = better_metric {
         let best = if metric.maximize {
@@ -278,7 +279,7 @@ fn run(job: &Job, options: &Options) -> Row {
     filled(row, &report)
 }
 
-/// The planner of that name; the embedded one as a process of its own.
+/// Returns the planner of that name; the embedded one as a process of its own.
 fn planner(name: &str) -> Result<Planner, String> {
     if name != "embedded" {
         return Planner::named(name).map_err(|error| error.to_string());
@@ -327,7 +328,7 @@ fn filled(row: Row, report: &Report) -> Row {
     }
 }
 
-/// A message in which absolute paths are names of files: where they lie is of no interest elsewhere.
+/// Replaces absolute paths in a message by file names, so that it does not depend on the machine.
 fn without_folders(message: &str) -> String {
     let words = message.split(' ').map(|word| match word.rsplit_once('/') {
         Some((_, name)) if word.starts_with('/') && !name.is_empty() => name,

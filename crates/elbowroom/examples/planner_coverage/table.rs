@@ -1,4 +1,4 @@
-//! From results to Markdown.
+//! Conversion of results to Markdown.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::row::{self, Row};
 
-/// `table FILE.csv [--first]`
+/// Runs `table FILE.csv [--first]`.
 pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
     let (path, has_scores) = match arguments {
         [path] => (path, true),
@@ -17,8 +17,8 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Instance and planner lead to what became of it. An instance counts if every planner was run on
-/// it, so that all are measured on the same.
+/// Results by instance and planner. Only instances with a run of every planner count, so that all
+/// are measured on the same.
 struct Results<'a> {
     planners: Vec<&'a str>,
     /// By domain, in order; then by instance; then by planner.
@@ -44,7 +44,7 @@ impl<'a> Results<'a> {
         Self { planners, domains }
     }
 
-    /// The instances with a row for which `keep` holds.
+    /// Returns the instances with a row for which `keep` holds.
     fn instances(&self, keep: impl Fn(&Row) -> bool) -> Vec<&BTreeMap<&'a str, &'a Row>> {
         let all = self.domains.values().flat_map(BTreeMap::values);
         all.filter(|runs| runs.values().any(|row| keep(row)))
@@ -128,7 +128,7 @@ fn line(
         let median = median.map_or_else(String::new, |seconds| format!("{seconds:.2}"));
         let _ = write!(text, " {} | {median} |", solved.len());
         if has_scores {
-            // The sum of nothing is -0.
+            // An empty sum of floats is -0.
             let scores = solved.iter().fold(0.0, |sum, (_, score)| sum + score);
             let _ = write!(text, " {scores:.1} |");
         }
@@ -137,8 +137,9 @@ fn line(
     text
 }
 
-/// The score of the planning competitions: the best value of all planners, divided by this one's (the other way round where
-/// more is better). The value is that of the problem's metric, and the makespan where it has none.
+/// Returns the score of the planning competitions: the best value of all planners, divided by this
+/// one's (the inverse if more is better). The value is that of the problem's metric, or the
+/// makespan without one.
 fn score(runs: &BTreeMap<&str, &Row>, planner: &str) -> f64 {
     let row = runs[planner];
     let by_metric = !row.better.is_empty();
@@ -155,7 +156,7 @@ fn score(runs: &BTreeMap<&str, &Row>, planner: &str) -> f64 {
     let best = values.reduce(if more { f64::max } else { f64::min });
     match (best, value(row)) {
         (Some(best), Some(own)) if best.total_cmp(&own).is_eq() => 1.0,
-        // Below zero, the better value is the larger one by its size where less is better.
+        // Among negative values, the better one has the larger absolute value if less is better.
         (Some(best), Some(own)) if best * own > 0.0 => {
             if more == (best > 0.0) {
                 own / best
@@ -167,7 +168,7 @@ fn score(runs: &BTreeMap<&str, &Row>, planner: &str) -> f64 {
     }
 }
 
-/// How each planner's runs ended.
+/// Returns the table of outcomes of each planner.
 fn outcomes(results: &Results<'_>) -> String {
     let all = results.instances(|_| true);
     let names: BTreeSet<&str> = all
@@ -206,7 +207,7 @@ fn outcomes(results: &Results<'_>) -> String {
     text
 }
 
-/// Instances that one planner solves although another says that there is no plan.
+/// Lists the instances that one planner solves although another reports that there is no plan.
 fn contradictions(results: &Results<'_>) -> String {
     let mut text = String::new();
     for (domain, instances) in &results.domains {

@@ -1,4 +1,4 @@
-//! VAL's word on a plan.
+//! Validation of a plan by VAL.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -6,15 +6,16 @@ use std::process::{Command, Stdio};
 
 use elbowroom::model::TimeTriggeredPlan;
 
-/// What `Validate` says of a plan at a tolerance of a thousandth, within a minute: `valid`, `failed`, or `error` where it
-/// cannot judge. `docs/val-agreement.md` has what its tolerance means.
+/// Runs `Validate` on a plan with a tolerance of a thousandth and a time limit of a minute. Returns
+/// `valid`, `failed`, or `error` if there is no verdict. `docs/val-agreement.md` explains the
+/// meaning of the tolerance.
 pub(crate) fn verdict(
     program: &Path,
     domain: &Path,
     problem: &Path,
     plan: &TimeTriggeredPlan,
 ) -> String {
-    // It reads no fractions.
+    // VAL does not read fractions.
     let mut text = String::new();
     for step in &plan.steps {
         let _ = write!(text, "{}: {}", step.start.to_decimal(9), step.action.name);

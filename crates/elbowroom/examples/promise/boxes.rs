@@ -1,5 +1,5 @@
-//! What the dynamic guarantee costs: boxes beside those of the weak one, and the time they take;
-//! and what is gained where the dispatcher sees to obligations.
+//! Cost of the dynamic guarantee: its boxes in comparison with those of the weak one, and their
+//! search times; and the gain if the dispatcher enforces obligations.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -16,13 +16,13 @@ use super::subject::Subject;
 use super::trial::{Boxed, Search, boxed};
 use super::{counted, not_counted};
 
-/// One plan's boxes, weak and dynamic.
+/// Boxes of one plan, weak and dynamic.
 struct Row {
     is_different: bool,
     widths: [Rational; 2],
     checks: [usize; 2],
     times: [Duration; 2],
-    /// The width of the dynamic box and of that with obligations enforced, where there are any.
+    /// Widths of the dynamic box and of that with enforced obligations, if there are any.
     enforced: Option<[Rational; 2]>,
 }
 
@@ -135,7 +135,7 @@ fn timed(
     Ok((boxed, begin.elapsed()))
 }
 
-/// The sum of the widths, upper ends cut at ten times the nominal value.
+/// Returns the sum of the widths, with upper ends cut at ten times the nominal value.
 fn width(envelope: &DecoupledEnvelope, plan: &ParametrizedPlan) -> Rational {
     let mut sum = Rational::ZERO;
     for (interval, parameter) in envelope.intervals().iter().zip(&plan.parameters) {

@@ -1,5 +1,5 @@
-//! Boxes whose ends are at their limits, each end moved out: refused, and where that is because
-//! nobody could know in time, the spoiler shows it.
+//! Boxes with maximal ends, each end moved outwards. The larger box must be rejected. If the reason
+//! is missing knowledge of the future, the spoiler must defeat the executors.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -17,23 +17,23 @@ use super::trial::{Ready, Search};
 use super::worlds::Worlds;
 use super::{counted, not_counted};
 
-/// By how much an end is moved out (β).
+/// Step size of an end (β).
 const PRECISION: Rational = Rational::ONE;
 
-/// Those that go by what is planned, not by a box.
+/// Executors that use the planned schedule instead of a box.
 const EXECUTORS: [&str; 2] = ["stn", "fixed:60"];
 
-/// What came of all ends of one plan.
+/// Counts over all ends of one plan.
 #[derive(Clone, Debug, Default)]
 struct Row {
-    /// Ends that nothing but the parameter's range limits, or nothing at all.
+    /// Ends that are unlimited, or limited only by the parameter's range.
     free: usize,
-    /// Ends that were accepted further out: a mistake.
+    /// Ends that were accepted after the move, which is a bug.
     accepted: usize,
     no_schedule: usize,
     broken: usize,
     uncontrollable: usize,
-    /// Of the last: for each executor, how often the spoiler has won.
+    /// Number of uncontrollable ends for which the spoiler defeats each executor.
     spoiled: [usize; EXECUTORS.len()],
 }
 
@@ -127,7 +127,7 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
     Ok(row)
 }
 
-/// The box with an end moved out, unless nothing limits it but the parameter's range.
+/// Returns the box with an end moved outwards, or `None` if only the parameter's range limits it.
 fn grown(
     sharp: &DecoupledEnvelope,
     end: BoxEnd,
@@ -143,7 +143,7 @@ fn grown(
     Some(end.with_reach(sharp, Some(further)))
 }
 
-/// Whether the spoiler makes each executor fail.
+/// Returns `true` for each executor that fails against the spoiler.
 fn spoiled(ready: &Ready<'_>, envelope: &DecoupledEnvelope) -> [bool; EXECUTORS.len()] {
     let worlds = Worlds::new(&ready.subject.task, &ready.open, envelope);
     EXECUTORS.map(|executor| {

@@ -1,7 +1,8 @@
-//! What a late start excuses, before anybody has heard of it.
+//! Failures that are excused by a late start before its report.
 //!
-//! Whoever was told to start in time is taken to have started: reports may be lost. So nothing is promised of
-//! what the plan has after that start, where the world brings it about by itself meanwhile.
+//! An executor assumes that an action has started once it was commanded, because reports may be
+//! lost. So there is no promise for steps after that start in the plan that the world triggers by
+//! itself in the meantime.
 
 use std::collections::BTreeSet;
 
@@ -11,9 +12,9 @@ use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::plan::{InstanceId, Node, NodeId, ParameterId, ParametrizedPlan};
 
-/// Whether a run ended because this action, of which the plan has no other, started too late, without the
-/// executor being able to know: it had not heard of the start, and either had no time left, or something failed
-/// that was overtaken.
+/// Returns `true` if a run ended because this action started too late and the executor could not
+/// know. It must be the only instance of its action in the plan, and its start must not have been
+/// reported. Either there was no time left, or an action failed that was overtaken.
 pub(crate) fn excuses(task: &Task, prepared: &Prepared, report: &Report, late: &str) -> bool {
     let Some(reason) = report.reasons.first() else {
         return false;
@@ -34,9 +35,10 @@ pub(crate) fn excuses(task: &Task, prepared: &Prepared, report: &Report, late: &
     }
 }
 
-/// Whether an end or a timed initial has come before a start that the plan puts before it, and what failed
-/// is the action that starts there or one that ends after it. Who starts something that has to come later is
-/// to blame, and not the late start, unless it comes later only because of such an end.
+/// Returns `true` if an end or a timed initial has come before the late start although the plan
+/// puts it after that start, and the failed action is the late one or one that ends after it. If
+/// the executor itself started an action too early, the late start is no excuse, unless the plan
+/// puts that action after the late start only because of such an end.
 fn is_overtaken(
     task: &Task,
     prepared: &Prepared,
@@ -71,7 +73,7 @@ fn is_overtaken(
             let executed = report.executed.iter();
             executed.filter(|executed| executed.step.action.name == own)
         };
-        // More than those that need not wait for the late start.
+        // More starts than those that need not wait for the late start.
         let starts = all().filter(|id| !kept.contains(&plan.plan.start(*id)));
         let starts = starts.count();
         let ends = all().filter(|id| !later.contains(&plan.plan.end(*id)));
@@ -86,8 +88,9 @@ fn is_overtaken(
     is_overtaken && is_concerned
 }
 
-/// What an executor who relies on the box can bring about, or lets come about, only after a node: actions may end as
-/// soon as their lower ends have it, so what must come before their ends must not be left waiting for longer.
+/// Returns the nodes that an executor relying on the box executes or allows only after `first`.
+/// Actions may end at the lower ends of their durations, so conditions of their ends must not wait
+/// any longer.
 fn later_than(prepared: &Prepared, first: NodeId) -> BTreeSet<NodeId> {
     let plan = &prepared.plan;
     let mut values = plan.nominal();
@@ -135,7 +138,8 @@ fn later_than(prepared: &Prepared, first: NodeId) -> BTreeSet<NodeId> {
     nodes.filter(is_later).collect()
 }
 
-/// What the plan puts behind a node, one step after the other, each behind a node that `counts`.
+/// Returns the nodes after `first` by the constraints of the plan, transitively over nodes for
+/// which `counts` holds.
 fn put_behind(
     plan: &ParametrizedPlan,
     first: NodeId,

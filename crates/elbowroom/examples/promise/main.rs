@@ -1,22 +1,22 @@
-//! Whether what an envelope promises is kept: over every plan of a folder of benchmarks.
+//! Check of the promises of envelopes on every plan of a folder of benchmarks.
 //!
 //! ```text
-//! promise plan    [--data FOLDER] [--plans FOLDER] [--states N] [--seconds S]
+//! promise plan [--data FOLDER] [--plans FOLDER] [--states N] [--seconds S]
 //! promise nominal [--data FOLDER] [--plans FOLDER]
-//! promise runs    [--data FOLDER] [--plans FOLDER] [--runs N] [--each S]
-//! promise grow    [--data FOLDER] [--plans FOLDER]
+//! promise runs [--data FOLDER] [--plans FOLDER] [--runs N] [--each S]
+//! promise grow [--data FOLDER] [--plans FOLDER]
 //! promise boxes   [--data FOLDER] [--plans FOLDER]
 //! ```
 //!
-//! `plan` has the embedded planner make a plan for each temporal problem and keeps them as text in
-//! the folder `--plans`; the others use them, and make those that are missing (`--seconds 0`: they
-//! do not). `nominal` executes every valid plan where nothing deviates. `runs` executes them in
-//! worlds in which every duration is somewhere in its interval, each plan at most N times and for
-//! at most S seconds. `grow` widens boxes that cannot be widened. `boxes` compares boxes of the
-//! weak and the dynamic guarantee.
+//! `plan` computes a plan for each temporal problem with the embedded planner, and stores it as
+//! text in the folder `--plans`. The other commands read these plans, and compute missing ones (not
+//! with `--seconds 0`). `nominal` executes every valid plan without deviations. `runs` executes
+//! each plan in worlds in which every duration is in its interval, at most N times and for at most
+//! S seconds. `grow` tries to widen maximal boxes. `boxes` compares boxes of the weak and the
+//! dynamic guarantee.
 //!
-//! `--only TEXT` (also several) keeps the plans in whose family or name the text is, `--jobs` is
-//! the number of threads, `--widening` the number of seconds after which a box is wide enough.
+//! `--only TEXT` (repeatable) selects the plans whose family or name contains the text. `--jobs` is
+//! the number of threads, and `--widening` the time limit in seconds for widening a box.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,
@@ -79,7 +79,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The sources that are asked for.
+/// Returns the selected sources.
 fn wanted(options: &Options) -> Vec<Source> {
     let mut sources = sources::sources(&options.data);
     let only = &options.only;
@@ -90,10 +90,10 @@ fn wanted(options: &Options) -> Vec<Source> {
     sources
 }
 
-/// What there is to say of a plan and its family, or why it does not count.
+/// Function that returns the family of a plan and its result, or why the plan does not count.
 type Say<'a, T> = dyn Fn(&Source) -> Result<(String, T), String> + Sync + 'a;
 
-/// What there is to say of each plan, by family; and why others do not count, and how many.
+/// Returns the results by family, and the number of plans that do not count by reason.
 fn counted<T: Send>(
     options: &Options,
     say: &Say<'_, T>,
@@ -123,7 +123,7 @@ fn counted<T: Send>(
     (families, skipped)
 }
 
-/// A table of plans that do not count.
+/// Returns a table of the plans that do not count.
 fn not_counted(skipped: &BTreeMap<String, usize>) -> String {
     let mut text = String::from("\n| not counted | plans |\n|---|--:|\n");
     for (why, count) in skipped {
@@ -132,7 +132,7 @@ fn not_counted(skipped: &BTreeMap<String, usize>) -> String {
     text
 }
 
-/// Makes plans, and keeps them.
+/// Computes and stores plans.
 fn plan(options: &Options) {
     let mut sources = wanted(options);
     sources.retain(|source| source.origin == Origin::Planned);

@@ -1,4 +1,4 @@
-//! Every plan where nothing deviates: no executor may fail.
+//! Execution of every plan without deviations: no executor may fail.
 
 use std::fmt::Write as _;
 use std::time::Instant;
@@ -9,17 +9,17 @@ use super::subject::Subject;
 use super::trial::{Ready, Search};
 use super::{counted, not_counted};
 
-/// Those that keep the promise, and two for comparison.
+/// Executors with a promise, and two for comparison.
 const EXECUTORS: [&str; 5] = ["guarded", "live", "stn", "fixed:60", "esterel"];
 
-/// Of these none may fail, in whatever order lines stand.
+/// Number of executors that must not fail, for any order of the lines of the plan.
 const KEEP: usize = 3;
 
-/// What came of one plan.
+/// Result of one plan.
 struct Row {
-    /// Whether each executor failed.
+    /// `true` for each executor that failed.
     failed: [bool; EXECUTORS.len()],
-    /// Whether one failed whose lines stood in another order.
+    /// `true` if an executor failed with the lines in another order.
     is_order_missed: bool,
 }
 

@@ -1,24 +1,24 @@
-//! What the command line says.
+//! Command line.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use super::subject::Planning;
 
-/// What to do with which plans.
+/// Options of all commands.
 #[derive(Clone, Debug)]
 pub(crate) struct Options {
     pub(crate) data: PathBuf,
     pub(crate) planning: Planning,
-    /// Only plans whose family or name has this in it.
+    /// Texts to search for in the family and the name of a plan; one of them must occur.
     pub(crate) only: Vec<String>,
-    /// The most runs of one plan.
+    /// Maximum number of runs of one plan.
     pub(crate) runs: u64,
-    /// Time for the runs of one plan.
+    /// Time limit for the runs of one plan.
     pub(crate) each: Duration,
-    /// For how long to widen a box at most.
+    /// Time limit for widening a box.
     pub(crate) widening: Duration,
-    /// Threads.
+    /// Number of threads.
     pub(crate) jobs: usize,
 }
 

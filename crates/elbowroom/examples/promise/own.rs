@@ -1,6 +1,6 @@
-//! Small plans of our own, each of a kind that is hard to execute without knowing the future.
+//! Small plans of our own, each of a kind that is hard to execute without knowledge of the future.
 
-/// A problem with a plan: its name, domain, problem and plan.
+/// Problems with plans: name, domain, problem and plan.
 pub(crate) const OWN: &[[&str; 4]] = &[
     [
         "an end that needs another end, which must not have come at the start",

@@ -1,4 +1,4 @@
-//! Plans of the embedded planner, kept as text.
+//! Plans of the embedded planner, stored as text.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -12,25 +12,25 @@ use elbowroom::planner::{Answer, Settings, plan as search};
 use super::sources::Source;
 use super::subject::Planning;
 
-/// In files that say that there is none, whatever the limits.
+/// Prefix of files that say that there is no plan, independent of the limits.
 const NO_PLAN: &str = "; none: ";
 
-/// In files that say that none was found within limits; these follow.
+/// Prefix of files that say that no plan was found; the limits follow.
 const NOT_FOUND: &str = "; not found within ";
 
-/// Why there is no plan.
+/// Reason why there is no plan.
 enum Without {
-    /// None exists, or the planner does not take the problem.
+    /// None exists, or the planner does not support the problem.
     Ever(&'static str),
     /// None was found within the limits.
     Yet,
 }
 
-/// The plan that was made earlier, or a new one. Where none was found earlier, it is looked for
-/// again if the limits are others now.
+/// Returns the stored plan, or a new one. If no plan was found earlier, the search is repeated if
+/// the limits have changed.
 ///
 /// # Errors
-/// Why there is none.
+/// There is no plan; the text says why.
 pub(crate) fn plan(source: &Source, task: &Task, how: &Planning) -> Result<String, String> {
     let file = file(source, how);
     let limits = limits(how);
@@ -56,7 +56,7 @@ pub(crate) fn plan(source: &Source, task: &Task, how: &Planning) -> Result<Strin
             Err(Without::Ever(why)) => format!("{NO_PLAN}{why}\n"),
             Err(Without::Yet) => format!("{NOT_FOUND}{limits}\n"),
         };
-        // What cannot be kept is made again the next time.
+        // If the plan cannot be stored, it is computed again the next time.
         let _ = fs::write(file, text);
     }
     made.map_err(|without| match without {
@@ -65,7 +65,7 @@ pub(crate) fn plan(source: &Source, task: &Task, how: &Planning) -> Result<Strin
     })
 }
 
-/// The limits of the search, in words.
+/// Describes the limits of the search.
 fn limits(how: &Planning) -> String {
     let seconds = how.time.map_or(0, |time| time.as_secs());
     format!("{} states and {seconds} s", how.states)

@@ -1,5 +1,5 @@
-//! Every plan in worlds in which every duration is somewhere in its interval of the dynamic box:
-//! no failure, no new plan, and the judge accepts what was done.
+//! Execution of every plan with all durations in their intervals of the dynamic box. There must be
+//! no failure and no replanning, and the validator must accept the execution.
 
 use std::fmt::Write as _;
 use std::time::Instant;

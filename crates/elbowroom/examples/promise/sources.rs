@@ -1,30 +1,30 @@
-//! Where plans come from: files of the benchmarks, and problems to plan for.
+//! Sources of plans: files of the benchmarks, and planning problems.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A problem, and where its plan comes from.
+/// Problem, and the source of its plan.
 #[derive(Clone, Debug)]
 pub(crate) struct Source {
-    /// Under which it is counted.
+    /// Family for the counts.
     pub(crate) family: String,
-    /// Which it is in its family.
+    /// Name within its family.
     pub(crate) name: String,
     pub(crate) domain: PathBuf,
     pub(crate) problem: PathBuf,
     pub(crate) origin: Origin,
 }
 
-/// Where a plan comes from.
+/// Origin of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Origin {
-    /// Somebody wrote it down, or another planner made it.
+    /// Written by hand, or by another planner.
     File(PathBuf),
-    /// The embedded planner makes it.
+    /// Computed by the embedded planner.
     Planned,
 }
 
-/// All that there is below a folder of benchmarks.
+/// Returns all sources below a folder of benchmarks.
 pub(crate) fn sources(data: &Path) -> Vec<Source> {
     let mut sources = published(data);
     sources.extend(envelopes(&data.join("envelopes")));
@@ -32,7 +32,7 @@ pub(crate) fn sources(data: &Path) -> Vec<Source> {
     sources
 }
 
-/// The columns of a table without quoting, line by line.
+/// Returns the columns of each line of a table without quoting.
 fn table(path: &Path) -> Vec<Vec<String>> {
     let text = fs::read_to_string(path).unwrap_or_default();
     let lines = text.lines().skip(1);
@@ -40,7 +40,7 @@ fn table(path: &Path) -> Vec<Vec<String>> {
     lines.map(columns).collect()
 }
 
-/// The plans of `pddl/plans.csv`.
+/// Returns the plans of `pddl/plans.csv`.
 fn published(data: &Path) -> Vec<Source> {
     let folder = data.join("pddl");
     let rows = table(&folder.join("plans.csv"));
@@ -60,7 +60,8 @@ fn published(data: &Path) -> Vec<Source> {
     rows.iter().filter_map(source).collect()
 }
 
-/// The temporal problems of `pddl/manifest.csv` and all of `required-concurrency/manifest.csv`.
+/// Returns the temporal problems of `pddl/manifest.csv` and all of
+/// `required-concurrency/manifest.csv`.
 fn problems(data: &Path) -> Vec<Source> {
     let mut sources = Vec::new();
     let folder = data.join("required-concurrency");
@@ -103,7 +104,7 @@ fn problems(data: &Path) -> Vec<Source> {
     sources
 }
 
-/// All plans of `envelopes`, those with fixed times and those without.
+/// Returns all plans of `envelopes`, those with fixed times and those without.
 fn envelopes(folder: &Path) -> Vec<Source> {
     let mut files = Vec::new();
     below(folder, &mut files);
@@ -122,7 +123,8 @@ fn envelopes(folder: &Path) -> Vec<Source> {
     files.iter().filter_map(source).collect()
 }
 
-/// The domain and the problem that go with a plan of `envelopes`; `None` if it is no plan.
+/// Returns the domain and the problem for a plan of `envelopes`, or `None` if the file is not a
+/// plan.
 fn companions(parts: &[&str]) -> Option<(String, String)> {
     let (name, folders) = parts.split_last()?;
     let digits = || {
@@ -184,7 +186,7 @@ fn companions(parts: &[&str]) -> Option<(String, String)> {
     }
 }
 
-/// All files below a folder, in order.
+/// Adds all files below a folder, sorted.
 fn below(folder: &Path, found: &mut Vec<PathBuf>) {
     let Ok(entries) = fs::read_dir(folder) else {
         return;

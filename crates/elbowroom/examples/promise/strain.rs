@@ -1,6 +1,6 @@
-//! One thing that nobody has reckoned with: an action that takes shorter or longer than its interval has it, or a look
-//! at the world that comes too late. A plan that would still work is not given up because of it, and what is
-//! promised from then on is kept.
+//! One unexpected deviation: the duration of an action is outside its interval, or the executor
+//! observes the world too late. A plan that is still feasible must not be abandoned, and promises
+//! made after the deviation must be kept.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -15,19 +15,19 @@ use elbowroom::plan::{
 };
 use elbowroom::stn::{self, ConsistentNetwork, Network};
 
-/// What was not reckoned with.
+/// Unexpected deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stray {
-    /// How long this action takes.
+    /// The duration of this action.
     Duration(InstanceId),
-    /// When somebody looked at the world, the how-manieth time.
+    /// The time of an observation, by its number.
     Look(u64),
 }
 
-/// A world at which somebody looks later than he said he would, once.
+/// World whose executor once observes it later than planned.
 pub(crate) struct Lagging<W> {
     pub(crate) inner: W,
-    /// How many looks are left before the one that is late.
+    /// Number of observations before the late one.
     pub(crate) looks: u64,
     pub(crate) lag: Rational,
 }
@@ -53,7 +53,7 @@ impl<W: World> World for Lagging<W> {
     }
 }
 
-/// What a run knew, and what it said of that.
+/// Knowledge of the executor in a run, and its promises.
 pub(crate) struct Course<'a> {
     plan: &'a ParametrizedPlan,
     stray: Stray,
@@ -61,11 +61,11 @@ pub(crate) struct Course<'a> {
     tickets: BTreeMap<Ticket, InstanceId>,
     looks: u64,
     happened: Vec<Option<Rational>>,
-    /// The promises made, in their order.
+    /// Promises, in their order.
     promises: Vec<Promise>,
-    /// How many promises had been made when the stray was noticed.
+    /// Number of promises when the deviation was noticed.
     noticed: Option<usize>,
-    /// When and why the plan was given up; nothing is noted after that.
+    /// Time and cause of abandoning the plan; later events are ignored.
     given_up: Option<(Rational, Cause)>,
 }
 
@@ -84,13 +84,14 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Whether the plan was given up.
+    /// Returns `true` if the plan was abandoned.
     pub(crate) fn is_given_up(&self) -> bool {
         self.given_up.is_some()
     }
 
-    /// Whether what was promised at last is that promise or a stronger one, and nothing was beyond what was reckoned
-    /// with then: before the stray, or after it was noticed.
+    /// Returns `true` if the last promise is at least as strong as `weakest` and the deviation
+    /// cannot violate it: the promise was made before the deviating action had started, or after
+    /// the deviation was noticed.
     pub(crate) fn is_promised(&self, weakest: Promise) -> bool {
         let is_before = match self.stray {
             Stray::Duration(id) => self.happened[self.plan.plan.start(id).index()].is_none(),
@@ -102,8 +103,8 @@ impl<'a> Course<'a> {
         last.is_some_and(|last| *last <= weakest)
     }
 
-    /// Whether the plan was given up for want of time although the rest of it would have worked from then on as
-    /// planned, what was overdue ending when it suits.
+    /// Returns `true` if the plan was abandoned for lack of time although its remaining steps were
+    /// feasible with nominal durations and arbitrary ends of overdue actions.
     pub(crate) fn is_given_up_in_vain(&self, task: &Task) -> bool {
         let Some((now, cause)) = &self.given_up else {
             return false;

@@ -1,4 +1,4 @@
-//! A plan that is valid, read and freed of the order that it does not need.
+//! Valid plan, parsed and deordered.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use elbowroom::{PlanKind, RoundingRule, stn};
 use super::planning;
 use super::sources::{Origin, Source};
 
-/// A problem with a valid plan.
+/// Problem with a valid plan.
 pub(crate) struct Subject {
     pub(crate) family: String,
     pub(crate) name: String,
@@ -25,22 +25,22 @@ pub(crate) struct Subject {
     pub(crate) freed: Deordered,
 }
 
-/// How to come by plans.
+/// Settings of the planner.
 #[derive(Clone, Debug)]
 pub(crate) struct Planning {
-    /// Where plans made earlier are kept, and new ones are put.
+    /// Folder of stored plans.
     pub(crate) cache: Option<PathBuf>,
-    /// How many states to look at.
+    /// Maximum number of states in the search.
     pub(crate) states: u64,
-    /// How long to look for a plan that is not there; `None` for no plan at all.
+    /// Time limit for missing plans; `None` to compute none.
     pub(crate) time: Option<Duration>,
 }
 
 impl Subject {
-    /// A problem and a plan as texts.
+    /// Reads a problem and a plan from texts.
     ///
     /// # Errors
-    /// Why the plan does not count.
+    /// The plan does not count; the text says why.
     pub(crate) fn of_texts(
         [family, name]: [&str; 2],
         [domain, problem, plan]: [&str; 3],
@@ -52,10 +52,10 @@ impl Subject {
         Self::of_bytes([family, name], task, plan.as_bytes())
     }
 
-    /// What files say, or a planner finds.
+    /// Reads a problem, and reads or computes its plan.
     ///
     /// # Errors
-    /// Why it does not count.
+    /// It does not count; the text says why.
     pub(crate) fn of_source(source: &Source, how: &Planning) -> Result<Self, String> {
         let task = task(&source.domain, &source.problem)?;
         let bytes = match &source.origin {
@@ -90,8 +90,8 @@ impl Subject {
         })
     }
 
-    /// The same plan, read from a text in which the lines that start together stand in the opposite
-    /// order; `None` if no two of them do, or if its times cannot be written exactly.
+    /// Returns the same plan, parsed from a text with the opposite order of lines with equal start
+    /// times. `None` if there are no such lines, or if its times cannot be written exactly.
     pub(crate) fn turned_round(&self) -> Option<Result<Self, String>> {
         let mut plan = self.plan.clone();
         plan.steps.reverse();
@@ -118,7 +118,7 @@ impl Subject {
     }
 }
 
-/// The earliest schedule of an STN plan file at its nominal values.
+/// Returns the earliest schedule of an STN plan file at its nominal values.
 fn scheduled(bytes: &[u8], task: &Task) -> Result<TimeTriggeredPlan, String> {
     let plan = format::read(bytes, task).map_err(|_| "refused by the reader of STN plans")?;
     let plan = plan.plan.at(&plan.nominal());
@@ -128,7 +128,7 @@ fn scheduled(bytes: &[u8], task: &Task) -> Result<TimeTriggeredPlan, String> {
     Ok(plan.scheduled(&schedule.into()))
 }
 
-/// The task of two files.
+/// Reads the task of two files.
 pub(crate) fn task(domain: &Path, problem: &Path) -> Result<Task, String> {
     let source = |path: &Path| {
         let bytes = read(path)?;

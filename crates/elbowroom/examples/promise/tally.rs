@@ -1,4 +1,4 @@
-//! Runs of one plan, counted.
+//! Counts over the runs of one plan.
 
 use std::collections::BTreeMap;
 
@@ -9,29 +9,29 @@ use super::strain::Stray;
 use super::trial::{Outcome, Ready};
 use super::worlds::{Kind, Worlds};
 
-/// Those that promise something inside the box.
+/// Executors with a promise inside the box.
 const EXECUTORS: [&str; 2] = ["guarded", "live"];
 
-/// Of so many runs, one meets the spoiler.
+/// One run in this number meets the spoiler.
 const SPOILED: u64 = 30;
 
-/// Of so many runs of each, one meets something outside what is reckoned with.
+/// One run of each executor in this number has an unexpected deviation.
 const LATE: u64 = 5;
 
-/// How many runs there were, and how many of them failed.
+/// Numbers of runs and of failed runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Count {
     pub(crate) runs: u64,
     pub(crate) failed: u64,
-    /// How many ended with a plan that was given up, as it might be.
+    /// Number of runs that ended with an abandoned plan, for a valid reason.
     pub(crate) given_up: u64,
 }
 
-/// What came of one plan.
+/// Result of one plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
     pub(crate) counts: BTreeMap<Kind, Count>,
-    /// The first failure, in words.
+    /// Description of the first failure.
     pub(crate) failure: Option<String>,
 }
 
@@ -60,13 +60,14 @@ impl Tally {
     }
 }
 
-/// The run of that number: kinds of worlds and executors take turns. What is promised after a start that is
-/// late, `guarded` promises alone, and `live` after a duration that is outside its interval.
+/// Executes the run of that number. Kinds of worlds and executors alternate. Late starts are only
+/// tested with `guarded`, and durations outside their interval only with `live`, because only these
+/// make promises for them.
 pub(crate) fn run(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &mut Tally) {
     let executor = EXECUTORS[usize::from(number % 2 == 1)];
     let label = format!("{executor}, run {number}");
     let turn = number / 2;
-    // With time-outs and without, alternately.
+    // With and without time-outs, alternately.
     let timeout = if (turn / 2).is_multiple_of(2) {
         TimeoutRule::default()
     } else {
@@ -91,7 +92,8 @@ pub(crate) fn run(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
     tally.add(kind, &label, &outcome);
 }
 
-/// The run of that number in which something is not as was reckoned with; `false` if there is no such run.
+/// Executes the run of that number with an unexpected deviation. Returns `false` if there is no
+/// such run.
 fn run_unreckoned(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &mut Tally) -> bool {
     let executor = EXECUTORS[usize::from(number % 2 == 1)];
     let label = format!("{executor}, run {number}");
@@ -107,7 +109,7 @@ fn run_unreckoned(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
             return false;
         };
         let outcome = ready.run_late(&mut worlds.late(&late, number), &late.action);
-        // What a late start excuses does not happen where that start is in time.
+        // An excused failure must not occur if that start is in time.
         let mut in_time = worlds.drawn(Kind::Late, number, &TimeoutRule::Off);
         let outcome = outcome.unwrap_or_else(|| ready.run(executor, &mut in_time));
         tally.add(Kind::Late, &label, &outcome);

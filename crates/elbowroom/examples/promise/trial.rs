@@ -1,4 +1,4 @@
-//! Runs of one plan, without a planner: it works, or it does not.
+//! Runs of one plan, without a planner.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -20,39 +20,39 @@ use super::lateness;
 use super::strain::{Course, Stray};
 use super::subject::Subject;
 
-/// A plan made ready for every executor.
+/// Plan, prepared for every executor.
 pub(crate) struct Ready<'a> {
     pub(crate) subject: &'a Subject,
     /// For `stn` and `fixed`.
     pub(crate) network: Prepared,
-    /// With all durations left open, and the box.
+    /// With all durations as parameters, and the box.
     pub(crate) open: Prepared,
     /// For `esterel`, `adaptable` and `lookahead`.
     orderings: Result<Prepared, PrepareError>,
 }
 
-/// How a run ended.
+/// Outcome of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Outcome {
-    /// What was wrong with it, in one word; `None` if nothing was.
+    /// Failure in one word, if any.
     pub(crate) failure: Option<&'static str>,
-    /// What there is to say about that.
+    /// Explanation of the failure.
     pub(crate) why: String,
 }
 
-/// How far to widen boxes.
+/// Limits for widening boxes.
 #[derive(Clone, Copy)]
 pub(crate) struct Search<'a> {
     pub(crate) most_checks: usize,
-    /// Whether to go on.
+    /// Returns `false` to stop.
     pub(crate) goes_on: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// The box of a plan with all durations open, and what it took.
+/// Box of a plan with all durations as parameters, and its search effort.
 pub(crate) struct Boxed {
     pub(crate) envelope: DecoupledEnvelope,
     pub(crate) checks: usize,
-    /// Whether the search came to its end.
+    /// `true` if the search was completed.
     pub(crate) is_finished: bool,
 }
 
@@ -60,7 +60,7 @@ impl<'a> Ready<'a> {
     /// Prepares a plan as `elbowroom run` does, with the dynamic guarantee.
     ///
     /// # Errors
-    /// Why it cannot be.
+    /// It cannot be prepared; the text says why.
     pub(crate) fn new(subject: &'a Subject, search: Search<'_>) -> Result<Self, String> {
         let task = &subject.task;
         let nominal = subject.freed.nominal.clone();
@@ -93,7 +93,7 @@ impl<'a> Ready<'a> {
         })
     }
 
-    /// The same plan, with that box.
+    /// Returns the same plan with another box.
     pub(crate) fn with_open(&self, open: Prepared) -> Self {
         Self {
             subject: self.subject,
@@ -103,26 +103,26 @@ impl<'a> Ready<'a> {
         }
     }
 
-    /// The dynamic box.
+    /// Returns the dynamic box.
     pub(crate) fn envelope(&self) -> &DecoupledEnvelope {
         let envelope = self.open.envelope.as_ref();
         envelope.expect("it was made with one")
     }
 
-    /// Runs with an executor in the world where everything happens as planned.
+    /// Runs an executor in a world without deviations.
     pub(crate) fn run_as_planned(&self, executor: &str) -> Outcome {
         let model = WorldModel::as_planned();
         let mut world = SimWorld::new(Arc::clone(&self.subject.task), &model, 0);
         self.run(executor, &mut world)
     }
 
-    /// Runs with an executor in any world.
+    /// Runs an executor in any world.
     pub(crate) fn run(&self, executor: &str, world: &mut dyn World) -> Outcome {
         let report = self.report(executor, world);
         self.outcome(&report)
     }
 
-    /// Runs with an executor in any world, with time-outs by that rule.
+    /// Runs an executor in any world with this time-out rule.
     pub(crate) fn run_timed(
         &self,
         executor: &str,
@@ -133,16 +133,17 @@ impl<'a> Ready<'a> {
         self.outcome(&report)
     }
 
-    /// Runs with `guarded` in a world in which this action starts late; `None` if it ended because of
-    /// that, before anybody could know.
+    /// Runs `guarded` with a late start of this action. Returns `None` if the run ended for that
+    /// reason before the executor could know.
     pub(crate) fn run_late(&self, world: &mut dyn World, late: &str) -> Option<Outcome> {
         let report = self.report("guarded", world);
         let is_excused = lateness::excuses(&self.subject.task, &self.open, &report, late);
         (!is_excused).then(|| self.outcome(&report))
     }
 
-    /// Runs in a world in which one thing is not as reckoned with, and the rest so much that a plan with the promise
-    /// `weakest` works; and whether the plan was given up.
+    /// Runs an executor in a world with one unexpected deviation. A failure counts if the last
+    /// promise was at least as strong as `weakest`, or if `live` abandoned a feasible plan. Also
+    /// returns `true` if the plan was abandoned.
     pub(crate) fn run_strained(
         &self,
         executor: &str,
@@ -210,7 +211,7 @@ impl<'a> Ready<'a> {
         }
     }
 
-    /// What the judge says of what was done.
+    /// Validates the execution.
     fn judged(&self, report: &Report) -> validate::Verdict {
         let steps = report.executed.iter().map(|executed| executed.step.clone());
         let plan = TimeTriggeredPlan {
@@ -220,7 +221,7 @@ impl<'a> Ready<'a> {
     }
 }
 
-/// Has the answer to the only question that is asked.
+/// Preparer that returns the prepared forms of the plan.
 struct Remembered<'a>(&'a Ready<'a>);
 
 impl Preparer for Remembered<'_> {
@@ -238,10 +239,10 @@ impl Preparer for Remembered<'_> {
     }
 }
 
-/// The box of a plan with that guarantee.
+/// Returns the box of a plan with that guarantee.
 ///
 /// # Errors
-/// Why there is none.
+/// There is no box; the text says why.
 pub(crate) fn boxed(
     task: &Arc<Task>,
     plan: &Arc<elbowroom::plan::ParametrizedPlan>,

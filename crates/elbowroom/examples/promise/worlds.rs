@@ -1,4 +1,4 @@
-//! Worlds in which every duration is somewhere in its interval of a box.
+//! Worlds with durations inside the intervals of a box.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,20 +16,21 @@ use rand_chacha::ChaCha8Rng;
 
 use super::strain::Lagging;
 
-/// How durations come about.
+/// Distribution of the durations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
-    /// Anywhere in the interval, all values alike.
+    /// Uniform in the interval.
     Uniform,
-    /// At one of the two ends of the interval.
+    /// One of the two ends of the interval.
     Corner,
-    /// As spiteful as what has happened so far allows.
+    /// The worst values for the executor, chosen by the spoiler during the run.
     Spoiler,
-    /// Somewhere in the sixteenth of the interval around what is planned, and one action starts late.
+    /// In the sixteenth of the interval around the nominal value, and one action starts late.
     Late,
-    /// One of them is outside its interval; the others are as with one of the kinds above, but for the spoiler's.
+    /// One duration is outside its interval; the others are as with one of the other kinds except
+    /// the spoiler.
     Outside,
-    /// As with a late start, but what is late is one look at the world.
+    /// As [`Self::Late`], but one observation is late instead of a start.
     LateLook,
 }
 
@@ -55,7 +56,7 @@ impl Kind {
     }
 }
 
-/// An action that starts later than it is told to.
+/// Action that starts later than commanded.
 pub(crate) struct LateStart {
     pub(crate) action: String,
     model: WorldModel,
@@ -67,8 +68,8 @@ pub(crate) struct Worlds<'a> {
     model: WorldModel,
     prepared: &'a Prepared,
     envelope: &'a DecoupledEnvelope,
-    /// For each action's name, its instances in the order in which they start as planned, with
-    /// what is left open of their durations.
+    /// Instances of each action, in the order of their planned starts, with the parameters of their
+    /// durations.
     instances: BTreeMap<String, Vec<(InstanceId, Option<ParameterId>)>>,
     network: Option<PlanNetwork>,
 }
@@ -119,7 +120,7 @@ impl<'a> Worlds<'a> {
         Paced::new(self.sim(), self.durations(kind, &mut rng, timeout))
     }
 
-    /// A start that is late, as drawn with that seed: of an action of which the plan has no other.
+    /// Draws a late start of an action that occurs once in the plan.
     pub(crate) fn late_start(&self, seed: u64) -> Option<LateStart> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let single = self.instances.iter().filter(|(_, all)| all.len() == 1);
@@ -138,7 +139,7 @@ impl<'a> Worlds<'a> {
         Some(LateStart { action, model })
     }
 
-    /// The world in which that action starts late, and durations are as drawn with that seed.
+    /// Returns a world with that late start; durations are drawn with this seed.
     pub(crate) fn late<'b>(&self, late: &'b LateStart, seed: u64) -> Paced<'b, Durations> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let world = SimWorld::new(Arc::clone(&self.task), &late.model, 0);
@@ -148,8 +149,8 @@ impl<'a> Worlds<'a> {
         )
     }
 
-    /// The world in which one duration is outside its interval and the others are of that kind, as drawn with
-    /// that seed, and whose duration it is. `None` if none can be outside.
+    /// Returns a world with one duration outside its interval and the others of that kind, and the
+    /// action with that duration. `None` if no duration can be outside.
     pub(crate) fn outside(
         &self,
         kind: Kind,
@@ -162,7 +163,7 @@ impl<'a> Worlds<'a> {
         for (id, parameter) in open {
             let interval = self.envelope.interval(parameter);
             let share = Rational::new(rng.random_range(0..1000_i64), 1000);
-            // What takes no time at all may stand against itself.
+            // Two instances of an action with a duration of 0 could interfere with each other.
             let least = self.task.epsilon();
             if let Some(lower) = interval.lower.value().filter(|lower| *lower > least) {
                 strays.push((id, least + (lower - least) * &share));
@@ -182,7 +183,8 @@ impl<'a> Worlds<'a> {
         Some((Paced::new(self.sim(), durations), stray.0))
     }
 
-    /// The world in which one look comes late, and durations are as drawn with that seed, and which look it is.
+    /// Returns the world with one late observation, and the number of that observation. Durations
+    /// are drawn with this seed.
     pub(crate) fn late_look(&self, seed: u64) -> (Lagging<Paced<'_, Durations>>, u64) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let plan = &self.prepared.plan.plan;
@@ -201,7 +203,7 @@ impl<'a> Worlds<'a> {
         self.durations_but(kind, rng, timeout, None)
     }
 
-    /// Durations, but for a stray one.
+    /// Draws the durations, except `stray`, which may be outside its interval.
     fn durations_but(
         &self,
         kind: Kind,
@@ -238,7 +240,7 @@ impl<'a> Worlds<'a> {
         time(plan.end(id)) - time(plan.start(id))
     }
 
-    /// The world that plays the durations as spitefully as the box allows.
+    /// Returns a world with durations chosen by the spoiler within the box.
     pub(crate) fn spoiled(&self, timeout: &TimeoutRule) -> Option<Paced<'_, Spoiling>> {
         let network = self.network.as_ref()?;
         let plan = &self.prepared.plan.plan;
@@ -247,8 +249,8 @@ impl<'a> Worlds<'a> {
     }
 }
 
-/// A value in an interval, up to the time-out of the action. Where the interval is infinite, up to
-/// three times the nominal value, and in three runs of ten up to the time-out, or up to a thousand
+/// Draws a value in an interval, up to the time-out of the action. If the interval is infinite, the
+/// maximum is three times the nominal value, and in three runs of ten the time-out, or a thousand
 /// times the nominal value if time-outs are off.
 fn drawn(
     interval: &Interval,
@@ -286,11 +288,11 @@ fn drawn(
     let share = Rational::new(rng.random_range(0..=1000_i64), 1000);
     let value = &lower + (&upper - &lower) * share;
     if kind == Kind::Late {
-        // Of infinitely much room, as much again as is planned.
+        // In an infinite interval, at most twice the nominal value.
         let value = nominal + (value - nominal) / Rational::from(16);
         return value.min(nominal * Rational::from(2));
     }
-    // Few decimals, where there is room for that.
+    // Rounded to three decimals if the interval permits.
     let rounded = (value * Rational::from(1000)).floor() * thousandth;
     rounded.max(lower)
 }

@@ -1,5 +1,5 @@
-//! How much of the possible room incremental rectangular robustification finds: its box beside the
-//! largest one, by family, in the published order of the parameters and in random ones.
+//! Ratio of the box of incremental rectangular robustification (IRR) to the largest box, by family,
+//! in the published order of the parameters and in random ones.
 //!
 //! ```text
 //! cargo run --release -p elbowroom --example shares -- DATA [ORDERS] [STEPS]
@@ -7,17 +7,19 @@
 //! cargo run --release -p elbowroom --example shares -- DATA volume
 //! ```
 //!
-//! The second prints how long the largest box takes for each guarantee and objective (IRR, with whose
-//! box it begins, and the search), and its certificate, as `elbowroom verify` reads it.
+//! The second command prints the computation times of the largest box for each guarantee and
+//! objective (IRR, whose box is the first one, and the search), and the time `elbowroom verify`
+//! needs for its certificate.
 //!
-//! The third prints which share of the exact region's volume each box has (weak guarantee, whose region
-//! it is; published order).
+//! The third command prints the share of each box in the volume of the exact region (weak
+//! guarantee, as for the region; published order).
 //!
-//! `DATA` is the folder with `envelopes/`, `ORDERS` the number of random orders (20), `STEPS` how many
-//! boxes a search for the largest one may try (2000); plans for which that is not enough are counted
-//! and left out. Guarantee: dynamic. Steps: a hundredth of each nominal value. Ends count up to nine times
-//! the nominal value. Probabilities are those of a world in which each duration is normally distributed
-//! around its nominal value, with a standard deviation of 15 % of it, and never less than a thousandth.
+//! `DATA` is the folder with `envelopes/`, `ORDERS` the number of random orders (20), and `STEPS`
+//! the maximum number of boxes in the search for the largest one (2000). Plans that need more are
+//! counted and omitted. The guarantee is the dynamic one. The step size is a hundredth of each
+//! nominal value. Ends count up to nine times the nominal value. Probabilities are those of a world
+//! in which each duration is normally distributed around its nominal value, with a standard
+//! deviation of 15 % of it, and at least a thousandth.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,
@@ -48,19 +50,19 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// One order of the parameters of one plan: IRR's share of the greatest sum of widths, of the
-/// greatest least slack, and of the greatest volume (the geometric mean of the widths), and whether
-/// it leaves an end with no room that could have some.
+/// Result for one order of the parameters of one plan: IRR's share of the greatest sum of widths,
+/// of the greatest least slack, and of the greatest volume (the geometric mean of the widths).
+/// `is_starved` is `true` if an end has no slack although it could have some.
 struct Shares {
     widths: f64,
     slack: f64,
     volume: f64,
-    /// Of the greatest probability that all durations stay inside.
+    /// Share of the greatest probability that all durations stay inside.
     probability: f64,
     is_starved: bool,
 }
 
-/// The largest boxes of one plan.
+/// Largest boxes of one plan.
 struct Largest {
     widest: BestRun,
     fairest: BestRun,
@@ -124,7 +126,7 @@ fn families(data: &Path) -> Vec<(String, Vec<Instance>)> {
     families
 }
 
-/// The share of the exact region's volume that each box has.
+/// Prints the share of each box in the volume of the exact region.
 fn volumes(families: &[(String, Vec<Instance>)]) {
     println!(
         "| family | plans | with a volume | exactly | IRR: least | median | greatest | best least slack: median | best sum of widths: median |"
@@ -162,7 +164,7 @@ fn volumes(families: &[(String, Vec<Instance>)]) {
     }
 }
 
-/// The share that each box has, by name, and whether it is exact.
+/// Returns the share of each box by name, and `true` if the volume is exact.
 fn shares_of_volume(instance: &Instance) -> Option<(Vec<(String, f64)>, bool)> {
     let (task, text) = read(instance)?;
     let plan = format::read(text.as_bytes(), &task).ok()?;
@@ -221,7 +223,8 @@ fn row(family: &str, order: &str, plans: usize, shares: &[Shares]) {
     );
 }
 
-/// The published order first; `None` if the largest boxes are not found, or if there is no room.
+/// Returns the results, the published order first; `None` if the largest boxes are not found, or
+/// have no slack.
 fn compared(instance: &Instance, orders: usize, steps: usize) -> Option<Vec<Shares>> {
     let (task, text) = read(instance)?;
     let largest = Largest {
@@ -245,7 +248,8 @@ fn compared(instance: &Instance, orders: usize, steps: usize) -> Option<Vec<Shar
     Some(all)
 }
 
-/// The largest box with the dynamic guarantee, if it is proved to be, and has any room.
+/// Returns the largest box with the dynamic guarantee, if it is proved to be the largest and has
+/// any slack.
 fn largest(task: &Arc<Task>, text: &str, objective: Objective, steps: usize) -> Option<BestRun> {
     let run = sought(task, text, Guarantee::Dynamic, objective, steps)?;
     let is_logarithm = matches!(objective, Objective::Volume | Objective::Probability);
@@ -253,7 +257,7 @@ fn largest(task: &Arc<Task>, text: &str, objective: Objective, steps: usize) -> 
     (run.is_proved && has_room).then_some(run)
 }
 
-/// The largest box that is found in so many steps, from IRR's on.
+/// Returns the largest box found in `steps` steps, starting with IRR's.
 fn sought(
     task: &Arc<Task>,
     text: &str,
@@ -286,14 +290,14 @@ fn sought(
     run.ok().filter(|run| run.envelope.is_ok())
 }
 
-/// The world in which each duration is normally distributed around its nominal value.
+/// Returns the world in which each duration is normally distributed around its nominal value.
 pub(crate) fn around(task: &Task) -> Option<WorldModel> {
     let text = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"*\"\n\
                 normal = { mean = 1, deviation = 0.15 }\nrelative = true\n";
     WorldModel::read(Source::new("world", text), task.problem()).ok()
 }
 
-/// IRR's steps: a hundredth of each nominal value.
+/// Returns settings with IRR's steps: a hundredth of each nominal value.
 fn fine() -> Settings {
     Settings {
         relative: Some(Rational::new(1, 100)),
@@ -301,7 +305,7 @@ fn fine() -> Settings {
     }
 }
 
-/// IRR's box beside the largest ones.
+/// Compares IRR's box with the largest ones.
 fn shares(task: &Arc<Task>, text: &str, names: &[String], largest: &Largest) -> Option<Shares> {
     let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
     let mut oracle = Oracle::new(task, &plan, Guarantee::Dynamic).ok()?;
@@ -332,14 +336,14 @@ fn shares(task: &Arc<Task>, text: &str, names: &[String], largest: &Largest) -> 
         likely += mass.to_f64().ln();
     }
     let mut sum = Rational::ZERO;
-    // Of each parameter its weight, and its width in relation to the scale.
+    // Weight of each parameter, and its width relative to the scale.
     let mut widths = vec![(0.0, volume_foot().to_f64()); plan.parameters.len()];
     let mut least: Option<Rational> = None;
     let mut is_starved = false;
     for own in &widest.proof.variables {
         let scale = &own.scale;
         for end in &own.ends {
-            // In this order of the parameters it has another position.
+            // The position of the parameter depends on the order.
             let end = &BoxEnd {
                 parameter: plan.find(&names[end.parameter.index()])?,
                 side: end.side,

@@ -1,4 +1,4 @@
-//! How long the largest boxes take, and their certificates.
+//! Computation times of the largest boxes and of their certificates.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use elbowroom::verify::{AnswerError, verify_answer};
 use crate::instances::Instance;
 use crate::{around, read, sought};
 
-/// A row for each family, guarantee and objective.
+/// Prints a row for each family, guarantee and objective.
 #[allow(
     clippy::disallowed_methods,
     reason = "how long it takes is what is asked"
@@ -67,10 +67,10 @@ pub(crate) fn times(families: &[(String, Vec<Instance>)], steps: usize) {
     }
 }
 
-/// How long the certificate of the largest box takes to check, in seconds; `None` without one.
+/// Returns the time in seconds to check the certificate of the largest box, or `None` without one.
 ///
 /// # Panics
-/// When it is refused.
+/// The certificate is rejected.
 #[allow(
     clippy::disallowed_methods,
     reason = "how long it takes is what is asked"
@@ -99,7 +99,7 @@ fn checked(
     }
 }
 
-/// Ends a search after so many steps.
+/// Watcher that ends a search after this number of steps.
 struct Patience(usize);
 
 impl Watcher for Patience {

@@ -1,5 +1,5 @@
-//! Judges what a certificate claims of its box, whatever proofs it has: by the search for strategies
-//! and fixed times, by all corners of the box, and by linear programs.
+//! Checks of a certificate's claim about its box that are independent of its proofs: by the search
+//! for strategies and fixed times, at all corners of the box, and by linear programs.
 
 use std::collections::BTreeMap;
 
@@ -13,17 +13,18 @@ use serde_json::Value;
 
 use crate::shared::changed::numbers;
 
-/// Later than anything, for ends that are infinite.
+/// Bound for infinite ends, later than any time.
 const EVER: i64 = 1_000_000_000;
 
-/// The certificate in an answer.
+/// Returns the certificate in an answer.
 pub(crate) fn certificate_in(answer: &Value) -> Certificate {
     let certificate = answer.pointer("/best/certificate").expect("a certificate");
     serde_json::from_value(certificate.clone()).expect("the form of a certificate")
 }
 
-/// Whether a change there says nothing about why no box is better: it is in why the box is inside, or
-/// in a constraint that no proof of an inequality mentions.
+/// Returns `true` if a change at this place does not affect the proof that no box is better: it is
+/// in the proof that the box is inside, or in a constraint without a mention in the proof of an
+/// inequality.
 pub(crate) fn is_about_the_box(answer: &Value, place: &str) -> bool {
     if place.starts_with("/best/certificate/sound/") {
         return true;
@@ -46,7 +47,7 @@ pub(crate) fn is_about_the_box(answer: &Value, place: &str) -> bool {
     })
 }
 
-/// Whether the box is inside the envelope, as far as the certificate tells what that takes.
+/// Returns `true` if the box is inside the envelope, by the conditions that the certificate lists.
 pub(crate) fn is_inside(certificate: &Certificate) -> bool {
     let Some(sound) = &certificate.sound else {
         return false;
@@ -96,8 +97,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The network with durations that the world decides on; `None` if something in it depends on
-    /// what has no end.
+    /// Returns the network with uncontrollable durations, or `None` if a constraint depends on an
+    /// infinite end.
     fn uncertain(&self) -> Option<UncertainNetwork> {
         let mut network = Network::with_nodes(self.certificate.points.len());
         let mut links = Vec::new();
@@ -140,7 +141,7 @@ impl<'a> Judge<'a> {
         UncertainNetwork::new(network, links).ok()
     }
 
-    /// Whether there is a schedule at each corner of the box.
+    /// Returns `true` if there is a schedule at each corner of the box.
     fn has_schedules(&self) -> bool {
         let count = self.intervals.len();
         (0..1_usize << count).all(|corner| {
@@ -176,7 +177,8 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Whether no schedule for any values in the box fails the condition in one of the ways told.
+    /// Returns `true` if no schedule for values in the box violates the condition in one of the
+    /// listed ways.
     fn cannot_fail(&self, condition: &Condition) -> bool {
         let moment = self.certificate.points.len();
         let before = |earlier: usize, later: usize| Difference {
@@ -222,7 +224,7 @@ impl<'a> Judge<'a> {
         true
     }
 
-    /// Whether a way to fail is possible at some corner.
+    /// Returns `true` if a violation is possible at some corner.
     fn is_possible(&self, way: &Way, known: &[Difference]) -> bool {
         (0..1_usize << way.corners.len()).any(|corner| {
             let mut intervals = self.intervals.clone();
@@ -234,7 +236,7 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Whether a linear program with all that the way takes has a solution.
+    /// Returns `true` if the linear program with all constraints of the violation has a solution.
     fn program(
         &self,
         intervals: &[[Option<Rational>; 2]],
@@ -310,10 +312,10 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// `Σ factor · variable <= bound`, or less than that.
+/// `Σ factor · variable <= bound`, or `<` if the last part is `true`.
 type Row = (Vec<(VariableId, Rational)>, Rational, bool);
 
-/// Has a linear program keep to a row.
+/// Adds a row to the linear program.
 fn hold(simplex: &mut Simplex, (row, bound, is_strict): Row) {
     let mut once: BTreeMap<VariableId, Rational> = BTreeMap::new();
     for (variable, factor) in row {

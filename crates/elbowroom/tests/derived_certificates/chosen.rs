@@ -1,4 +1,5 @@
-//! Weak boxes of plans with durations that the executor could choose, and that the network keeps as planned.
+//! Weak boxes of plans with durations that the executor could choose, and that the network keeps as
+//! planned.
 
 use elbowroom::envelope::{Guarantee, Objective};
 use elbowroom::verify::{AnswerError, verify_answer_of};
@@ -7,7 +8,7 @@ use serde_json::{Value, json};
 use super::forgery::Forger;
 use super::{OBJECTIVES, answer_for, read};
 
-/// An action whose condition over all never holds: it works for the duration 0 alone.
+/// Action whose over-all condition never holds: it is only possible with duration 0.
 const BLINK: [&str; 3] = [
     "(define (domain blinks) (:requirements :durative-actions :duration-inequalities)
       (:predicates (lit) (seen) (made))
@@ -19,7 +20,7 @@ const BLINK: [&str; 3] = [
     "0: (blink) [0]\n0.001: (make) [4]\n",
 ];
 
-/// An effect that depends on a duration, at the start or at the end, and a condition that reads it.
+/// Effect that depends on a duration, at the start or at the end, and a condition that reads it.
 const POUR: [&str; 3] = [
     "(define (domain pours) (:requirements :durative-actions :duration-inequalities :fluents)
       (:predicates (poured) (made)) (:functions (amount))

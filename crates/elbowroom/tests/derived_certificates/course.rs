@@ -1,4 +1,5 @@
-//! Certificates of plans with constraints on their course, and of durations that the domain leaves open by numbers.
+//! Certificates of plans with trajectory constraints, and of durations that the domain restricts by
+//! numbers.
 
 use std::sync::Arc;
 
@@ -73,7 +74,8 @@ fn certificates_of_plans_with_constraints_on_their_course_are_accepted() {
     assert!(accepted >= 40, "{accepted}");
 }
 
-/// A certificate is accepted for a problem with another constraint only if that has the same envelope.
+/// A certificate is accepted for a problem with another constraint only if the envelope is the
+/// same.
 #[test]
 fn certificate_of_another_constraint_is_accepted_only_if_it_claims_the_same() {
     let goals = (Guarantee::Dynamic, Objective::Widths);
@@ -103,7 +105,7 @@ fn certificate_of_another_constraint_is_accepted_only_if_it_claims_the_same() {
     assert!(refused > 60, "{refused}");
 }
 
-/// The order that the constraint needs is missing, or its bound is a little later.
+/// The order required by the constraint is missing, or its bound is a little later.
 #[test]
 fn certificate_without_a_bound_of_a_constraint_is_refused() {
     for (constraint, number) in [

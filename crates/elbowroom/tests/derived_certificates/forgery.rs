@@ -1,4 +1,4 @@
-//! Forged certificates: random changes of true ones, and ones with tighter inequalities.
+//! Forged certificates: random modifications of valid ones, and ones with tighter inequalities.
 
 use elbowroom::num::Rational;
 use elbowroom::verify::{AnswerError, Certificate, Verified, added_up};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::shared::changed::{changed, numbers};
 
-/// Forges certificates at random, and counts them.
+/// Generator of random forgeries, with counts.
 pub(super) struct Forger {
     draw: Draw,
     count: usize,
@@ -14,7 +14,7 @@ pub(super) struct Forger {
 }
 
 impl Forger {
-    /// The same seed leads to the same changes.
+    /// Creates a forger. The same seed gives the same modifications.
     pub(super) fn new(seed: u64) -> Self {
         Self {
             draw: Draw(seed),
@@ -23,8 +23,8 @@ impl Forger {
         }
     }
 
-    /// Asserts of a number of random changes of an answer that the verifier refuses them, unless they make the same
-    /// claim.
+    /// Checks that the verifier rejects a number of random modifications of an answer, unless they
+    /// have the same claim.
     pub(super) fn attack(
         &mut self,
         (answer, times): (&Value, usize),
@@ -54,8 +54,8 @@ impl Forger {
     }
 }
 
-/// Answers in each of which one inequality that the certificate only states is tighter: another box is the best one
-/// then.
+/// Returns answers with one tighter inequality each that the certificate only states. Another box
+/// would be the best one then.
 pub(super) fn tightened(answer: &Value) -> Vec<Value> {
     let proofs = answer.pointer("/best/certificate/proofs");
     let proofs = proofs.and_then(Value::as_array).expect("a list");
@@ -75,7 +75,7 @@ pub(super) fn tightened(answer: &Value) -> Vec<Value> {
     forged
 }
 
-/// A forger recomputes the sums that follow from the certificate.
+/// Recomputes the sums that follow from the certificate.
 fn add_up(broken: &mut Value) {
     let certificate = broken["best"]["certificate"].clone();
     let certificate: Option<Certificate> = serde_json::from_value(certificate).ok();
@@ -116,7 +116,7 @@ fn places(value: &Value, path: &str, lists: &mut Vec<String>) {
     }
 }
 
-/// One random change of an answer.
+/// Returns a random modification of an answer.
 fn mutated(answer: &Value, draw: &mut Draw) -> Value {
     let mut broken = answer.clone();
     let mut found = Vec::new();
@@ -139,7 +139,7 @@ fn mutated(answer: &Value, draw: &mut Draw) -> Value {
                 _ => changed(number),
             };
         }
-        // An element of a list disappears, or changes places with another one.
+        // An element of a list disappears, or is exchanged with another one.
         kind @ (2 | 3) => {
             places(&part, root, &mut found);
             let place = &found[draw.below(found.len())];
@@ -171,7 +171,7 @@ fn mutated(answer: &Value, draw: &mut Draw) -> Value {
                 _ => own["observed"] = json!(!own["observed"].as_bool().unwrap_or_default()),
             }
         }
-        // Names change places.
+        // Names are exchanged.
         _ => {
             let list = broken
                 .pointer_mut("/parameters")
@@ -191,7 +191,7 @@ fn mutated(answer: &Value, draw: &mut Draw) -> Value {
     broken
 }
 
-/// The claims of an answer, without its reasons.
+/// Returns the claims of an answer, without its reasons.
 pub(super) fn claim(answer: &Value) -> Vec<Value> {
     let members = [
         "/domain",

@@ -14,7 +14,8 @@ use serde_json::Value;
 use super::forgery::{Forger, tightened};
 use super::{GUARANTEES, OBJECTIVES, answer, read};
 
-/// Filling for long enough makes the tank full enough for watering to count, and for too long floods the cellar.
+/// Watering only has an effect if the tank was filled for long enough; filling for too long floods
+/// the cellar.
 const DOMAIN: &str = "
     (define (domain garden)
       (:requirements :durative-actions :fluents :conditional-effects :negative-preconditions)
@@ -36,7 +37,8 @@ fn problem(goal: &str) -> String {
     )
 }
 
-/// Goals that need the conditions of the plan's effects to be as in the plan, and one that needs some of them.
+/// Goals for which the conditions of the plan's effects must be as in the plan, and one for which
+/// some of them must.
 const GOALS: [&str; 3] = [
     "(watered) (not (flooded)) (not (noted))",
     "(watered) (not (flooded))",
@@ -66,7 +68,7 @@ fn certificates_of_plans_with_conditional_effects_on_numbers_that_vary_are_accep
         }
     }
     println!("{accepted} certificates accepted, refused: {refused:#?}");
-    // Without a goal that needs it, a condition may change inside a valid box.
+    // A condition that no goal needs may change inside a valid box.
     let is_free =
         |own: &String| own.starts_with("(ready)") || own.starts_with("(watered) (not (flooded)),");
     assert!(refused.iter().all(is_free), "{refused:#?}");
@@ -120,7 +122,7 @@ fn certificate_for_another_threshold_is_accepted_only_if_its_claim_is_true() {
             refused += 1;
             continue;
         }
-        // The search may have ended elsewhere, but the claim is true.
+        // The search may have ended with another box, but the claim is true.
         let own = answer(&task, &plan, goals.0, goals.1).expect("a box");
         let number = |answer: &Value, name: &str| -> Rational {
             let exact = answer["best"][name]["exact"].as_str().expect("a number");
@@ -134,7 +136,8 @@ fn certificate_for_another_threshold_is_accepted_only_if_its_claim_is_true() {
     assert!(refused >= 4, "{refused}");
 }
 
-/// An inequality that only follows while a condition of an effect holds is refused where a plan works without it.
+/// An inequality that holds only while a condition of an effect holds is rejected if the plan is
+/// also valid without that condition.
 #[test]
 fn inequality_about_a_condition_that_the_goal_does_not_need_is_refused() {
     let goals = (Guarantee::Dynamic, Objective::Widths);

@@ -32,7 +32,7 @@ const VARY: [&str; 8] = [
 
 const LABELS: [&str; 4] = ["name", "kind", "action", "quantity"];
 
-/// Sets the label of a parameter. The certificate has names also.
+/// Sets the label of a parameter. The certificate also contains names.
 fn set(answer: &mut Value, parameter: usize, label: &str, to: &Value) {
     answer["parameters"][parameter][label] = to.clone();
     if label == "name" {

@@ -1,4 +1,5 @@
-//! Boxes of the objective `probability`: the guarantee is derived from the files, the probability from the world.
+//! Boxes of the objective `probability`: the guarantee is derived from the files, the probability
+//! from the world.
 
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use serde_json::{Value, json};
 use super::forgery::Forger;
 use super::{GUARANTEES, answered, read, request, timed};
 
-/// Distributions of all durations in relation to the planned ones, each with a similar one.
+/// Distributions of all durations relative to the planned ones, each with a similar one.
 const WORLDS: [[&str; 2]; 4] = [
     [
         "normal = { mean = 1, deviation = 0.15 }",
@@ -97,7 +98,8 @@ fn probability_is_checked_with_the_world_and_assumed_without_it() {
     assert!(forger.told() > 500);
 }
 
-/// Boxes that next to no drawn duration is in, for which the search knows no logarithm.
+/// Boxes that contain almost none of the drawn durations, and for which the search has no
+/// logarithm.
 #[test]
 fn improbable_box_is_accepted_with_its_least_value_alone() {
     let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (open) (done))

@@ -1,11 +1,11 @@
-//! Conditions over all that allow an action no moment.
+//! Over-all conditions that are vacuous because the action has duration 0.
 
 use elbowroom::verify::{AnswerError, verify_answer_of};
 
 use crate::forgery::claim;
 use crate::{GUARANTEES, OBJECTIVES, answer, read};
 
-/// A domain in which `look` takes no time in the plan.
+/// Returns a domain for a plan with duration 0 of `look`.
 fn domain(condition: &str) -> String {
     format!(
         "(define (domain d) (:requirements :adl :durative-actions :duration-inequalities :numeric-fluents)
@@ -51,8 +51,8 @@ fn certificates_are_accepted_if_a_condition_over_all_limits_a_duration_to_zero()
     assert!(accepted >= 20, "{accepted}");
 }
 
-/// Instances that take no time, so that nothing reads the condition over all. Other instances make it false, before
-/// and at the same time.
+/// Instances of duration 0, so that their over-all condition is never read. Other instances make it
+/// false, before and at the same time.
 #[test]
 fn certificates_are_accepted_if_earlier_instances_delete_a_condition_over_no_time() {
     let mut accepted = 0;

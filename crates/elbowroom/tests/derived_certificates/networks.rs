@@ -14,8 +14,8 @@ use super::forgery::Forger;
 use super::shared::own::case;
 use super::{GUARANTEES, OBJECTIVES, answer_for};
 
-/// A pump whose rate the domain leaves open, a choice of durations, a bound that is a parameter, and an
-/// over-all condition on a number.
+/// A pump with a variable rate, a choice of durations, a bound that is a parameter, and an over-all
+/// condition on a number.
 const DOMAIN: &str = "
     (define (domain well)
       (:requirements :durative-actions :fluents :duration-inequalities :timed-initial-literals)
@@ -65,7 +65,7 @@ fn verified(answer: &Value, task: &Task, plan: &ParametrizedPlan) -> Result<Veri
     verify_answer_of_network(&answer.to_string(), task, &given_plan(plan))
 }
 
-/// Problems with plan files that have constraints.
+/// Returns problems with plan files that have constraints.
 fn all() -> Vec<(Arc<Task>, ParametrizedPlan)> {
     let (delivery, _) = case("delivery");
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/delivery/plan.stn");
@@ -99,7 +99,7 @@ fn true_certificates_of_plan_files_with_constraints_are_accepted() {
     assert!(accepted >= 10, "{accepted}");
 }
 
-/// Each change of a plan file makes the certificate one about another plan.
+/// After any change of the plan file, the certificate belongs to another plan.
 #[test]
 fn certificate_of_another_plan_file_is_refused() {
     let well = task(DOMAIN, PROBLEM);
@@ -182,8 +182,8 @@ fn mutated_certificates_of_plan_files_are_refused_unless_they_claim_the_same() {
     assert!(forger.told() > 800);
 }
 
-/// Without an order between interfering happenings, or with a duration that the domain forbids, some
-/// schedule of the file is not valid.
+/// Without an order between interfering happenings, or with a duration that the domain forbids,
+/// some schedule of the file is invalid.
 #[test]
 fn plan_file_that_allows_invalid_schedules_has_no_derivable_certificate() {
     let well = task(DOMAIN, PROBLEM);
@@ -193,7 +193,8 @@ fn plan_file_that_allows_invalid_schedules_has_no_derivable_certificate() {
     for (index, change) in [(2, "duration"), (5, "order")] {
         let mut given: GivenPlan = given_plan(&own);
         let mut broken = answer.clone();
-        // A forger changes the file and the network alike; timed initials come first in the network.
+        // The file and the network are changed in the same way; timed initials come first in the
+        // network.
         let place = format!("/best/certificate/constraints/{}", index + 1);
         let constraint = broken.pointer_mut(&place).expect("a constraint");
         if change == "duration" {

@@ -1,9 +1,10 @@
 //! Small problems whose conditions read numbers that the plan changes.
 
-/// A domain, a problem and a plan.
+/// Domain, problem and plan.
 pub(crate) type Texts = (&'static str, &'static str, &'static str);
 
-/// Over-all conditions on a number that other actions change at once; one is part of a disjunction.
+/// Over-all conditions on a number that other actions change instantaneously; one is part of a
+/// disjunction.
 pub(crate) const LIFT: Texts = (
     "(define (domain lift)
       (:requirements :durative-actions :fluents :disjunctive-preconditions :conditional-effects)
@@ -45,7 +46,7 @@ pub(crate) const TAXI: Texts = (
     "0: (drive) [12]\n13: (clean) [6]\n",
 );
 
-/// Continuous changes, with strict and other bounds, of one number that two actions change at the same time.
+/// Continuous changes, with strict and other bounds, of one number by two concurrent actions.
 const POND: Texts = (
     "(define (domain pond)
       (:requirements :durative-actions :fluents :continuous-effects)
@@ -69,7 +70,8 @@ const POND: Texts = (
     "0: (fill) [10]\n1: (hoard) [7]\n3.5: (feed) [4]\n11: (drain) [5]\n",
 );
 
-/// A condition throughout an action on a number that another one has changed, and a rule that compares numbers.
+/// An over-all condition on a number that another action has changed, and a rule that compares
+/// numbers.
 const FLASH: Texts = (
     "(define (domain flash)
       (:requirements :durative-actions :fluents :derived-predicates)
@@ -86,7 +88,7 @@ const FLASH: Texts = (
     "0: (load) [6]\n7: (shoot) [2]\n",
 );
 
-/// All of them, by name.
+/// All problems, by name.
 pub(crate) const ALL: [(&str, Texts); 4] = [
     ("lift", LIFT),
     ("taxi", TAXI),

@@ -1,5 +1,5 @@
-//! Windows of timed initials whose times vary, and boxes whose intervals have both ends equally far from the nominal
-//! value.
+//! Windows of timed initials whose times vary, and boxes whose intervals are symmetric around the
+//! nominal value.
 
 use super::*;
 

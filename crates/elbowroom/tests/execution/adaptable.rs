@@ -6,7 +6,7 @@ use elbowroom::num::Rational;
 
 use crate::scene::Scene;
 
-/// The photo needs the light, and the sample a rock that may roll away.
+/// The photo needs light, and the sample a rock that may roll away.
 const DOMAIN: &str = "
     (define (domain field) (:requirements :durative-actions :timed-initial-literals)
       (:predicates (light) (rock) (photo) (sample) (report))
@@ -48,12 +48,12 @@ fn done(report: &Report) -> Vec<&str> {
     names.map(|name| name.trim_matches(['(', ')'])).collect()
 }
 
-/// What the judge says of what was done.
+/// Returns `true` if the validator accepts the execution.
 fn is_valid(scene: &Scene, report: &Report) -> bool {
     scene.judged(report).is_valid()
 }
 
-/// When an action started, and when it ended.
+/// Returns the start and the end of an action.
 fn times(report: &Report, name: &str) -> (Rational, Rational) {
     let steps = report.executed.iter().map(|executed| &executed.step);
     let mut found = steps.filter(|step| step.action.name.contains(name));
@@ -82,8 +82,7 @@ fn an_order_that_misses_its_deadline_is_not_chosen() {
     assert!(is_valid(&scene, &report));
 }
 
-/// The next start is decided when it is known what has become of the one before: after no time,
-/// where that is told at once.
+/// The next start is decided when the previous one is reported, which is immediately here.
 #[test]
 fn starts_that_are_due_at_once_begin_at_once() {
     let scene = field(7);
@@ -123,7 +122,7 @@ fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
         failures += report.starts - 3;
     }
     assert!(failures > 20, "{failures}");
-    // Twenty failures in a row with probability 0.5 are not believed.
+    // Twenty failures in a row are not believable with probability 0.5.
     let report = scene.run("adaptable", &fails("1"), 1);
     assert_eq!(report.verdict, Verdict::ReplanLimit);
     assert!(
@@ -133,7 +132,7 @@ fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
             .all(|reason| reason.cause == Cause::Failed)
     );
     assert_eq!(report.starts, 20 * report.reasons.len());
-    // Nor is it tried for ever where next to nothing starts; and trying again takes no time here.
+    // Retries are also limited if a start hardly ever succeeds; a retry takes no time here.
     let hopeless = CHANCES.replace("start = 0.5", "start = 1e-9");
     let mut scene = field(100).with_likelihoods(&hopeless);
     scene.settings.most_replans = 1;
@@ -144,12 +143,10 @@ fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
     }
 }
 
-/// Someone takes the rock away while the command to sample it is on its way: no wonder that it
-/// fails, and no reason to give the plan up, where rocks come back.
 /// The parcel of `cases/delivery`, whose picks fail at their end three times in ten.
 #[test]
 fn a_pick_that_fails_at_its_end_and_is_undone_is_tried_again() {
-    // What follows the header.
+    // The sections after the header.
     let sections = |name: &str| {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/delivery/");
         let text = std::fs::read_to_string(format!("{folder}{name}")).expect("it is there");
@@ -165,7 +162,7 @@ fn a_pick_that_fails_at_its_end_and_is_undone_is_tried_again() {
             let scene = scene(&told);
             let report = scene.run(executor, &scene.world(world), seed);
             assert_eq!(report.verdict, Verdict::GoalReached, "{executor} {seed}");
-            // Nobody needs another plan for that.
+            // A retry needs no new plan.
             assert_eq!(report.replans, 0, "{executor} {seed}");
             let picks = done(&report)
                 .iter()
@@ -179,7 +176,7 @@ fn a_pick_that_fails_at_its_end_and_is_undone_is_tried_again() {
             "{executor}: {again} twice, {more} more often"
         );
     }
-    // Whoever is told that picks are certain gives the plan up.
+    // With a likelihood of 1 for picks, a failure makes the executor abandon the plan.
     let certain = told.replace("end = 0.7", "end = 1.0");
     let scene = scene(&certain);
     let given_up = (0..40).filter(|seed| {
@@ -205,10 +202,10 @@ fn a_failure_that_is_explained_by_what_was_seen_does_not_count() {
         let scene = Scene::new(&domain, problem, plan).with_likelihoods(&chances);
         scene.run("adaptable", &scene.world(world), 1)
     };
-    // It is back before the action would start.
+    // The rock is back before the action would start.
     let report = run(&format!("{late}{gone}{back}"));
     assert_eq!((report.starts, report.replans), (1, 0), "{report:#?}");
-    // It is not; and then there is no order, but that is all that is wrong.
+    // The rock is not back. Then there is no order, which is the only reason.
     let report = run(&format!("{late}{gone}"));
     assert_eq!(report.verdict, Verdict::Unsolvable);
     assert_eq!(report.reasons[0].cause, Cause::NoOrder, "{report:#?}");

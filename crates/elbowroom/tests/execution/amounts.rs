@@ -1,4 +1,4 @@
-//! Amounts that are measured, and durations that move numbers.
+//! Measured amounts, and durations that affect numbers.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -19,7 +19,7 @@ use crate::guarantee::one_order;
 use crate::own;
 use crate::scene::{Scene, runs};
 
-/// Ten sites more, and nothing about time: only how much a survey takes of the battery.
+/// Independent surveys without deadlines, which only consume charge.
 const DOMAIN: &str = "(define (domain sites)
     (:requirements :typing :durative-actions :fluents) (:types site)
     (:predicates (idle) (surveyed ?s - site)) (:functions (charge))
@@ -37,7 +37,7 @@ const DOMAIN: &str = "(define (domain sites)
 const PROBLEM: &str = "(define (problem p) (:domain sites) (:objects a b - site)
     (:init (idle) (= (charge) 80)) (:goal (and (surveyed a) (surveyed b))))";
 
-/// A survey takes 90 of the battery in place of 40. The domain says `(* (draw ?r) ?duration)`.
+/// A survey consumes 90 of the battery instead of 40. The domain says `(* (draw ?r) ?duration)`.
 #[test]
 fn an_amount_in_which_the_duration_stands_is_held_against_how_long_it_took() {
     let scene = Scene::case("battery");
@@ -50,23 +50,23 @@ fn an_amount_in_which_the_duration_stands_is_held_against_how_long_it_took() {
         assert_eq!(since, Some(Rational::from(20)), "{executor}: {report:#?}");
     }
     let report = scene.run("adaptable", &model, 0);
-    // Who goes by orders says after which news none was left.
+    // Executors based on orders name the event after which no order was left.
     let [behind] = report.reasons[0].behind.as_slice() else {
         panic!("{:?}", report.reasons);
     };
     assert_eq!(behind.to_string(), "(survey rover crater) succeeded at 20");
-    // More of it because it took longer is no deviation.
+    // A larger amount due to a longer duration is no deviation.
     let model = scene.world("[[duration]]\naction = \"recharge\"\nconstant = 10.5\n");
     let report = scene.run("fixed:10", &model, 0);
     assert_eq!(report.replans, 0, "{:?}", report.reasons);
 }
 
-/// Nobody left the amounts open, and yet they are measured: 60 for each in place of 30.
+/// The amounts are no parameters, and are still measured: 60 for each instead of 30.
 #[test]
 fn live_holds_amounts_that_were_not_left_open_against_the_rest() {
     for (plan, known) in [
         ("0: (survey a) [20]\n20.001: (survey b) [20]", 20),
-        // Measured at the start, known at the start.
+        // Measured and known at the start.
         ("0: (warm-up a) [20]\n20.001: (warm-up b) [20]", 0),
     ] {
         let scene = Scene::new(DOMAIN, PROBLEM, Some(plan));
@@ -83,14 +83,14 @@ fn live_holds_amounts_that_were_not_left_open_against_the_rest() {
     }
 }
 
-/// While a tank is filled its level rises: after 20 it runs over. A survey of 25 leaves too little
-/// in the battery for the next one.
+/// Filling raises the level of a tank, which overflows after 20. A survey of 25 leaves too little
+/// charge for the next one.
 #[test]
 fn live_gives_up_what_runs_too_long_for_the_numbers_while_it_runs() {
     for (case, action, longest, limit) in [("tank", "fill", 300, 20), ("battery", "survey", 60, 25)]
     {
         let mut scene = Scene::case(case);
-        // Of the other actions, the durations are as planned. (The executor could choose them.)
+        // The other durations are as planned. (The executor could choose them.)
         scene.flow.vary = vec![
             format!("duration {action}")
                 .parse()
@@ -110,7 +110,7 @@ fn live_gives_up_what_runs_too_long_for_the_numbers_while_it_runs() {
             .as_ref()
             .and_then(|allowed| allowed.upper.value());
         let upper = upper.expect("a limit");
-        // As near below the limit as ε.
+        // Within ε below the limit.
         let (limit, epsilon) = (Rational::from(limit), Rational::new(1, 1000));
         assert!(
             *upper <= limit && *upper >= &limit - &epsilon,
@@ -122,7 +122,7 @@ fn live_gives_up_what_runs_too_long_for_the_numbers_while_it_runs() {
     }
 }
 
-/// The time at which a plan was first abandoned, although no other one was to be made.
+/// Time at which a plan was first abandoned, although no other one could be made.
 #[derive(Default)]
 struct FirstAbandoned(Option<Rational>);
 
@@ -134,7 +134,7 @@ impl Recorder for FirstAbandoned {
     }
 }
 
-/// The last action deviates, and there is nothing left to be planned.
+/// The last action deviates, and no further planning is needed.
 #[test]
 fn a_goal_that_is_reached_needs_no_new_plan() {
     let problem = PROBLEM.replace(" (surveyed b)", "");
@@ -150,8 +150,8 @@ fn a_goal_that_is_reached_needs_no_new_plan() {
     );
 }
 
-/// A duration is bounded from below by one constraint and from above by another; a reason shows
-/// both.
+/// A duration has its lower bound from one constraint and its upper bound from another; a reason
+/// shows both.
 #[test]
 fn a_reason_shows_all_that_bounds_a_duration() {
     let scene = Scene::case("delivery");
@@ -171,13 +171,14 @@ fn a_reason_shows_all_that_bounds_a_duration() {
     }
 }
 
-/// Counts how often it is asked about the rest of a plan: about points, or for boxes.
+/// Region that counts the queries about the remaining plan, for points or for boxes.
 #[derive(Default)]
 struct Counting {
     asked: Arc<AtomicUsize>,
-    /// Whether it looks for boxes as usual, and counts these; else it is asked about each point by itself.
+    /// `true` if it searches for boxes as usual, and counts these; otherwise each point is a query
+    /// of its own.
     finds_boxes: bool,
-    /// Whether it is asked although what was observed is within a box that works.
+    /// `true` if it is queried even if the observations are within a valid box.
     is_asked_inside: bool,
 }
 
@@ -212,7 +213,7 @@ impl Region for Counting {
     }
 }
 
-/// An executor that somebody else made.
+/// Executor given from outside.
 struct Made(Box<dyn Executor>);
 
 impl Executor for Made {
@@ -264,7 +265,7 @@ fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
         let execution = scene.execution("live").decided_by(Made(live));
         let report = execution.run_in(&mut *model.world(&scene.task, 0));
         assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
-        // What ends after the last deviation is only asked about if the plan had no envelope.
+        // Later ends are only queried if the plan had no envelope.
         let count = asked.load(Ordering::Relaxed);
         assert!(
             count <= questions && (count > 0) == (questions > 0),
@@ -273,8 +274,8 @@ fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
     }
 }
 
-/// How long an action under way may take is found with one oracle that widens a box; asking about each
-/// duration by itself gives the same limits up to ε, and so the same runs.
+/// The limits of a running action's duration are found with one oracle that widens a box. Separate
+/// queries for each duration give the same limits up to ε, and so the same runs.
 #[test]
 fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_about() {
     let mut outlived = 0;
@@ -306,8 +307,8 @@ fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_abou
     assert!(outlived > 3, "{outlived}");
 }
 
-/// A drive takes longer than the envelope has it, so that a survey may take no more of the battery than planned; it
-/// takes as much as it could have before.
+/// A drive takes longer than in the envelope, so that a survey may not consume more than planned.
+/// It consumes as much as the envelope allowed before.
 #[test]
 fn once_something_has_left_the_envelope_amounts_are_held_against_what_is_left() {
     let domain = "(define (domain rover)
@@ -354,8 +355,9 @@ fn once_something_has_left_the_envelope_amounts_are_held_against_what_is_left() 
     assert_eq!((report.verdict, report.replans), (Verdict::GoalReached, 0));
 }
 
-/// Twenty robots drive 32 times each, which their batteries allow with an eighth to spare. The envelope gives that to
-/// some of the drives; the box for the rest gives each a share, and what is under way may end before it was planned to.
+/// Twenty robots drive 32 times each. Their batteries hold an eighth more than needed. The envelope
+/// assigns this reserve to some of the drives. The box for the remaining plan gives each drive a
+/// share, and running actions may end earlier than planned.
 #[test]
 fn the_box_for_the_rest_has_room_for_all_of_it() {
     let domain = "(define (domain patrol)
@@ -411,10 +413,11 @@ fn the_box_for_the_rest_has_room_for_all_of_it() {
     assert!((1..=4).contains(&most), "{most}");
 }
 
-/// What two runs differ in, if it is more than that limits of durations, which are found up to ε, were looked for from
-/// other durations on: which of the two comes first, that an action has outlived its limit or that a condition fails, does
-/// not count. Nor does it if what is lost is noticed earlier in the first one: several actions under way take longer, and
-/// while nothing is heard of them, only who goes by a box looks at all of them.
+/// Returns a relevant difference between two runs. Limits of durations are found up to ε and from
+/// different initial values, so it is irrelevant whether an outlived limit or a failed condition
+/// comes first. It is also irrelevant if the first run detects the loss of the guarantee earlier:
+/// several running actions take longer, and without events only an executor with a box checks all
+/// of them.
 fn difference(one: &Report, other: &Report, epsilon: &Rational) -> Option<String> {
     let lost = |report: &Report| report.reasons.first()?.since.clone();
     if let (Some(one), Some(other)) = (lost(one), lost(other))
@@ -447,8 +450,8 @@ fn difference(one: &Report, other: &Report, epsilon: &Rational) -> Option<String
     far.map(|(one, other)| format!("{one}, {other}"))
 }
 
-/// Where what was observed is within the plan's envelope, the rest of the plan works: who asks about the rest all the
-/// same is told so, and the runs are the same.
+/// If the observations are within the plan's envelope, the remaining plan is feasible. An executor
+/// that still queries it gets this answer, and the runs are the same.
 #[test]
 fn what_stays_within_the_envelope_needs_no_question() {
     let asked = Arc::new(AtomicUsize::new(0));

@@ -1,4 +1,4 @@
-//! Plans that are made while the run goes on.
+//! Planning in the background of a run.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
         .with_settings(settings())
 }
 
-/// A lasting run by `guarded`.
+/// Makes a persistent run by `guarded`.
 fn lasting(task: &Arc<Task>, end: i64, script: Vec<(i64, Event)>, planner: &Beside) -> Told {
     let script = script
         .into_iter()
@@ -37,8 +37,8 @@ fn the_running_plan_goes_on_while_one_is_made_for_a_goal_that_was_given() {
     let task = task("", "(and (have book) (have cup))");
     let planner = Beside::taking(&[seconds(1), seconds(12)]);
     let told = lasting(&task, 100, vec![(5, pursue("key", "(have key)"))], &planner);
-    // The first plan was made in the first second; the second job begins while the second search
-    // is under way, and the third when it is over.
+    // The first plan is made in the first second; the second job begins during the second search,
+    // and the third after it.
     assert_has(
         &told,
         &[
@@ -74,7 +74,7 @@ fn search_ends_when_a_deadline_passes_behind_which_the_goal_is_out_of_reach() {
     assert_eq!(planner.desk().begun, 2, "{:#?}", told.notes);
 }
 
-/// What the new plan was to do and the running one has done meanwhile is not done again.
+/// Steps of the new plan that the current one has executed meanwhile are not repeated.
 #[test]
 fn what_was_done_meanwhile_is_not_done_again() {
     let task = task("(free s)", "(and (have book) (have cup))");
@@ -109,7 +109,7 @@ fn goals_and_facts_that_come_in_during_a_search_are_taken_in_at_once() {
             "rest: goal-reached",
         ],
     );
-    // All was taken in before there was a plan.
+    // All events were processed before there was a plan.
     let place = |what: &str| told.lines.iter().position(|it| it.contains(what));
     let there = place("\"event\":\"planned\"");
     for what in ["goal", "fact", "pause", "resume"] {
@@ -126,7 +126,7 @@ fn goals_and_facts_that_come_in_during_a_search_are_taken_in_at_once() {
 fn where_the_plan_is_lost_nothing_is_started_until_there_is_another_one() {
     let task = task("(free s)", "(and (have book) (have cup) (have key))");
     let planner = Beside::taking(&[seconds(0), seconds(20)]);
-    // Somebody has taken what nobody fetches yet, whatever that is, and brings it back.
+    // All items that are not fetched yet are removed and returned.
     let here = |item: &str, truth| fact(&task, &format!("(here {item})"), truth);
     let gone = ITEMS.map(|item| (2, here(item, false)));
     let back = ITEMS.map(|item| (3, here(item, true)));
@@ -137,7 +137,7 @@ fn where_the_plan_is_lost_nothing_is_started_until_there_is_another_one() {
         &[
             "0: start",
             "2: plan",
-            // There was no plan without it, but it is there again.
+            // The item was missing in the situation of the search, but is available again.
             "22: the plan is there",
             "22: plan",
             "42: the plan is there",
@@ -186,12 +186,12 @@ fn a_search_for_a_goal_that_is_abandoned_ends_and_one_without_goals_is_needless(
             "31: rest: no goals",
         ],
     );
-    // The last plan arrives when its goal is abandoned: there is no open request to abandon.
+    // The last plan arrives when its goal is abandoned, so there is no open request to abandon.
     let desk = planner.desk();
     assert_eq!((desk.begun, desk.given_up), (4, 1), "{:#?}", told.notes);
 }
 
-/// Goals that come, or go, faster than plans can be made do not keep the run from acting.
+/// The run acts even if goals are added or abandoned faster than plans can be made.
 #[test]
 fn goals_that_change_faster_than_plans_are_made_do_not_starve_the_run() {
     let task = task("", "(have book)");
@@ -222,8 +222,8 @@ fn goals_that_change_faster_than_plans_are_made_do_not_starve_the_run() {
     }
 }
 
-/// A search for goals that were abandoned, which is let go on as goals have changed so often, may have no
-/// end. After five seconds it is ended.
+/// A search for abandoned goals continues if goals change often. It may never end, and is stopped
+/// after five seconds.
 #[test]
 fn a_search_for_abandoned_goals_is_not_let_go_on_for_ever() {
     let task = task("", "(have book)");
@@ -237,7 +237,7 @@ fn a_search_for_abandoned_goals_is_not_let_go_on_for_ever() {
         &told,
         &[
             "4: plan",
-            // The fourth search has gone on for five seconds.
+            // The fourth search has run for five seconds.
             "9: plan",
             "10: the plan is there",
             "rest: goal-reached key",
@@ -257,7 +257,7 @@ fn a_run_that_finds_no_plan_rests_and_one_that_is_over_ends() {
         &told,
         &["5: the plan is there", "rest: unsolvable-from-here problem"],
     );
-    // A run with one goal waits for its first plan, and makes others beside itself.
+    // A run with one goal waits for its first plan, and makes others in the background.
     let script = vec![
         (seconds(3), fact(&task, "(here cup)", false)),
         (seconds(4), fact(&task, "(here cup)", true)),
@@ -288,8 +288,8 @@ fn told_once(task: &Arc<Task>, script: (i64, Vec<(Rational, Event)>), planner: &
     told(execution(task, "guarded"), task, script, planner, &[])
 }
 
-/// What the new plan was to do cannot be done any more when it comes, while the running plan goes on: it
-/// is outdated, and another one is made, twice more at most before nothing else is started.
+/// The new plan is infeasible when it arrives, while the current plan continues. It is outdated,
+/// and planning is repeated at most twice before the executor stops starting actions.
 #[test]
 fn a_plan_that_is_outdated_when_it_comes_is_made_again() {
     let task = task("", "(and (have book) (have cup))");
@@ -315,9 +315,8 @@ fn a_plan_that_is_outdated_when_it_comes_is_made_again() {
     assert_eq!(told.report.starts, 3, "{:#?}", told.notes);
 }
 
-/// Whatever is asked, however long plans take and actions deviate: what is executed is a plan by the
-/// judge's rules, nothing is started while the run is paused, and the record plays back to the same
-/// decisions.
+/// For all requests, planning times and deviations, the validator accepts the execution, nothing is
+/// started while the run is paused, and the record replays with the same decisions.
 #[test]
 fn whatever_happens_meanwhile_what_is_done_is_valid_and_plays_back() {
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();

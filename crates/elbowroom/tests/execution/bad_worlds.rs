@@ -6,8 +6,8 @@ use elbowroom::sim::{Distribution, Reports};
 
 use crate::scene::{EXECUTORS, Scene, runs};
 
-/// No panic, no hang, no wrong "goal reached". `ELBOWROOM_BAD_RUNS` says how many runs, and
-/// `ELBOWROOM_BAD_FIRST` from which one on.
+/// There must be no panic, no hang, and no wrong "goal reached". `ELBOWROOM_BAD_RUNS` sets the
+/// number of runs, and `ELBOWROOM_BAD_FIRST` the first one.
 #[test]
 fn no_report_is_believed_against_reason() {
     let mut scenes = [
@@ -47,7 +47,7 @@ fn no_report_is_believed_against_reason() {
     assert!(ends.len() > 1, "no run was disturbed: {ends:?}");
 }
 
-/// Each kind of mistake by itself, and all of them together.
+/// Returns each kind of fault separately, and all of them together.
 fn bad(run: u64) -> Reports {
     let mut reports = Reports {
         lateness: Distribution::Uniform {

@@ -1,5 +1,5 @@
-//! What tests of plans that are made while the run goes on are made of. No threads and no clock: a planner
-//! that takes as long as it is told to, by the world's time, and a world that says when its plan is there.
+//! Fixtures for tests of planning in the background. There are no threads and no clock: the planner
+//! takes a given time of the world, and the world reports when the plan is ready.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,33 +17,33 @@ use elbowroom::report::trace::Line;
 
 use crate::lasting::scripted::{Notes, Scripted};
 
-/// A planner that works beside the run.
+/// Planner in the background of a run.
 #[derive(Clone, Default)]
 pub(crate) struct Beside(Arc<Mutex<Desk>>);
 
 #[derive(Default)]
 pub(crate) struct Desk {
     pub(crate) now: Rational,
-    /// How long each search takes, one after the other; the last one again and again.
+    /// Durations of the searches in their order; the last one is repeated.
     pub(crate) seconds: Vec<Rational>,
-    /// When the plan is there, until that was said.
+    /// Time at which the plan is ready, until it is reported.
     due: Option<Rational>,
-    /// How long making it ready takes, likewise.
+    /// Durations of the preparations, likewise.
     readying: Vec<Rational>,
     ready: Option<Rational>,
     pub(crate) readied: usize,
     pub(crate) begun: usize,
     pub(crate) given_up: usize,
     pub(crate) waited_for: usize,
-    /// Whether there is never a plan.
+    /// `true` if there is never a plan.
     pub(crate) has_none: bool,
-    /// From where plans were asked for.
+    /// Situations for which plans were requested.
     pub(crate) asked: Vec<Situation>,
-    /// From where plans were begun ahead.
+    /// Situations for which plans were begun in advance.
     pub(crate) ahead: Vec<Situation>,
-    /// When the last one of these is there.
+    /// Time at which the last one of these is ready.
     ahead_due: Rational,
-    /// The task of the search that was begun, with the goals of then.
+    /// Task of the current search, with its goals at the beginning.
     task: Option<Task>,
 }
 
@@ -56,7 +56,7 @@ impl Beside {
         Self(Arc::new(Mutex::new(desk)))
     }
 
-    /// With plans that take so long to be made ready; without any times, that is done at once.
+    /// Sets the durations of the preparations; without any, plans are prepared at once.
     pub(crate) fn readying(self, seconds: &[Rational]) -> Self {
         self.desk().readying = seconds.to_vec();
         self
@@ -68,7 +68,7 @@ impl Beside {
 }
 
 impl Desk {
-    /// When a plan is there that is begun now.
+    /// Returns the time at which a plan begun now is ready.
     fn next_due(&self) -> Rational {
         let index = self.begun.min(self.seconds.len() - 1);
         &self.now + &self.seconds[index]
@@ -118,7 +118,7 @@ impl Planner for Beside {
     }
 }
 
-/// A preparer that works beside the run, and takes its time; or, without any time to take, at once.
+/// Preparer in the background that takes a given time; without one, it prepares at once.
 pub(crate) struct Readier(pub(crate) Beside, pub(crate) flow::Settings);
 
 impl Preparer for Readier {
@@ -147,11 +147,11 @@ impl Preparer for Readier {
     }
 }
 
-/// That world, which says when a plan is there, and in which actions take longer or less long than planned.
+/// World with deviating durations that reports when a plan is ready.
 pub(crate) struct Telling {
     pub(crate) inner: Scripted,
     planner: Beside,
-    /// By how many quarters of itself the nth start's duration differs.
+    /// Deviation of the nth start's duration, in quarters of itself.
     quarters: Vec<i64>,
     started: usize,
 }
@@ -175,7 +175,7 @@ impl World for Telling {
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
         let mut desk = self.planner.desk();
         if desk.ready.as_ref().is_some_and(|ready| *ready <= desk.now) {
-            // Without anything else that happens at that time.
+            // No other event is reported at that time.
             desk.ready = None;
             return Ok(Passage {
                 now: desk.now.clone(),
@@ -210,7 +210,7 @@ impl World for Telling {
     }
 }
 
-/// Notes, and the lines of the trace.
+/// Recorder of notes and of the lines of the trace.
 struct Tape {
     notes: Notes,
     task: Arc<Task>,
@@ -245,7 +245,7 @@ pub(crate) fn settings() -> RunSettings {
     }
 }
 
-/// The world of a script, and what says when it is over.
+/// Returns the world of a script, and the flag that ends the run.
 pub(crate) fn telling(
     (end, script): (i64, Vec<(Rational, Event)>),
     planner: &Beside,
@@ -281,7 +281,7 @@ pub(crate) fn told(
     told_in(execution, task, planner, &mut world, &is_to_end)
 }
 
-/// The run in that world, which says when it is over.
+/// Runs in that world until it sets the flag.
 pub(crate) fn told_in(
     execution: Execution<'_>,
     task: &Arc<Task>,

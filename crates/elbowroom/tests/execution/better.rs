@@ -1,4 +1,5 @@
-//! The search for a better plan after a guarantee was lost, while the rest of the present plan is still feasible.
+//! The search for a better plan after the loss of a guarantee, while the current plan is still
+//! feasible.
 
 use elbowroom::execution::Cause;
 use elbowroom::execution::run::{PlanningTime, Report, RunSettings, Verdict};
@@ -32,7 +33,8 @@ fn scene(deadline: u32, fast_pace: u32) -> Scene {
     scene
 }
 
-/// Runs with this duration of the large robot's walk. It is planned for 10, and the box guarantees about 16.7.
+/// Runs with this duration of the large robot's walk. It is planned for 10, and the box guarantees
+/// about 16.7.
 fn run(deadline: u32, fast_pace: u32, walk: &str, planning_time: i64) -> Report {
     let mut scene = scene(deadline, fast_pace);
     scene.settings.planning_time = PlanningTime::Seconds(planning_time.into());
@@ -48,7 +50,7 @@ fn plan_with_more_slack_takes_over_while_the_present_one_is_still_feasible() {
     assert_eq!(causes.collect::<Vec<_>>(), [Cause::MoreSlack]);
     let since = report.reasons[0].since.clone().expect("a time");
     assert!(since > Rational::from(16) && since < Rational::from(17));
-    // After the last moment at which the present plan is feasible, no other one is.
+    // After the last time at which the current plan is feasible, no other one is.
     let report = run(25, 2, "21", 1);
     assert_ne!(report.verdict, Verdict::GoalReached, "{report:#?}");
 }

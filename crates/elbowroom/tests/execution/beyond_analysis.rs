@@ -1,4 +1,5 @@
-//! Plans whose numbers are beyond exact analysis: the validator judges the rest at its planned values.
+//! Plans whose numbers are beyond exact analysis: the validator checks the remaining plan at its
+//! planned values.
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use elbowroom::sim::SimWorld;
 
 use crate::scene::Scene;
 
-/// The water flows in faster the higher the head is, which sinks meanwhile.
+/// The water flows in faster if the head is higher, which sinks meanwhile.
 const DOMAIN: &str = "(define (domain pond)
     (:requirements :durative-actions :numeric-fluents :continuous-effects :negative-preconditions)
     (:predicates (idle) (inspected) (open))

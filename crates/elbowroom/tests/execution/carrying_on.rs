@@ -1,4 +1,5 @@
-//! Plans that are abandoned because time or numbers fall short, where no other plan is found.
+//! Plans that are abandoned because of a lack of time or of violated numeric conditions, and
+//! without an alternative plan.
 
 use elbowroom::execution::Cause;
 use elbowroom::execution::executors::DEFAULT_EXECUTOR;
@@ -23,7 +24,7 @@ const DOOR: &str = "(define (problem p) (:domain walks)
 
 const PLAN: &str = "0: (go) [10]\n10.001: (go-on) [10]";
 
-/// Runs in a simulated world, with slack watched as in real time or not.
+/// Runs in a simulated world, with or without monitoring of slack as in real time.
 fn outcome(executor: &str, watches_room: bool, world: &str) -> (Verdict, usize) {
     let mut scene = Scene::new(WALKS, DOOR, Some(PLAN));
     scene.settings.watches_room = watches_room;
@@ -36,7 +37,7 @@ fn goal_is_reached_if_a_later_action_makes_up_for_the_delay() {
     let world = "[[duration]]\naction = \"go\"\nconstant = 13\n[[duration]]\naction = \"go-on\"\nconstant = 8\n";
     for watches_room in [false, true] {
         let reached = |executor| outcome(executor, watches_room, world).0 == Verdict::GoalReached;
-        // 13 leaves 9 s for an action of 10 s, so no plan exists; but it takes 8 s.
+        // After 13 s, 9 s are left for an action of 10 s, so no plan exists; but it takes only 8 s.
         assert!(reached("live"), "{watches_room}");
         assert!(reached("esterel"), "{watches_room}");
         assert!(!reached("guarded"), "{watches_room}");
@@ -64,7 +65,7 @@ fn plan_that_lacks_more_than_time_is_not_carried_on() {
     assert_ne!(verdict, Verdict::GoalReached);
 }
 
-/// Two hoses fill a tank in turn, each for 10 s.
+/// Two hoses fill a tank, one after the other, each for 10 s.
 #[test]
 fn goal_is_reached_if_a_later_action_makes_up_for_numbers_that_fall_short() {
     let domain = "(define (domain hoses)
@@ -94,7 +95,7 @@ fn goal_is_reached_if_a_later_action_makes_up_for_numbers_that_fall_short() {
     }
 }
 
-/// The bus cannot pass during a walk, and leaves from the place where the walk began.
+/// The bus cannot pass during a walk, and leaves from the start of the walk.
 const BUS: &str = "(define (domain bus)
     (:requirements :durative-actions :timed-initial-literals)
     (:predicates (way-free) (at-stop) (half-way) (there) (open))
@@ -120,7 +121,7 @@ fn overdue_action_is_cancelled_if_there_is_a_plan_without_it() {
     assert_ne!(esterel.verdict, Verdict::GoalReached);
 }
 
-/// A recharge of any length between 1 and 45, of which 25 are needed and 40 planned; then a drive before 75.
+/// A recharge of 1 to 45; 25 are needed and 40 planned. Then a drive before 75.
 const RECHARGE: &str = "(define (domain recharge)
     (:requirements :durative-actions :fluents :duration-inequalities :timed-initial-literals)
     (:predicates (free) (home) (there) (day)) (:functions (charge))
@@ -143,7 +144,7 @@ fn open_duration_may_deviate_as_far_as_domain_and_plan_allow() {
             let world = format!("[[duration]]\naction = \"recharge\"\nconstant = {takes}\n");
             let report = scene.run(executor, &scene.world(&world), 0);
             assert_eq!(report.verdict, Verdict::GoalReached, "{executor}, {takes}");
-            // Paper 1's algorithm gives the drive some of the room.
+            // Paper 1's algorithm gives the drive some of the slack.
             if executor == "live" || takes != "44.9" {
                 assert_eq!(report.replans, 0, "{executor}, {takes}: {report:#?}");
             }
@@ -216,8 +217,8 @@ fn default_is_never_below_the_baselines_in_windows() {
     }
 }
 
-/// Glass is melted for as long as the domain leaves open, at most until it is too hot, and formed in a shift. Whatever breaks
-/// off is lost.
+/// Glass is melted for a variable duration, at most until it is too hot, and formed in a shift. A
+/// broken-off action loses the glass.
 const GLASS: &str = "(define (domain glass)
     (:requirements :durative-actions :fluents :continuous-effects :duration-inequalities :timed-initial-literals)
     (:predicates (raw) (melted) (warm) (rested) (formed) (shift)) (:functions (heat))
@@ -231,7 +232,8 @@ const GLASS: &str = "(define (domain glass)
       :condition (and (at start (rested)) (over all (shift)))
       :effect (and (at start (not (rested))) (at end (formed)))))";
 
-/// Runs with this duration of melting. The glass is warm until then, and the first shift ends at another time.
+/// Runs with this duration of melting. The glass is warm until `times.0`, and the first shift ends
+/// at `times.1`.
 fn form_glass(plan: &str, times: (u32, u32), world: &str, planning_time: Rational) -> Report {
     let (cold, shift) = times;
     let problem = format!(
@@ -250,8 +252,8 @@ const FORMED: &str = "0: (melt) [10]\n10.001: (rest) [2]\n12.002: (form) [4]";
 
 #[test]
 fn plan_that_is_carried_on_gives_way_to_one_that_is_found_after_an_end() {
-    // From 14 on it is known that the first shift is too short. If melting took a quarter longer than that, the glass
-    // would be cold; but it ends in time, and can be formed in the second shift.
+    // From 14 on it is known that the first shift is too short. If melting took a quarter longer
+    // than that, the glass would be cold. It ends in time, and can be formed in the second shift.
     let world = "[[duration]]\naction = \"melt\"\nconstant = 16\n";
     let report = form_glass(FORMED, (17, 21), world, Rational::ZERO);
     assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
@@ -261,8 +263,8 @@ fn plan_that_is_carried_on_gives_way_to_one_that_is_found_after_an_end() {
 
 #[test]
 fn overdue_action_is_not_expected_to_break_its_own_condition() {
-    // After 18 s, a quarter longer is too hot for the glass. Because planning takes time here, no better plan is searched
-    // for before.
+    // After 18 s, a quarter longer is too hot for the glass. Because planning takes time here,
+    // there is no earlier search for a better plan.
     let world = "[[duration]]\naction = \"melt\"\nconstant = 19\n";
     let report = form_glass(FORMED, (35, 24), world, Rational::new(1, 10));
     assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
@@ -279,7 +281,7 @@ fn open_duration_is_not_begun_at_the_end_of_its_interval() {
     assert_eq!(report.replans, 0, "{report:#?}");
 }
 
-/// Three actions: the end of the first one lies in the second, the end of the second one in the third.
+/// Three actions: the first one ends during the second, and the second during the third.
 const NESTED: &str = "(define (domain nested)
     (:requirements :durative-actions :duration-inequalities)
     (:predicates (first) (second) (third) (first-done) (second-done) (third-done))

@@ -17,7 +17,8 @@ const ADAPTIVE: [&str; 2] = ["adaptable", "lookahead"];
 const CERTAIN: &str =
     "[defaults]\nbecomes_true = 0.0\nbecomes_false = 0.0\nstart = 1.0\neffect = 1.0\n";
 
-/// A domain with the facts `p`, `q`, `r` and one more for each action, which its end adds. The goal is all of these.
+/// Returns a domain with the facts `p`, `q`, `r` and one more for each action, which its end adds.
+/// The goal is all of these.
 fn scene(actions: &[(&str, &str, &str, &str)], init: &str, plan: &str) -> Scene {
     let mut domain = "(define (domain d) (:requirements :durative-actions :duration-inequalities
         :disjunctive-preconditions :negative-preconditions :numeric-fluents :timed-initial-literals)
@@ -45,7 +46,7 @@ fn scene(actions: &[(&str, &str, &str, &str)], init: &str, plan: &str) -> Scene 
     scene
 }
 
-/// Two actions whose starts make each other's condition true, and whose ends make it false.
+/// Returns two actions whose starts make each other's condition true, and whose ends make it false.
 fn pair() -> Scene {
     let a = (
         "a",
@@ -71,8 +72,8 @@ fn circle() -> Scene {
     scene(&actions, "", "1: (a) [3]\n1: (b) [3]\n1: (c) [2]")
 }
 
-/// While `c` runs, `a` ends at the moment at which `b` starts: before that end `b` lacks `r`, and after it `c` lacks `p`
-/// until `b` starts.
+/// Returns a plan with an action `c`, during which `a` ends at the moment of the start of `b`.
+/// Before that end `b` lacks `r`, and after it `c` lacks `p` until `b` starts.
 fn relay() -> Scene {
     let actions = [
         ("c", "(= ?duration 9)", "(over all (or (p) (q)))", ""),
@@ -87,7 +88,7 @@ fn relay() -> Scene {
     scene(&actions, "(p)", "1: (c) [9]\n1: (a) [3]\n4: (b) [8]")
 }
 
-/// The load is exactly 1 while `c` runs.
+/// Returns a plan with an action `c` that needs a load of exactly 1.
 fn load() -> Scene {
     let actions = [
         (
@@ -112,7 +113,7 @@ fn load() -> Scene {
     scene(&actions, "(p)", "0: (c) [9]\n1: (a) [3]\n4: (b) [3]")
 }
 
-/// The end of an action that takes no time is needed at the moment of its start.
+/// Returns a plan with an action of duration 0 whose end is needed at the moment of its start.
 fn timeless() -> Scene {
     let actions = [
         ("a", "(>= ?duration 0)", "(over all (p))", "(at end (q))"),
@@ -121,7 +122,8 @@ fn timeless() -> Scene {
     scene(&actions, "", "1: (a) [0]\n2: (b) [2]")
 }
 
-/// At 5 a timed initial literal takes `p` away, and brings `r` that the start of `b` needs.
+/// Returns a plan with a timed initial literal at 5 that deletes `p`, and adds `r` for the start of
+/// `b`.
 fn relief() -> Scene {
     let actions = [
         ("c", "(= ?duration 9)", "(over all (or (p) (q)))", ""),
@@ -142,7 +144,7 @@ fn scenes() -> [(&'static str, Scene); 6] {
     ]
 }
 
-/// One of the scenes without a likelihood file.
+/// Returns one of the scenes without a likelihood file.
 fn scene_without(name: &str) -> Scene {
     let mut scenes = scenes().into_iter();
     let found = scenes.find(|(own, _)| *own == name);
@@ -179,7 +181,7 @@ fn coupled_starts_are_one_decision() {
     }
 }
 
-/// A start that fails takes the others of its moment along: all are tried again together.
+/// If one of several simultaneous starts fails, all are tried again together.
 #[test]
 fn coupled_starts_are_tried_again_after_failures() {
     for name in ["pair", "circle"] {
@@ -219,7 +221,7 @@ fn literal(rng: &mut ChaCha8Rng) -> String {
 fn random(rng: &mut ChaCha8Rng) -> Option<(Scene, String)> {
     let names = ["a", "b", "c"];
     let has_load = rng.random_bool(0.3);
-    // Half of the plans have a circle: each start gives what the next action needs.
+    // Half of the plans have a cycle: each start adds the condition of the next action.
     let is_circle = rng.random_bool(0.5);
     let facts = ["p", "q", "r"];
     let origin = rng.random_range(0..3);
@@ -303,7 +305,8 @@ fn is_valid(scene: &Scene, plan: &TimeTriggeredPlan) -> bool {
     validate(&scene.task, plan, &validate::Settings::default()).is_valid()
 }
 
-/// Returns `true` if the plan works with its happenings of one moment a little apart, in some order.
+/// Returns `true` if the plan is valid with its simultaneous happenings a little apart, in some
+/// order.
 fn works_apart(scene: &Scene) -> bool {
     let tenth = elbowroom::num::Rational::new(1, 100);
     let orders = [

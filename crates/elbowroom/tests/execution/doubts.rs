@@ -32,12 +32,12 @@ fn scene(goal: &str) -> Scene {
     scene
 }
 
-/// A world whose first action hangs.
+/// World whose first action hangs.
 struct Hanging<'a> {
     world: SimWorld<'a>,
-    /// The report on its end, and how long after the cancellation it comes.
+    /// Report of its end, and its delay after the cancellation.
     reply: Option<(i64, Ending)>,
-    /// The parts that it reports as done, one every 25 seconds; the last one for ever.
+    /// Completed shares that it reports, one every 25 seconds; the last one is repeated.
     completions: Vec<Rational>,
     can_look: bool,
     now: Rational,
@@ -217,7 +217,7 @@ fn goal_in_doubt_is_not_reached() {
     }
 }
 
-/// While the other robot works, the end is reported, before or after its effects were put in doubt.
+/// The end is reported while the other robot works, before or after its effects were put in doubt.
 #[test]
 fn late_end_settles_the_doubt_while_another_action_runs() {
     let problem = "(define (problem p) (:domain robots) (:objects r1 r2 - robot x y z - item)

@@ -1,4 +1,4 @@
-//! Paper 2's baseline on a clock.
+//! Baseline of paper 2 on a clock.
 
 use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::execution::{About, Cause};
@@ -56,7 +56,7 @@ fn a_plan_is_given_up_when_a_condition_does_not_hold_where_it_is_needed() {
     assert_eq!(reason.about, Some(About::Conditions(unlocked)));
     assert_eq!(count(&report, "unlock"), 2);
     assert!(scene.judged(&report).is_valid());
-    // Not before it is needed: `guarded` sees at 20 that the rest does not work any more.
+    // Only at the failure. `guarded` knows at 20 that the remaining plan is infeasible.
     assert!(report.executed.iter().any(|it| it.step.start > 27.into()));
 }
 
@@ -68,7 +68,7 @@ fn a_plan_is_given_up_when_an_action_breaks_off() {
     assert_eq!(report.reasons[0].cause, Cause::Failed, "{report:#?}");
 }
 
-/// The counter closes at 60, and a drop that begins later than 57 is in vain.
+/// The counter closes at 60, so a drop that begins later than 57 fails.
 #[test]
 fn a_deadline_is_noticed_only_where_something_fails_for_it() {
     let scene = Scene::case("delivery");
@@ -80,6 +80,6 @@ fn a_deadline_is_noticed_only_where_something_fails_for_it() {
     let reason = &report.reasons[0];
     assert_eq!(reason.cause, Cause::Failed, "{reason}");
     assert!(report.time > 60.into());
-    // `stn` knows it as soon as the drive is late.
+    // `stn` detects it as soon as the drive is late.
     assert!(scene.run("stn", &world, 1).time < Rational::from(51));
 }

@@ -1,5 +1,5 @@
-//! Where the present plan is expected to lead: for the plan that is made beside it, and for the one that is
-//! made ahead while something is late.
+//! Expected situation after the next steps of the current plan, for planning in the background and
+//! for planning in advance during a delay.
 
 use elbowroom::execute::Execution;
 use elbowroom::execution::{Command, Event, Passage, Request, World, WorldError};
@@ -10,14 +10,14 @@ use crate::beside::{Beside, Telling, Told, assert_has, seconds, settings, tellin
 use crate::lasting::scripted::{fact, pursue, task};
 use crate::scene::{Scene, irr};
 
-/// What is under way there: the actions and when they started.
+/// Returns the names and start times of the running actions.
 fn under_way(situation: &Situation) -> Vec<(String, String)> {
     let words = |it: &RunningAction| (it.action.name.clone(), it.start.to_decimal(1));
     situation.running.iter().map(words).collect()
 }
 
-/// A lasting run in which `r` fetches everything, one after the other: the first plan is there after 12
-/// seconds, and another one is asked for when the goal is given once more.
+/// Makes a persistent run: `r` fetches all items, one after the other. The first plan is ready
+/// after 12 seconds, and another one is requested when the goal is repeated.
 fn errands(script: Vec<(i64, Event)>, quarters: &[i64]) -> (Told, Vec<Situation>) {
     let goal = "(and (have book) (have cup) (have key))";
     let task = task("", goal);
@@ -40,7 +40,7 @@ fn the_goal_once_more() -> Event {
     pursue("problem", "(and (have cup) (have book) (have key))")
 }
 
-/// After a pause all that is left is late. It is still done one after the other.
+/// After a pause all remaining actions are late. They are still executed one after the other.
 #[test]
 fn what_is_late_after_a_pause_is_expected_in_its_order() {
     let (told, asked) = errands(
@@ -62,7 +62,8 @@ fn what_is_late_after_a_pause_is_expected_in_its_order() {
     assert_eq!(third[0].1, "50", "{third:?}");
 }
 
-/// What is late is expected to take a quarter longer than it has taken, and what comes after it not before.
+/// A late action is expected to take a quarter longer than its current age, and its successors
+/// follow it.
 #[test]
 fn what_waits_for_something_late_is_expected_after_it() {
     let (told, asked) = errands(vec![(23, the_goal_once_more())], &[2, 0, 0]);
@@ -74,7 +75,8 @@ fn what_waits_for_something_late_is_expected_after_it() {
     assert_eq!(second[0].1, "25.8", "{second:?}");
 }
 
-/// Someone walks and climbs until 26, for which there is a lift, too; somebody else dries what is washed.
+/// One robot walks and climbs until 26; there is a lift as an alternative. Meanwhile another one
+/// dries the washing.
 const DOMAIN: &str = "(define (domain late)
   (:requirements :durative-actions :timed-initial-literals)
   (:predicates (path) (half) (there) (open) (wet) (clean) (dry) (lamp))
@@ -95,7 +97,7 @@ const PROBLEM: &str = "(define (problem late) (:domain late)
 
 const PLAN: &str = "0.000: (walk) [10.000]\n0.000: (wash) [14.500]\n10.001: (climb) [10.000]\n14.501: (dry) [6.000]\n";
 
-/// That world, with actions that take as long as is said here.
+/// World with the given durations.
 struct Deviating<'w> {
     inner: Telling,
     durations: &'w [(&'static str, Rational)],
@@ -119,7 +121,7 @@ impl World for Deviating<'_> {
     }
 }
 
-/// A run in which walking takes for ever, and a plan a second.
+/// Runs with an endless walk and a planning time of one second.
 fn walking(
     durations: &[(&'static str, Rational)],
     script: Vec<(Rational, Event)>,
@@ -143,7 +145,7 @@ fn walking(
     (told, planner)
 }
 
-/// When the lift was begun.
+/// Returns the start time of the lift.
 #[track_caller]
 fn lift(told: &Told) -> f64 {
     let starts = told.notes.iter();
@@ -158,8 +160,8 @@ fn names(situation: &Situation) -> Vec<String> {
     names.map(|it| it.action.name.clone()).collect()
 }
 
-/// The washing is over, and the drying begins, while it is waited for the walk: as planned, or a moment
-/// earlier or later. The plan that was begun at the warning is there when it is needed.
+/// The washing ends and the drying begins during the wait for the walk, as planned or slightly
+/// earlier or later. The plan that was begun at the warning is ready when it is needed.
 #[test]
 fn what_ends_and_starts_as_planned_is_part_of_what_is_planned_ahead() {
     for milliseconds in [14_500, 14_503, 14_497, 14_550] {
@@ -174,15 +176,15 @@ fn what_ends_and_starts_as_planned_is_part_of_what_is_planned_ahead() {
     }
 }
 
-/// Somebody else is late, too, or a fact changes that nobody expected to: the planner is told where a plan
-/// will be needed then.
+/// If another action is late as well, or a fact changes unexpectedly, the planner receives the new
+/// expected situation.
 #[test]
 fn what_comes_otherwise_than_foreseen_is_foreseen_anew() {
     let (told, planner) = walking(&[("(wash)", seconds(30))], Vec::new());
     let desk = planner.desk();
     assert_eq!(names(&desk.ahead[1]), ["(walk)", "(wash)"]);
     assert_eq!(desk.asked[0], desk.ahead[1], "{:#?}", told.notes);
-    // The plan was begun a quarter of a second after the washing should have been over.
+    // The plan was begun a quarter of a second after the planned end of the washing.
     let began = lift(&told);
     assert!(began < 16.0, "{began}: {:#?}", told.notes);
 

@@ -1,4 +1,4 @@
-//! Within the guarantee nothing fails.
+//! No run fails within the guarantee.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -15,9 +15,9 @@ use elbowroom::sim::{SimWorld, WorldModel};
 use crate::scene::{Scene, read, runs};
 use crate::shared;
 
-/// In worlds where every open quantity stays in its interval, `guarded` always reaches the goal,
-/// never replans, and the judge accepts what was done. `ELBOWROOM_GUARANTEED_RUNS` says how many
-/// runs, if not these.
+/// In worlds with every parameter in its interval, `guarded` always reaches the goal and never
+/// replans, and the validator accepts the execution. `ELBOWROOM_GUARANTEED_RUNS` sets the number of
+/// runs.
 #[test]
 fn within_the_envelope_the_goal_is_always_reached() {
     let scenes = scenes();
@@ -45,8 +45,8 @@ fn within_the_envelope_the_goal_is_always_reached() {
     }
 }
 
-/// Deadlines, required concurrency, steps side by side, numbers that are read, numbers that change
-/// continuously, consumption left open; and the authors' robot deliveries, where they are there.
+/// Returns scenes with deadlines, required concurrency, concurrent steps, conditions on numbers,
+/// continuous changes and variable consumption, and the authors' robot deliveries, if available.
 fn scenes() -> Vec<(String, Scene)> {
     let mut scenes: Vec<(String, Scene)> = ["delivery", "match", "battery", "tank"]
         .into_iter()
@@ -68,7 +68,7 @@ fn scenes() -> Vec<(String, Scene)> {
     scenes
 }
 
-/// Table 2, with a plan for one of the orders.
+/// Returns the problem of table 2, with a plan for one of the orders.
 pub(super) fn one_order(capacity: &str, charge: &str) -> Scene {
     let problem = read("experiments/table2/problem.pddl");
     let problem = problem
@@ -82,7 +82,7 @@ pub(super) fn one_order(capacity: &str, charge: &str) -> Scene {
     scene
 }
 
-/// A plan for table 2: the steps of the base run side by side.
+/// Plan for table 2 with concurrent steps of the base.
 const ONE_ORDER: &str = "
       0.000: (collect rover store simple) [60]
      60.001: (go rover store press) [20]
@@ -97,8 +97,8 @@ const ONE_ORDER: &str = "
     390.005: (go rover mounting front) [20]
     410.006: (deliver rover front simple) [1]";
 
-/// The authors' problems with plans of the embedded planner: the durations of the authors' plans are
-/// not those of their domain.
+/// Returns the authors' problems with plans of the embedded planner. The durations of the authors'
+/// plans do not match their domain.
 fn robot_deliveries() -> Vec<(String, Scene)> {
     let Some(data) = shared::data() else {
         return Vec::new();
@@ -112,7 +112,7 @@ fn robot_deliveries() -> Vec<(String, Scene)> {
             text(&folder.join(path))
         };
         let mut scene = Scene::within(20_000, &domain, &file("problems_deadline/"), None);
-        // Intervals without an upper end are drawn from beyond every time-out.
+        // Values of unbounded intervals are drawn beyond every time-out.
         scene.settings.timeout = TimeoutRule::Off;
         scene.flow.timeout = TimeoutRule::Off;
         scenes.push((format!("robot delivery {name}"), scene));
@@ -124,7 +124,8 @@ fn text(path: &std::path::Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Every open quantity is anywhere in its interval of the first plan's envelope, all values alike.
+/// Returns a world with a uniform distribution of every parameter in its interval of the first
+/// plan's envelope.
 fn world_of_the_envelope(scene: &Scene) -> WorldModel {
     let prepared = scene.prepared("guarded");
     let envelope = prepared.envelope.as_ref().expect("a correct test");
@@ -152,8 +153,8 @@ fn world_of_the_envelope(scene: &Scene) -> WorldModel {
     scene.world(&sections)
 }
 
-/// The ends of an interval in thousandths, rounded inwards; three times the nominal value where
-/// there is no end.
+/// Returns the ends of an interval in thousandths, rounded inwards. An infinite end is replaced by
+/// three times the nominal value.
 fn ends(interval: &Interval, nominal: &Rational) -> (f64, f64) {
     let thousand = Rational::from(1000);
     let lower = interval.lower.value().expect("a correct test");
@@ -164,7 +165,7 @@ fn ends(interval: &Interval, nominal: &Rational) -> (f64, f64) {
     (from.to_f64(), to.to_f64())
 }
 
-/// The fluent that an action changes by the parameter.
+/// Returns the fluent that an action changes by the parameter.
 fn changed(action: &Action, parameter: usize) -> FluentId {
     let Body::Durative(body) = &action.body else {
         panic!("a correct test");

@@ -1,12 +1,12 @@
-//! From one plan to the next, while time passes and things go on.
+//! Transitions between plans during a run.
 
 use elbowroom::execution::run::{PlanningTime, RunningRule, Verdict};
 use elbowroom::num::Rational;
 
 use crate::scene::{EXECUTORS, Scene};
 
-/// Ends come in while a plan is made: they are no steps of the plan that is given up, and the new
-/// plan, which goes on with what runs, must not wait for them.
+/// Actions that end during planning are no steps of the abandoned plan. The new plan, which
+/// continues with the running actions, must not wait for them.
 #[test]
 fn what_ends_while_a_plan_is_made_has_ended_for_the_new_plan() {
     for name in ["delivery", "match"] {
@@ -35,8 +35,8 @@ fn what_ends_while_a_plan_is_made_has_ended_for_the_new_plan() {
     }
 }
 
-/// The door is being unlocked when the first drive does not start, so the new plan goes on with
-/// that. It was once taken for another of its steps that begin at once, and done again and again.
+/// The first drive does not start while the door is being unlocked, so the new plan continues with
+/// the unlocking. A bug once treated it as another step of the new plan and repeated it endlessly.
 #[test]
 fn what_runs_is_not_started_again_by_the_new_plan() {
     let scene = Scene::case("delivery");

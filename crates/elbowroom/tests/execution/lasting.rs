@@ -1,5 +1,5 @@
-//! Runs that go on when their goal is reached: what is asked of them while they run, and what comes
-//! of it. No clock and no files: a script says when what is asked or seen.
+//! Persistent runs, which continue after their goal is reached: their requests, and the results.
+//! There is no clock and no file; a script determines the times of requests and observations.
 
 mod amid;
 mod anew;

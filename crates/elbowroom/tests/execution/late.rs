@@ -1,5 +1,5 @@
-//! Actions that take longer than planned: a warning while there is room, a wait while a plan can bear
-//! it, and a plan without them when none can.
+//! Actions that take longer than planned: a warning while there is slack, a wait while the plan is
+//! feasible, and replanning without them afterwards.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -16,8 +16,8 @@ use elbowroom::sim::SimWorld;
 use crate::lasting::scripted::{Notes, Scripted};
 use crate::scene::{Scene, read};
 
-/// Walking and climbing take 20 of 26 seconds, and the envelope lets walking take 15.3125. There is also
-/// a slide, where nobody is on the path; who stops walking leaves it.
+/// Runs the walker. Walking and climbing take 20 of 26 seconds, and the envelope allows 15.3125 for
+/// walking. There is also a slide, which needs a free path; a cancelled walk frees the path.
 fn walking(seconds: Rational, watches_room: bool) -> (Report, Vec<String>) {
     let (scene, mut world) = walker(seconds);
     let notes = Notes::default();
@@ -104,8 +104,8 @@ fn what_no_plan_can_bear_has_failed_and_the_next_plan_does_without() {
     );
 }
 
-/// The envelope takes all of the six seconds that there are: the walk would have to start at once. On a
-/// clock no start is on time to the millisecond.
+/// The envelope uses all of the six seconds of slack, so the walk would have to start at once. On a
+/// clock no start is exactly on time.
 #[test]
 fn a_start_that_is_late_takes_from_the_room_and_needs_no_new_plan() {
     let (scene, _) = walker(Rational::from(10));
@@ -121,11 +121,11 @@ fn a_start_that_is_late_takes_from_the_room_and_needs_no_new_plan() {
         assert_eq!(done(&report), ["(walk)", "(climb)"]);
         assert!(scene.judged(&report).is_valid());
     }
-    // With a sixteenth of the room it would go on.
+    // With a sixteenth of the slack no new plan would be needed.
     assert!(run("5.8").replans > 0);
 }
 
-/// What is left of the envelope counts: who takes longer than that is given up.
+/// The remaining slack of the envelope counts: a longer walk makes the plan infeasible.
 #[test]
 fn after_a_start_that_is_late_the_envelope_still_counts() {
     let (scene, _) = walker(Rational::from(10));
@@ -140,7 +140,7 @@ fn after_a_start_that_is_late_the_envelope_still_counts() {
     assert!(run("15.5").replans > 0);
 }
 
-/// What must end by when, and when a new plan is made: in a world in which walking starts so late and takes so long.
+/// Runs in a world with this delay and duration of the walk. Returns the report and the warnings.
 fn warned(scene: &Scene, executor: &str, delay: &str, duration: &str) -> (Report, Vec<String>) {
     let model = scene.world(&format!(
         "[[delay]]\naction = \"walk\"\nconstant = {delay}\n\
@@ -159,8 +159,8 @@ fn warned(scene: &Scene, executor: &str, delay: &str, duration: &str) -> (Report
     (report, warnings.cloned().collect())
 }
 
-/// On a clock each start is a little late. What that takes from the room is no more than that: the walk may take what is
-/// left of the six seconds, less what the climb has of them.
+/// On a clock each start is slightly late. The slack is reduced by no more than the delay: the walk
+/// may use the rest of the six seconds, except the climb's share.
 #[test]
 fn a_start_that_is_next_to_nothing_late_takes_next_to_nothing_from_the_room() {
     let (scene, _) = walker(Rational::from(10));
@@ -178,7 +178,8 @@ fn a_start_that_is_next_to_nothing_late_takes_next_to_nothing_from_the_room() {
     }
 }
 
-/// Of what has used its room it is said until when there need not be a new plan, and that is when one is needed.
+/// A warning names the latest time at which no new plan is needed, and a new plan is needed at that
+/// time.
 #[test]
 fn a_warning_says_until_when_no_new_plan_is_needed() {
     let (scene, _) = walker(Rational::from(10));
@@ -211,7 +212,7 @@ fn a_warning_says_until_when_no_new_plan_is_needed() {
     }
 }
 
-/// A performer that is never heard, and says so when it is told to stop.
+/// Performer that sends no reports, except a confirmation of its cancellation.
 struct Mute<'a> {
     inner: SimWorld<'a>,
     name: &'static str,
@@ -250,8 +251,9 @@ impl World for Mute<'_> {
     }
 }
 
-/// Who never says that he has started may have done so when he was told to, until his action would be over: then its start
-/// is late, and there is too little time for it. The goal is still reached in time without it.
+/// An action without a start report may have started when it was commanded, until its planned end.
+/// After that its start is late, and the remaining time is too short for it. The goal is still
+/// reached in time without it.
 #[test]
 fn what_was_never_heard_to_start_is_waited_for_as_long_as_the_plan_can_bear_it() {
     let (scene, _) = walker(Rational::from(10));
@@ -281,7 +283,7 @@ fn what_was_never_heard_to_start_is_waited_for_as_long_as_the_plan_can_bear_it()
     }
 }
 
-/// A world that tells what has happened only now and then.
+/// World that delivers reports only at multiples of a period.
 struct Ticking<'a> {
     inner: SimWorld<'a>,
     every: Rational,
@@ -299,7 +301,7 @@ impl World for Ticking<'_> {
     }
 }
 
-/// A passage of time that goes on until then, whatever is observed meanwhile.
+/// Extends a passage of time until `until`, with all observations meanwhile.
 fn all_until(
     world: &mut SimWorld<'_>,
     mut passage: Passage,
@@ -313,7 +315,7 @@ fn all_until(
     Ok(passage)
 }
 
-/// A world at which somebody looks later than he said he would, by so much.
+/// World whose executor observes it later than planned, by this lag.
 struct Lagging<'a> {
     inner: SimWorld<'a>,
     lag: Rational,
@@ -331,8 +333,8 @@ impl World for Lagging<'_> {
     }
 }
 
-/// The envelope takes all the room that there is, so that the first of the welds would have to be inspected at once.
-/// A decision that is late takes from the room as a start does that is late.
+/// The envelope uses all of the slack, so the first of the welds would have to be inspected at
+/// once. A late decision reduces the slack like a late start.
 #[test]
 fn a_decision_that_is_late_takes_from_the_room_and_needs_no_new_plan() {
     let file = |name: &str| read(&format!("cases/match/{name}"));
@@ -358,15 +360,15 @@ fn a_decision_that_is_late_takes_from_the_room_and_needs_no_new_plan() {
             );
             assert!(scene.judged(&report).is_valid());
         }
-        // Of the twelve seconds to spare, more than all are lost.
-        // `live` is asked again when it has carried on in vain.
+        // The plan has twelve seconds of slack, and the delays exceed them. `live` requests a new
+        // plan after it has continued in vain.
         assert!(run("7").replans >= 1, "{executor}");
     }
 }
 
-/// Pumping fills the tank with as much as it takes time, and ten is planned, fifteen the most. When one hears that
-/// the walk has started late, the pump has run for longer: nothing is known of the rest then, although
-/// there is time for all of it.
+/// Pumping fills the tank in proportion to its duration: ten planned, and at most fifteen. When the
+/// late start of the walk is reported, the pump has run for longer. The feasibility of the
+/// remaining plan is then unknown, although there is time for it.
 #[test]
 fn a_start_that_is_late_is_no_excuse_for_what_has_left_its_interval() {
     let domain = "(define (domain tank)
@@ -402,8 +404,9 @@ fn a_start_that_is_late_is_no_excuse_for_what_has_left_its_interval() {
     assert_eq!(report.time, Rational::from(16), "{report:#?}");
 }
 
-/// In worlds without a clock, as in the papers' experiments, that is the end. That no plan exists is not
-/// proved: the running action might end at any moment. A fact that changes when the action is cancelled permits another plan.
+/// In worlds without a clock, as in the papers' experiments, the run ends. It is not proved that no
+/// plan exists, because the running action might end at any moment. A fact that changes when the
+/// action is cancelled permits another plan.
 #[test]
 fn where_room_is_not_watched_a_run_ends_when_no_plan_can_bear_what_is_late() {
     let (scene, mut world) = walker(Rational::from(1000));
@@ -426,8 +429,8 @@ fn where_room_is_not_watched_a_run_ends_when_no_plan_can_bear_what_is_late() {
     assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
 }
 
-/// At the warning the planner is told from where a plan will be needed, and when it is needed it is
-/// asked for that one, which may be ready by then.
+/// At the warning the planner receives the situation for which a plan will be needed. That plan is
+/// requested when it is needed, and may be ready by then.
 #[test]
 fn the_plan_that_will_be_needed_is_asked_for_ahead() {
     #[derive(Default)]

@@ -1,4 +1,4 @@
-//! `live:X` gives a plan up for a likelier one.
+//! `live:X` replaces a plan by a likelier one.
 
 use elbowroom::execution::Cause;
 use elbowroom::execution::run::Verdict;
@@ -6,7 +6,7 @@ use elbowroom::sim::WorldModel;
 
 use crate::scene::Scene;
 
-/// Two orders, the nearer of which has next to no time to spare.
+/// Returns a problem with two orders. The nearer one has almost no slack.
 fn hasty_order() -> (Scene, WorldModel) {
     let scene = Scene::two_orders("425", "800");
     let model = scene.world(
@@ -42,8 +42,8 @@ fn an_order_that_will_hardly_be_in_time_is_dropped_for_one_that_will() {
         assert_eq!(why.cause, Cause::Likelier, "{report:#?}");
     }
     println!("{prudent} against {patient} of {count}");
-    // Without looking at the odds, an order is dropped when it is late, and then it is too late for
-    // the other one.
+    // Without considering probabilities, an order is abandoned only when it is late, and then it is
+    // too late for the other one.
     assert!(
         prudent >= patient + 5,
         "{prudent} against {patient} of {count}"

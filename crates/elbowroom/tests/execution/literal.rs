@@ -1,4 +1,4 @@
-//! A plan executed to the letter: each action at its planned time, whatever comes of it.
+//! Literal execution of a plan: each action at its planned time, independent of results.
 
 use std::sync::{Arc, Mutex};
 
@@ -14,18 +14,18 @@ use elbowroom::sim::{SimWorld, WorldModel};
 
 use crate::scene::Scene;
 
-/// What came of it.
+/// Result of an execution.
 pub(crate) struct Outcome {
     pub(crate) report: Report,
-    /// What is true in the end.
+    /// True state at the end.
     pub(crate) truth: State,
-    /// Whether the goal is.
+    /// `true` if the goal holds.
     pub(crate) is_goal: bool,
-    /// What is believed when the last action has ended; `None` if something failed before.
+    /// Believed state when the last action has ended; `None` after a failure.
     pub(crate) belief: Option<State>,
 }
 
-/// Executes the plan of a scene to the letter, in the world where everything goes as planned.
+/// Executes the plan of a scene literally in a world without deviations.
 pub(crate) fn execute(scene: &Scene) -> Outcome {
     let model = WorldModel::as_planned();
     let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 0);
@@ -50,7 +50,7 @@ pub(crate) fn execute(scene: &Scene) -> Outcome {
     }
 }
 
-/// Looks at nothing in the plan.
+/// Preparer without any analysis of the plan.
 struct AsItIs;
 
 impl Preparer for AsItIs {
@@ -79,7 +79,7 @@ impl Preparer for AsItIs {
 }
 
 struct Literal {
-    /// What has not been started, the first one last.
+    /// Steps that have not been started, in reverse order.
     steps: Vec<(StepId, elbowroom::model::Step)>,
     left: usize,
     belief: Arc<Mutex<Option<State>>>,

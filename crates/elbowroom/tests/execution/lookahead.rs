@@ -1,12 +1,12 @@
-//! What is best in small worlds, on a clock.
+//! Optimal policies in small worlds on a clock.
 
 use elbowroom::execution::Ending;
 use elbowroom::execution::run::{Report, Verdict};
 
 use crate::scene::{Scene, read};
 
-/// A vase is to be fetched before somebody knocks it over. There is a slide, on which one mostly
-/// slips, and there are stairs.
+/// Returns a task: a vase is to be fetched before it is knocked over. There are stairs, and a slide
+/// on which the robot mostly slips.
 fn house() -> Scene {
     Scene::new(&domain(), &file("problem.pddl"), Some(SLIDE)).with_likelihoods(&slippery())
 }
@@ -21,7 +21,7 @@ fn domain() -> String {
     file("domain.pddl")
 }
 
-/// What follows the head of a file of ours.
+/// Returns the sections after the header of a file.
 fn sections(name: &str) -> String {
     let text = file(name);
     let (_, sections) = text.split_once("version = 1").expect("a correct test");
@@ -40,7 +40,7 @@ fn done(report: &Report) -> Vec<&str> {
     names.map(|name| name.trim_matches(['(', ')'])).collect()
 }
 
-/// The goal, with the first plan.
+/// Returns `true` if the goal was reached with the first plan.
 fn has_reached(report: &Report) -> bool {
     report.verdict == Verdict::GoalReached && report.replans == 0
 }
@@ -73,8 +73,8 @@ fn a_detour_that_is_not_in_the_plan_is_taken_where_it_is_likelier_to_work() {
     assert!(adaptable + count / 4 < lookahead, "{adaptable}");
 }
 
-/// Without likelihoods nothing speaks against the slide but that the table knows no durations: both
-/// ways are certain.
+/// Without likelihoods both ways are certain. The table has no durations, so it does not prefer
+/// either.
 #[test]
 fn where_everything_is_certain_every_way_is_as_good() {
     let scene = Scene::new(&domain(), &file("problem.pddl"), Some(SLIDE));
@@ -98,7 +98,7 @@ fn what_the_plan_did_not_need_is_done_when_it_is_needed_without_a_new_plan() {
     assert_eq!(report.replans, 1, "{:?}", report.reasons);
 }
 
-/// Somebody has fetched the vase, and may put it back.
+/// Another agent has fetched the vase, and may put it back.
 #[test]
 fn what_is_under_way_is_let_go_where_its_end_is_not_worth_waiting_for() {
     let fleeting = format!("{}\n[facts.fetched]\nbecomes_false = 0.1\n", slippery());
@@ -109,7 +109,7 @@ fn what_is_under_way_is_let_go_where_its_end_is_not_worth_waiting_for() {
     assert_eq!(report.time, 5.into());
     let endings: Vec<_> = report.executed.iter().map(|it| it.ending.clone()).collect();
     assert_eq!(endings, [Some(Ending::Cancelled)]);
-    // `adaptable` waits for what it has begun.
+    // `adaptable` waits for the end of a running action.
     assert_eq!(
         scene.run("adaptable", &scene.world(world), 0).time,
         10.into()
@@ -124,7 +124,7 @@ fn a_dead_end_is_a_reason_to_ask_for_a_plan_and_there_is_none() {
     assert_eq!(report.verdict, Verdict::Unsolvable, "{report:#?}");
 }
 
-/// A problem of paper 2's experiments with one of its likelihood files.
+/// Returns a problem of paper 2's experiments with one of its likelihood files.
 fn machines(name: &str, case: &str) -> Scene {
     let file = |name: &str| read(&format!("experiments/olisipo/{name}"));
     let likelihoods = file(&format!("{name}-{case}.toml"));
@@ -137,8 +137,9 @@ fn machines(name: &str, case: &str) -> Scene {
     Scene::new(&domain, &problem, None).with_likelihoods(sections)
 }
 
-/// The machines of paper 2, with starts that fail. In AF3 p4 the likelihoods say that a machine may
-/// become maintained by itself, which here it never does: whoever waits for it, waits for ever.
+/// The machines of paper 2, with starts that fail. By the likelihoods of AF3 p4 a machine may
+/// become maintained spontaneously, which never happens here. An executor that waits for it would
+/// never end.
 #[test]
 fn the_machines_of_paper_2_are_maintained_on_a_clock() {
     let failing = "[[failure]]\naction = \"*\"\nwhen = \"start\"\nprobability = 0.25\n";
@@ -162,8 +163,8 @@ fn the_machines_of_paper_2_are_maintained_on_a_clock() {
     }
 }
 
-/// By the likelihoods the goal may come about by itself, which never happens. The world has no table, as an action of it
-/// may take no time.
+/// By the likelihoods the goal may come about spontaneously, which never happens. The world has no
+/// table, because one of its actions may have duration 0.
 #[test]
 fn chance_change_that_never_happens_is_not_awaited() {
     let idle = |name: &str, effect: &str| {

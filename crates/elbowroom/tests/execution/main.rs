@@ -1,4 +1,4 @@
-//! Whole runs: executors, worlds, planner and envelopes together.
+//! Complete runs: executors, worlds, planner and envelopes together.
 
 mod adaptable;
 mod amounts;

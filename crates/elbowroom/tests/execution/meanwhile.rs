@@ -1,5 +1,5 @@
-//! What is asked and happens at random while plans are made, or made ready, beside a run; and what must hold
-//! whatever that is.
+//! Random requests and events during planning or preparation in the background, and the invariants
+//! of all such runs.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -14,23 +14,23 @@ use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored};
 use crate::beside::{Told, seconds};
 use crate::lasting::scripted::{Dice, abandon, fact, pursue};
 
-/// What can be fetched.
+/// Items that can be fetched.
 pub(crate) const ITEMS: [&str; 3] = ["book", "cup", "key"];
 
-/// What is random about a run.
+/// Random choices of a run.
 pub(crate) struct Fate {
     pub(crate) script: Vec<(Rational, Event)>,
-    /// How long plans take.
+    /// Planning times.
     pub(crate) lengths: Vec<Rational>,
-    /// By how many quarters durations differ.
+    /// Deviations of durations, in quarters.
     pub(crate) quarters: Vec<i64>,
-    /// For what else is left to chance.
+    /// Random numbers for further choices.
     pub(crate) dice: Dice,
 }
 
 impl Fate {
-    /// Goals that come and go, pauses, and, with odd seeds, somebody who takes things away. The script
-    /// ends with a goal that can be reached, called `last`.
+    /// Draws goals that are added and abandoned, pauses, and, with odd seeds, items that are taken
+    /// away. The script ends with a reachable goal called `last`.
     pub(crate) fn of(task: &Task, seed: u64) -> Self {
         let mut dice = Dice(seed);
         let mut script = Vec::new();
@@ -44,8 +44,8 @@ impl Fate {
             };
             script.push((Rational::new(dice.small(600), 10), event));
         }
-        // Somebody takes things away, and brings them back: in every other run, as what others do is
-        // nothing that a plan could be judged with.
+        // Items are taken away and returned in every other run. The validator cannot check a plan
+        // with changes by others.
         for _ in 0..(seed % 2) * 6 {
             let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
             let here = fact(task, &format!("(here {item})"), dice.below(2) == 0);
@@ -54,7 +54,7 @@ impl Fate {
         for item in ITEMS {
             script.push((seconds(61), fact(task, &format!("(here {item})"), true)));
         }
-        // However it went, it goes on in the end.
+        // The run always resumes in the end.
         script.push((seconds(61), Event::Asked(Request::Resume)));
         script.push((seconds(62), pursue("last", "(and (have book) (have key))")));
         let lengths = (0..12).map(|_| Rational::new(dice.small(150), 10));
@@ -69,8 +69,8 @@ impl Fate {
     }
 }
 
-/// The last goal was reached, what was executed is a plan by the judge's rules where nobody else did
-/// anything, and nothing was started in a pause. `name` says which run it is.
+/// Checks that the last goal was reached, that nothing was started in a pause, and that the
+/// validator accepts the execution, unless others have changed facts. `name` identifies the run.
 pub(crate) fn assert_in_order(task: &Task, told: &Told, (seed, name): (u64, &str)) {
     let notes = &told.notes;
     let is_last = |it: &String| {
@@ -95,12 +95,12 @@ pub(crate) fn assert_in_order(task: &Task, told: &Told, (seed, name): (u64, &str
     }
 }
 
-/// Whether a line of a record tells the world to start something.
+/// Returns `true` if a line of a record is a start command.
 pub(crate) fn is_start(line: &str) -> bool {
     line.contains("\"event\":\"command\"") && line.contains("\"type\":\"start\"")
 }
 
-/// The record leads an execution like that which made it to the same decisions.
+/// Checks that an execution from the record has the same decisions as the original one.
 pub(crate) fn assert_plays_back(
     task: &Arc<Task>,
     told: &Told,

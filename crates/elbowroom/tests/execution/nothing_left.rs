@@ -1,4 +1,4 @@
-//! The end of a run: nothing is left running, nothing is thrown away, and a dead end has a reason.
+//! End of a run: no action keeps running, no event is lost, and a dead end has a reason.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -15,7 +15,7 @@ use serde_json::json;
 
 use crate::scene::{EXECUTORS, Scene};
 
-/// Two robots that have nothing to do with each other, and a lamp that somebody may put out.
+/// Two independent robots, and a lamp that may be switched off.
 const ROBOTS: &str = "(define (domain robots)
     (:requirements :durative-actions :negative-preconditions :timed-initial-literals)
     (:predicates (lamp) (carried) (picked) (shelved) (open) (lit))
@@ -38,7 +38,7 @@ fn robots(init: &str, goal: &str, plan: &str) -> Scene {
 
 const BOTH: &str = "0: (carry) [100]\n0: (pick) [10]";
 
-/// A run that explains itself, and ends when it is asked to.
+/// Runs with explanations, until the run is asked to end.
 fn run(
     scene: &Scene,
     executor: &str,
@@ -56,7 +56,7 @@ fn run(
         .run_in(world)
 }
 
-/// A run in a simulated world, with what is running in it when the run is over.
+/// Runs in a simulated world. Returns the report, and the number of running actions at the end.
 fn simulated(scene: &Scene, executor: &str, model: &WorldModel, plans: bool) -> (Report, usize) {
     let mut world = SimWorld::new(Arc::clone(&scene.task), model, 0);
     let report = if plans {
@@ -96,7 +96,7 @@ fn endings(report: &Report) -> Vec<(&str, Option<&str>)> {
 #[test]
 fn a_failed_pick_does_not_cancel_the_other_robots_drive() {
     let scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
-    // It fails before it has started, the first time.
+    // The first attempt fails before its start.
     let model =
         scene.world("[[failure]]\naction = \"pick\"\nprobability = 0.5\nwhen = \"start\"\n");
     for executor in EXECUTORS.iter() {
@@ -113,7 +113,7 @@ fn a_failed_pick_does_not_cancel_the_other_robots_drive() {
             assert_eq!(carries, [&("(carry)", Some("succeeded"))], "{executor}");
             replans += report.replans;
         }
-        // Those that try again by themselves need no new plan.
+        // Executors with retries need no new plan.
         let retries = ["esterel", "adaptable", "lookahead"].contains(executor);
         assert!(replans > 0 || retries, "{executor}");
     }
@@ -135,7 +135,7 @@ fn when_the_planner_fails_what_runs_is_cancelled() {
             all.iter().all(|(_, ending)| ending.is_some()),
             "{executor}: {all:?}"
         );
-        // Those that go by orders first do what is left of the plan.
+        // Executors based on orders first execute the remaining steps of the plan.
         let gives_up = !["adaptable", "lookahead"].contains(executor);
         let is_cancelled = all.contains(&("(carry)", Some("cancelled")));
         assert!(is_cancelled || !gives_up, "{executor}: {all:?}");
@@ -158,7 +158,7 @@ fn so_it_is_when_the_time_is_up_or_there_were_too_many_plans() {
     assert_eq!(endings(&report)[0], ("(carry)", Some("cancelled")));
 }
 
-/// The parcel is neither on the shelf nor in the hand: since the pick broke off.
+/// The failed pick has left the parcel neither on the shelf nor in the hand.
 #[test]
 fn a_dead_end_says_what_can_never_become_true_again_and_since_when() {
     let scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
@@ -192,7 +192,7 @@ fn a_dead_end_may_come_from_an_observation_or_a_timed_initial_or_be_there_from_t
     };
     assert_eq!(reason.behind, [seen]);
 
-    // Nobody tells `esterel` that the shop closes.
+    // `esterel` does not monitor the closing of the shop.
     let plan = "0: (pick) [10]\n10.001: (sort) [10]";
     let init = "(shelved) (open) (lamp) (at 25 (not (open)))";
     let scene = robots(init, "(and (picked) (lit))", plan);
@@ -212,7 +212,7 @@ fn a_dead_end_may_come_from_an_observation_or_a_timed_initial_or_be_there_from_t
     assert_ne!(report.verdict, Verdict::GoalReached);
 }
 
-/// At each moment at which it is asked, in every executor's run.
+/// The run is asked to end at each possible time, with every executor.
 #[test]
 fn a_run_that_is_asked_to_end_does_so_in_order_and_can_be_played_back() {
     let scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
@@ -243,7 +243,7 @@ fn a_run_that_is_asked_to_end_does_so_in_order_and_can_be_played_back() {
             assert!(world.truth().running().is_empty(), "{executor}, {limit}");
             let open = report.executed.iter().filter(|it| it.ending.is_none());
             assert_eq!(open.count(), 0, "{executor}, {limit}: {report:#?}");
-            // A late success is one.
+            // A late success still counts.
             assert!(text.contains("\"verdict\":\"interrupted\""), "{text}");
 
             let stored = Stored::read(&text).expect("a correct test");
@@ -265,7 +265,7 @@ fn a_run_that_is_asked_to_end_does_so_in_order_and_can_be_played_back() {
     }
 }
 
-/// A world in which cancelled actions need a while to stop, or never do.
+/// World whose cancelled actions stop with a delay, or never.
 struct Sluggish<'a> {
     inner: SimWorld<'a>,
     stops_after: Option<i64>,
@@ -331,7 +331,7 @@ fn what_is_cancelled_at_the_end_has_a_moment_to_stop_and_no_more() {
     }
 }
 
-/// A world that never says that an action has failed.
+/// World that never reports a failure.
 struct Silent<'a>(SimWorld<'a>);
 
 impl World for Silent<'_> {
@@ -353,7 +353,8 @@ impl World for Silent<'_> {
     }
 }
 
-/// The lamp goes out while somebody sorts: no plan can go on with that, but any with the carrying.
+/// The lamp goes out during sorting. Every plan can continue with the carrying, and none with the
+/// sorting.
 #[test]
 fn what_can_no_longer_succeed_is_not_kept() {
     let plan = "0: (carry) [100]\n0: (sort) [10]";

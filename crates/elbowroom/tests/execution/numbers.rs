@@ -1,5 +1,5 @@
-//! Executors start actions only while conditions on numbers and duration bounds hold. The validator judges each run
-//! ([`Scene::run`]).
+//! Executors start actions only if conditions on numbers and duration bounds hold. The validator
+//! checks each run ([`Scene::run`]).
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::scene::{Scene, runs};
 
-/// Executors that order a plan's actions by facts, with numbers read at the starts.
+/// Executors that order a plan's actions by facts, and check numbers at the starts.
 const EXECUTORS: [&str; 3] = ["adaptable", "lookahead", "fixed:10"];
 
 /// Those of them that choose orders.
@@ -28,7 +28,7 @@ fn scene(actions: &str, initial: &str, goal: &str, plan: &str) -> Scene {
     Scene::new(&domain, &problem, Some(plan))
 }
 
-/// The times at which the actions started in a run that reached its goal without another plan.
+/// Returns the start times of the actions in a run that reached its goal without replanning.
 fn starts(scene: &Scene, executor: &str) -> Vec<(String, String)> {
     let report = scene.run(executor, &scene.world(""), 1);
     assert_eq!(
@@ -178,11 +178,11 @@ fn comparison_of_undefined_fluent_does_not_hold() {
     }
 }
 
-/// An action of a random problem.
+/// Action of a random problem.
 struct Draft {
     duration: String,
     effects: String,
-    /// With the words before them.
+    /// Conditions with their time specifiers.
     conditions: Vec<String>,
     step: String,
 }
@@ -193,7 +193,7 @@ fn pick<'a>(rng: &mut ChaCha8Rng, from: &[&'a str]) -> &'a str {
     from.choose(rng).expect("something to choose from")
 }
 
-/// A comparison that may hold.
+/// Returns a comparison that may hold.
 fn comparison(rng: &mut ChaCha8Rng) -> String {
     let left = pick(rng, &FLUENTS);
     let right = match rng.random_range(0..5) {
@@ -209,7 +209,7 @@ fn comparison(rng: &mut ChaCha8Rng) -> String {
     }
 }
 
-/// An effect on a number.
+/// Returns an effect on a number.
 fn effect(rng: &mut ChaCha8Rng) -> String {
     let fluent = pick(rng, &FLUENTS);
     if rng.random_range(0..4) == 0 {
@@ -251,7 +251,8 @@ fn draft(rng: &mut ChaCha8Rng, number: usize, time: &mut f64) -> Draft {
     }
 }
 
-/// A random problem with a valid plan; conditions are added as long as the plan stays valid.
+/// Returns a random problem with a valid plan; conditions are added as long as the plan stays
+/// valid.
 fn random_scene(seed: u64) -> Option<Scene> {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let mut time = 0.0;
@@ -309,7 +310,7 @@ fn made(drafts: &[Draft], initial: &str) -> Scene {
     Scene::within(50, &domain, &problem, Some(&plan))
 }
 
-/// In worlds that deviate, too. `ELBOWROOM_NUMBER_SEEDS` is the number of seeds.
+/// The worlds include deviations. `ELBOWROOM_NUMBER_SEEDS` is the number of seeds.
 #[test]
 fn no_start_violates_conditions_on_numbers() {
     let worlds = [
@@ -332,6 +333,6 @@ fn no_start_violates_conditions_on_numbers() {
             }
         }
     }
-    // Of nine runs each, most reach the goal.
+    // There are nine runs for each, and most reach the goal.
     assert!(drawn > 40 && reached > drawn * 7, "{reached} in {drawn}");
 }

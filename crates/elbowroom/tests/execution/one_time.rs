@@ -1,5 +1,5 @@
-//! What happens at one time is one group, in the simulated world, in what is believed of it, and
-//! for the judge.
+//! Simultaneous happenings are one group for the simulated world, for the believed state, and for
+//! the validator.
 
 use std::fmt::Write as _;
 
@@ -41,7 +41,7 @@ fn reaches_the_goal(scene: &Scene) {
     assert!(verdict.is_valid(), "{verdict:?}");
 }
 
-/// Every executor reaches the goal by a valid plan where nothing deviates.
+/// Checks that every executor reaches the goal by a valid plan without deviations.
 fn every_execution_is_valid(scene: &Scene) {
     for executor in EXECUTORS.iter() {
         let report = scene.run(executor, &scene.world(""), 0);
@@ -51,7 +51,7 @@ fn every_execution_is_valid(scene: &Scene) {
     }
 }
 
-/// The plan is not valid, so nothing is started.
+/// Checks that the plan is invalid, so that nothing was started.
 fn is_refused(report: &Report) {
     let Verdict::NoPlan { why, .. } = &report.verdict else {
         panic!("{report:#?}");
@@ -135,7 +135,7 @@ const MATCH: &str = "
 fn a_match_that_burns_out_just_as_the_mending_ends_is_enough() {
     let plan = "0: (light) [8]\n3: (mend) [5]";
     reaches_the_goal(&scene(MATCH, "(p3)", "(p1)", plan));
-    // In whichever order they were started.
+    // For any order of the starts.
     let short = MATCH.replace("?duration 8", "?duration 2");
     let plan = "0: (light) [2]\n0.5: (mend) [1.5]";
     let short = short.replace("?duration 5", "?duration 1.5");
@@ -164,7 +164,7 @@ fn a_strict_comparison_may_become_an_equality_at_the_end() {
         "(p0)",
         "0: (drain) [5]",
     ));
-    // One tick more, and it has failed.
+    // With one more tick, it fails.
     let late = scene(
         &drain.replace("(> (x) 0)", "(> (+ (x) 10) 0)"),
         "",
@@ -174,8 +174,8 @@ fn a_strict_comparison_may_become_an_equality_at_the_end() {
     assert_ne!(execute(&late).report.verdict, Verdict::GoalReached);
 }
 
-/// What fails while numbers move is noticed at the next multiple of the resolution, not when the
-/// executor looks.
+/// A violation during continuous changes is detected at the next multiple of the resolution,
+/// independent of the executor's observations.
 #[test]
 fn a_number_that_leaves_its_bounds_and_comes_back_has_left_them() {
     let actions = "
@@ -204,7 +204,7 @@ fn an_action_of_duration_0_takes_no_time() {
     assert_eq!(executed[0].step.start, Rational::from(2));
 }
 
-/// One end gives what the other takes; neither reads it.
+/// One end increases what the other decreases; neither reads it.
 #[test]
 fn two_ends_and_a_start_at_one_time_count_together() {
     let actions = "
@@ -219,7 +219,7 @@ fn two_ends_and_a_start_at_one_time_count_together() {
     for plan in [
         "0: (watch) [5]\n1: (take) [2]\n1: (give) [2]",
         "0: (watch) [5]\n1: (give) [2]\n1: (take) [2]",
-        // The start at 3 takes what the end at 3 gives.
+        // The start at 3 consumes what the end at 3 produces.
         "0: (watch) [5]\n1: (give) [2]\n3: (lend) [1]",
     ] {
         reaches_the_goal(&scene(actions, "", "(p0)", plan));
@@ -249,7 +249,7 @@ fn a_timed_initial_may_end_what_just_ends_and_open_what_just_starts() {
     assert_ne!(outcome.report.verdict, Verdict::GoalReached);
 }
 
-/// Random conditions, effects and plans, on a grid so coarse that most things coincide.
+/// Random conditions, effects and plans, on a grid so coarse that most happenings coincide.
 #[test]
 fn worlds_and_beliefs_agree_with_the_judge_on_random_plans() {
     let (mut valid, mut whole, mut invalid) = (0, 0, 0);
@@ -265,8 +265,8 @@ fn worlds_and_beliefs_agree_with_the_judge_on_random_plans() {
                 let outcome = execute(&scene);
                 let report = &outcome.report;
                 assert_eq!(report.verdict, Verdict::GoalReached, "{}", about());
-                // The run is over when no timed initial changes any more what the goal reads. The
-                // judge tells of the state after all of them.
+                // The run ends when no further timed initial affects the goal. The validator
+                // reports the state after all of them.
                 let timed = scene.task.timed();
                 if timed.iter().all(|it| it.time <= judged.makespan) {
                     whole += 1;
@@ -280,11 +280,11 @@ fn worlds_and_beliefs_agree_with_the_judge_on_random_plans() {
                 assert!(again.is_valid(), "{}\n{again:?}", about());
             }
             validate::Verdict::Invalid(violation) => {
-                // Worlds do not ask how far apart things are.
+                // Worlds do not check separations.
                 if matches!(violation.mistake, Mistake::Condition { .. }) {
                     invalid += 1;
                     let outcome = execute(&scene);
-                    // The goal may hold all the same.
+                    // The goal may still hold.
                     let is_done = outcome.belief.is_some();
                     let is_reached = outcome.report.verdict == Verdict::GoalReached;
                     assert!(!(is_done && is_reached), "{}", about());

@@ -1,4 +1,4 @@
-//! Executors and what timed initials open and close; and what is left open together.
+//! Windows of timed initials, and several parameters.
 
 use elbowroom::execution::run::Verdict;
 use elbowroom::num::Rational;
@@ -14,7 +14,7 @@ const SHIPPING: &str = "(define (domain shipping)
     (:durative-action ship :parameters () :duration (= ?duration 6)
       :condition (and (at start (packed)) (over all (van))) :effect (at end (shipped))))";
 
-/// `fixed:X` once shipped at 4.001, while the van comes at 20.
+/// `fixed:X` once shipped at 4.001, although the van comes at 20.
 #[test]
 fn nobody_ships_before_the_van_is_there() {
     let problem = "(define (problem p) (:domain shipping)
@@ -52,11 +52,10 @@ fn a_run_ends_after_the_last_timed_initial_that_the_goal_depends_on() {
     }
 }
 
-/// At 20 what was packed before is thrown away.
+/// At 20 earlier packages are thrown away.
 ///
-/// The published baselines start at once, pack in 1 instead of 4, and have made all the plans that
-/// they may make before it is 20. They fail, but they do not take what will be thrown away for a
-/// success.
+/// The published baselines start at once, pack in 1 instead of 4, and have used up their replans
+/// before 20. They fail, but they must not count the package that will be thrown away as a success.
 #[test]
 fn what_a_timed_initial_will_undo_is_done_again() {
     let problem = "(define (problem p) (:domain shipping)

@@ -1,11 +1,11 @@
-//! Whole problems of others in worlds where starts fail.
+//! Benchmark problems in worlds with failing starts.
 
 use elbowroom::execution::run::Verdict;
 
 use crate::scene::Scene;
 use crate::shared;
 
-/// The executors of paper 2.
+/// Executors of paper 2.
 const BY_LIKELIHOODS: &[&str] = &["adaptable", "esterel", "lookahead"];
 
 /// Robot deliveries with batteries and deadlines, and rovers with and without energy.

@@ -1,5 +1,5 @@
-//! `?duration` is the planned duration until an action ends, for envelopes, the simulator, executors and
-//! the validator of executed plans.
+//! `?duration` is the planned duration until an action ends, for envelopes, the simulator,
+//! executors and the validator of executed plans.
 
 use elbowroom::answers::Unwatched;
 use elbowroom::answers::envelope::{EnvelopeRequest, envelope};
@@ -32,7 +32,7 @@ fn scene(condition: &str, effects: &str, goal: &str) -> Scene {
     scene
 }
 
-/// The upper end of the only interval.
+/// Returns the upper end of the only interval.
 fn upper(scene: &Scene) -> End {
     let mut request = EnvelopeRequest::new(&scene.task, scene.plan.clone());
     request.timeout = TimeoutRule::Off;
@@ -42,7 +42,8 @@ fn upper(scene: &Scene) -> End {
     envelope.intervals()[0].upper.clone()
 }
 
-/// Returns `true` if a run reaches the goal in a world with this duration of `(fill)`. The validator must agree.
+/// Returns `true` if a run reaches the goal in a world with this duration of `(fill)`. The
+/// validator must agree.
 fn works(scene: &Scene, executor: &str, takes: &Rational) -> bool {
     let model = scene.world(&format!(
         "resolution = 0.0001\n[[duration]]\naction = \"fill\"\nconstant = {}\n",
@@ -54,7 +55,8 @@ fn works(scene: &Scene, executor: &str, takes: &Rational) -> bool {
     is_reached
 }
 
-/// The envelope ends at `limit`, runs up to there reach the goal, and longer ones do not.
+/// Checks that the envelope ends at `limit`, that runs up to there reach the goal, and that longer
+/// ones do not.
 fn assert_limit(scene: &Scene, limit: Option<&Rational>) {
     let expected = limit.cloned().map_or(End::Infinite, End::Closed);
     assert_eq!(upper(scene), expected);

@@ -1,5 +1,5 @@
-//! Plans that are made ready while the run goes on: by a preparer that takes as long as it is told to, by
-//! the world's time.
+//! Preparation of plans in the background of a run, by a preparer that takes a given time of the
+//! world.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
         .lasting(true)
 }
 
-/// A run by `guarded`.
+/// Makes a run by `guarded`.
 fn run(task: &Arc<Task>, end: i64, script: Vec<(i64, Event)>, planner: &Beside) -> Told {
     let script = script.into_iter();
     let script = script.map(|(time, event)| (seconds(time), event));
@@ -37,7 +37,8 @@ fn run(task: &Arc<Task>, end: i64, script: Vec<(i64, Event)>, planner: &Beside) 
     told(execution, task, (end, script.collect()), planner, &[])
 }
 
-/// The running plan begins what was committed while the new one is made ready, and that goes on in it.
+/// During the preparation of the new plan, the current plan starts committed actions, which
+/// continue in the new plan.
 #[test]
 fn what_is_begun_while_a_plan_is_made_ready_is_part_of_it() {
     let task = task("", "(and (have book) (have cup))");
@@ -51,7 +52,7 @@ fn what_is_begun_while_a_plan_is_made_ready_is_part_of_it() {
             "0: start",
             "2: plan",
             "6: the plan is there",
-            // Its executor is that of the first plan, and the second job is part of both.
+            // The executor of the first plan starts it, and the second job is part of both plans.
             "10: start",
             "26: start (fetch r key)",
             "36: rest: goal-reached",
@@ -60,7 +61,7 @@ fn what_is_begun_while_a_plan_is_made_ready_is_part_of_it() {
     assert_eq!(told.report.starts, 3, "{:#?}", told.notes);
 }
 
-/// What the new plan does not have, the running plan does not begin any more.
+/// The current plan starts no actions that the new plan does not contain.
 #[test]
 fn what_the_new_plan_does_not_have_is_not_begun_any_more() {
     let task = task("", "(have book)");
@@ -77,7 +78,7 @@ fn what_the_new_plan_does_not_have_is_not_begun_any_more() {
     assert_eq!(told.report.starts, 2, "{:#?}", told.notes);
 }
 
-/// What is asked and reported meanwhile is taken in at once.
+/// Requests and reports during the preparation are processed at once.
 #[test]
 fn what_is_asked_and_reported_while_a_plan_is_made_ready_is_taken_in_at_once() {
     let task = task("", "(have book)");
@@ -100,8 +101,8 @@ fn what_is_asked_and_reported_while_a_plan_is_made_ready_is_taken_in_at_once() {
     }
 }
 
-/// Something unexpected all the time does not keep the run from acting: after two more attempts, the
-/// executor is told.
+/// The run acts even if unexpected events occur all the time: after two more attempts, the executor
+/// gets the plan.
 #[test]
 fn what_happens_all_the_time_does_not_starve_the_run() {
     let task = task("", "(and (have book) (have cup))");
@@ -115,7 +116,7 @@ fn what_happens_all_the_time_does_not_starve_the_run() {
     assert_eq!(planner.desk().readied, 3, "{:#?}", told.notes);
 }
 
-/// The rest of the running plan for a goal that was added is made ready while it goes on.
+/// The remaining plan is prepared for an added goal while it is executed.
 #[test]
 fn a_plan_that_is_kept_goes_on_while_it_is_made_ready() {
     let task = task("", "(and (have book) (have cup))");
@@ -147,7 +148,7 @@ fn executor(seed: u64) -> &'static str {
     EXECUTORS[usize::try_from(seed % 6).expect("small")]
 }
 
-/// A run with plans that take so long to be made ready.
+/// Runs a random script with these preparation times.
 fn random_run(
     task: &Arc<Task>,
     seed: u64,
@@ -165,8 +166,8 @@ fn random_run(
     (told, planner)
 }
 
-/// Made ready beside the run without taking any time, a plan leads to what it leads to when it is waited
-/// for: all that differs is that it is said to be ready.
+/// A preparation in the background that takes no time has the same result as one in the foreground,
+/// except the report that the plan is ready.
 #[test]
 fn plans_that_are_ready_at_once_lead_to_the_same_as_plans_that_are_waited_for() {
     let (mut ready, mut records) = (0, Vec::new());
@@ -187,9 +188,9 @@ fn plans_that_are_ready_at_once_lead_to_the_same_as_plans_that_are_waited_for() 
     assert!(ready > 500, "{ready}");
 }
 
-/// Whatever is asked and happens, however long plans take to be made and made ready: what is executed is a
-/// plan by the judge's rules, nothing is started in a pause, the goals are reached in the end, and the
-/// record plays back to the same decisions.
+/// For all requests, events, planning times and preparation times, the validator accepts the
+/// execution, nothing is started in a pause, the goals are reached in the end, and the record
+/// replays with the same decisions.
 #[test]
 fn whatever_happens_while_plans_are_made_ready_what_is_done_is_valid_and_plays_back() {
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();

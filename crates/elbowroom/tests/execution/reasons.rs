@@ -1,4 +1,4 @@
-//! What executors do, and why they say they do it.
+//! Decisions of executors, and the reasons that they give.
 
 use elbowroom::execution::run::{RunningRule, Verdict};
 use elbowroom::execution::{Cause, Ending};
@@ -28,8 +28,8 @@ fn when_everything_goes_as_planned_so_does_every_executor() {
     }
 }
 
-/// The flare burns for 15 instead of 30: the second inspection does not fit in (required
-/// concurrency), and there is no second flare.
+/// The flare burns for 15 instead of 30: there is too little time for the second inspection
+/// (required concurrency), and there is no second flare.
 #[test]
 fn work_that_must_lie_within_a_burning_flare_fails_with_it() {
     let scene = Scene::case("match");
@@ -54,13 +54,13 @@ fn a_drive_that_outlives_its_interval_is_noticed_while_it_runs() {
     assert_eq!(reason.action.as_deref(), Some("(drive rover depot shelf)"));
     let allowed = reason.allowed.as_ref().unwrap();
     let since = reason.since.as_ref().unwrap();
-    // It started at 0, so it outlived its interval when the interval ended.
+    // It started at 0, so it exceeded its interval when the interval ended.
     assert_eq!(Some(since), allowed.upper.value());
     assert!(report.time < 55.into(), "{report:#?}");
 }
 
-/// Nominally everything after the drive takes 20.003, and the counter closes at 60: until 39.996
-/// the parcel can still be in time, and `live` does not give up before.
+/// Nominally everything after the drive takes 20.003, and the counter closes at 60. The parcel can
+/// be in time until 39.996, and `live` does not abandon the plan before.
 #[test]
 fn live_gives_up_exactly_when_the_deadline_is_out_of_reach() {
     let scene = Scene::case("delivery");
@@ -123,7 +123,7 @@ fn a_failed_action_is_made_up_for() {
 #[test]
 fn what_runs_may_be_cancelled_awaited_or_kept() {
     let mut scene = Scene::case("delivery");
-    // The drive is late while somebody else unlocks the office, which takes long.
+    // The drive is late during the long unlocking of the office.
     let model = scene.world(
         "[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 6\n\
          [[duration]]\naction = \"unlock\"\nconstant = 7\n",
@@ -153,7 +153,7 @@ fn what_runs_may_be_cancelled_awaited_or_kept() {
     }
 }
 
-/// Someone carries the parcel to the office: nothing is left to do.
+/// Somebody else carries the parcel to the office, so no step remains.
 #[test]
 fn what_happens_by_itself_changes_the_plan() {
     let scene = Scene::case("delivery");
@@ -163,7 +163,7 @@ fn what_happens_by_itself_changes_the_plan() {
     assert_eq!(report.verdict, Verdict::Unsolvable);
     let irrelevant = "[[event]]\nfact = \"(unlocked shelf)\"\nbecomes = true\nconstant = 5\n";
     assert_eq!(scene.run("guarded", &scene.world(irrelevant), 0).replans, 0);
-    // Who lets what runs go on, waits for it.
+    // With [`RunningRule::Keep`] the run waits for running actions.
     let mut scene = scene;
     scene.settings.running = RunningRule::Cancel;
     let helped = "[[event]]\nfact = \"(lies parcel office)\"\nbecomes = true\nconstant = 5\n\

@@ -1,7 +1,7 @@
-//! Digests of recorded runs: the same seed leads to the same record, to the byte, from one version to the next.
+//! Digests of recorded runs: the same seed gives the same record, to the byte, in all versions.
 //!
-//! `ELBOWROOM_UPDATE_RECORDED=1 cargo test -p elbowroom --test execution` writes them again, after an intended
-//! change of records.
+//! `ELBOWROOM_UPDATE_RECORDED=1 cargo test -p elbowroom --test execution` updates them after an
+//! intended change of records.
 
 use std::fs;
 use std::path::Path;
@@ -27,7 +27,7 @@ pub(crate) fn assert_as_recorded(name: &str, records: &[Vec<String>]) {
     }
 }
 
-/// FNV-1a over the lines, each with its end.
+/// Returns FNV-1a over the lines with their line ends.
 fn digest(lines: &[String]) -> u64 {
     let bytes = lines.iter().flat_map(|line| line.bytes().chain([b'\n']));
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {

@@ -1,4 +1,4 @@
-//! Worlds that refuse to start something, again and again.
+//! Worlds that repeatedly refuse to start an action.
 
 use std::sync::atomic::Ordering;
 
@@ -13,7 +13,7 @@ use elbowroom::num::Rational;
 use crate::beside::{Beside, Telling, telling};
 use crate::lasting::scripted::{Notes, fact, pursue, task};
 
-/// That world, which starts nothing before a time.
+/// World that refuses all starts before a time.
 struct Refusing {
     inner: Telling,
     before: Rational,
@@ -51,8 +51,8 @@ impl World for Refusing {
     }
 }
 
-/// The times at which something was started, what was noted, and how it ended. Nothing is started before
-/// so many tenths of a second.
+/// Runs in a world that refuses all starts before `tenths` tenths of a second. Returns the start
+/// times, the notes and the verdict.
 fn told(
     tenths: i64,
     script: Vec<(Rational, Event)>,
@@ -84,8 +84,8 @@ fn told(
     (starts.collect(), notes, report.verdict)
 }
 
-/// What is refused for twenty seconds does not use up ten new plans, and what is refused once or twice is
-/// tried again at once.
+/// An action that is refused for twenty seconds does not use up ten new plans, and one that is
+/// refused once or twice is retried at once.
 #[test]
 fn what_is_refused_again_and_again_is_tried_later_and_later() {
     for is_lasting in [false, true] {
@@ -101,11 +101,11 @@ fn what_is_refused_again_and_again_is_tried_later_and_later() {
             (waits[last] - 2.0 * waits[last - 1]).abs() < 0.3,
             "{waits:?}"
         );
-        // Where a plan is waited for, time is the planner's.
+        // If the run waits for the planner, only planning takes time.
         let (_, _, verdict) = told(200, Vec::new(), false, false);
         assert_eq!(verdict, Verdict::ReplanLimit);
     }
-    // In the end it is given up all the same.
+    // The run stops retrying in the end.
     let (starts, notes, _) = told(10_000, Vec::new(), true, true);
     assert!(
         notes.iter().any(|it| it.contains("rest: replan-limit")),
@@ -114,7 +114,7 @@ fn what_is_refused_again_and_again_is_tried_later_and_later() {
     assert!(starts[10] > 50.0, "{starts:?}");
 }
 
-/// Whatever else happens may be why it was refused: then nothing is waited for.
+/// Any other event may be the cause of the refusal, so it ends the delay.
 #[test]
 fn patience_ends_with_whatever_else_happens() {
     let day = task("", "(have book)");
@@ -130,7 +130,7 @@ fn patience_ends_with_whatever_else_happens() {
     for (script, is_soon) in [(seen, true), (asked, true), (paused, false)] {
         let (starts, notes, _) = told(65, script, true, true);
         let first = starts.iter().find(|it| **it > 6.5).expect("it goes on");
-        // Plans are asked for after 6.3 seconds, and then after 12.7.
+        // Plans are requested after 6.3 seconds, and then after 12.7.
         assert_eq!(*first < 7.5, is_soon, "{starts:?} {notes:#?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Reports that are wrong, one kind at a time: each has a defined outcome.
+//! Wrong reports, one kind at a time: each has a defined outcome.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use elbowroom::sim::{SimWorld, WorldModel};
 
 use crate::scene::{EXECUTORS, Scene};
 
-/// A world between which and the run somebody sits who changes its reports.
+/// World whose reports are modified on their way to the run.
 struct Tampered<'a> {
     inner: SimWorld<'a>,
     tamper: &'a mut (dyn FnMut(Observation) -> Vec<Observation> + Send),
@@ -42,7 +42,7 @@ impl World for Tampered<'_> {
     }
 }
 
-/// A run in that world. Whatever it believes, the goal is never said to be reached if it is not.
+/// Runs in that world. The run must not report that the goal is reached if it is not.
 fn run(
     scene: &Scene,
     executor: &str,
@@ -70,7 +70,7 @@ fn causes(report: &Report) -> Vec<Cause> {
     report.reasons.iter().map(|reason| reason.cause).collect()
 }
 
-/// How often actions of that name were done, and how they ended.
+/// Returns the endings of all executions of an action.
 fn endings(report: &Report, action: &str) -> Vec<Option<Ending>> {
     let done = report.executed.iter();
     let these = done.filter(|executed| executed.step.action.name.contains(action));
@@ -89,8 +89,7 @@ fn a_report_that_comes_twice_counts_once() {
     }
 }
 
-/// The drive takes too long, and the unlocking that goes on meanwhile is cancelled; but it was
-/// faster.
+/// The drive takes too long, and the concurrent unlocking is cancelled, but has already succeeded.
 #[test]
 fn a_success_after_a_cancel_counts() {
     let mut scene = Scene::case("delivery");
@@ -111,8 +110,8 @@ fn a_success_after_a_cancel_counts() {
     assert_eq!(endings(&report, "unlock")[0], Some(Ending::Succeeded));
 }
 
-/// The same, but first the cancel is confirmed, and then a success is reported: nobody knows what
-/// the unlocking has done, and the run says so.
+/// The same, but first the cancellation is confirmed, and then a success is reported. The effects
+/// of the unlocking are unknown, and the run reports that.
 #[test]
 fn an_end_after_another_end_is_a_contradiction() {
     let scene = Scene::case("delivery");
@@ -149,7 +148,7 @@ fn end_that_is_never_reported_times_out() {
     for executor in ["fixed:1000", "live"] {
         let mut lost = None;
         let report = run(&scene, executor, &WorldModel::as_planned(), &mut |it| {
-            // The first end of all.
+            // The first end of any action.
             if let Some((ticket, _)) = ended(&it)
                 && *lost.get_or_insert(ticket) == ticket
             {
@@ -158,7 +157,7 @@ fn end_that_is_never_reported_times_out() {
             vec![it]
         });
         assert!(lost.is_some());
-        // Given up is either the action, or before that the plan that waits for it in vain.
+        // Either the action times out, or the plan that waits for it is abandoned before.
         let cause = causes(&report)[0];
         let expected = [
             Cause::Silence,

@@ -1,4 +1,4 @@
-//! A problem, a plan, and how to run it.
+//! Problem with a plan, and the settings of its run.
 
 use std::sync::{Arc, LazyLock};
 
@@ -16,13 +16,13 @@ use elbowroom::planner::embedded;
 use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::sim::{Reports, SimWorld, Unreliable, WorldModel};
 
-/// One of each executor in the registry, so that a new one is covered from its first day on.
+/// One of each executor in the registry, so that new ones are tested automatically.
 pub(crate) static EXECUTORS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
     let registered = executors::EXECUTORS.iter();
     registered.map(|it| &*it.example().leak()).collect()
 });
 
-/// Envelopes are IRR's boxes.
+/// Returns settings with IRR's boxes.
 pub(crate) fn irr() -> flow::Settings {
     flow::Settings {
         search: Search::irr(),
@@ -30,7 +30,7 @@ pub(crate) fn irr() -> flow::Settings {
     }
 }
 
-/// A problem with a plan.
+/// Problem with a plan.
 pub(crate) struct Scene {
     pub(crate) task: Arc<Task>,
     pub(crate) plan: TimeTriggeredPlan,
@@ -41,7 +41,7 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// One of the folders in `cases`.
+    /// Reads one of the folders in `cases`.
     pub(crate) fn case(name: &str) -> Self {
         let file = |file: &str| read(&format!("cases/{name}/{file}"));
         Self::new(
@@ -51,19 +51,19 @@ impl Scene {
         )
     }
 
-    /// The problem of table 1 with these deadlines.
+    /// Returns the problem of table 1 with these deadlines.
     pub(crate) fn two_orders(early: &str, late: &str) -> Self {
         let problem = read("experiments/table1/problem.pddl");
         let problem = problem.replace("{early}", early).replace("{late}", late);
         Self::new(&read("experiments/table1/domain.pddl"), &problem, None)
     }
 
-    /// A problem; without a plan, one is made.
+    /// Returns a problem with a plan, by default that of the planner.
     pub(crate) fn new(domain: &str, problem: &str, plan: Option<&str>) -> Self {
         Self::within(400, domain, problem, plan)
     }
 
-    /// The same; plans are searched for among at most `states` states.
+    /// Returns a problem with a plan; the planner searches at most `states` states.
     pub(crate) fn within(states: u64, domain: &str, problem: &str, plan: Option<&str>) -> Self {
         let source = |text: &str| Source::new("test", text);
         let (problem, _) =
@@ -96,7 +96,7 @@ impl Scene {
         scene
     }
 
-    /// The same, with these sections of a likelihood file.
+    /// Adds these sections of a likelihood file.
     pub(crate) fn with_likelihoods(mut self, sections: &str) -> Self {
         let text = format!("format = \"elbowroom-likelihoods\"\nversion = 1\n{sections}");
         let read = likelihoods::read(text.as_bytes(), &self.task);
@@ -104,7 +104,7 @@ impl Scene {
         self
     }
 
-    /// Runs with an executor that looks for plans that are likelier to succeed in that world.
+    /// Runs an executor that searches for likelier plans in that world.
     pub(crate) fn run_likeliest(&self, executor: &str, model: &WorldModel, seed: u64) -> Report {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
         let PlanningTime::Seconds(time) = self.settings.planning_time.clone() else {
@@ -136,7 +136,7 @@ impl Scene {
         }
     }
 
-    /// The first plan made ready.
+    /// Prepares the first plan.
     pub(crate) fn prepared(&self, executor: &str) -> Prepared {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
         let mut analyst = Analyst::new(self.flow.clone());
@@ -145,7 +145,7 @@ impl Scene {
             .expect("a correct test")
     }
 
-    /// Runs with an executor in any world.
+    /// Runs an executor in any world.
     pub(crate) fn run_in(
         &self,
         executor: &str,
@@ -163,7 +163,7 @@ impl Scene {
         report
     }
 
-    /// An execution of the plan.
+    /// Returns an execution of the plan.
     pub(crate) fn execution(&self, executor: &str) -> Execution<'static> {
         Execution::of(&self.task)
             .beginning_with(self.plan.clone())
@@ -174,7 +174,7 @@ impl Scene {
             .planned_by(self.planner())
     }
 
-    /// Runs in a simulated world.
+    /// Runs in a simulated world, and validates successful executions.
     pub(crate) fn run(&self, executor: &str, model: &WorldModel, seed: u64) -> Report {
         let mut world = SimWorld::new(Arc::clone(&self.task), model, seed);
         let mut analyst = Analyst::new(self.flow.clone());
@@ -185,7 +185,8 @@ impl Scene {
         report
     }
 
-    /// Runs in a simulated world that reports badly; whether the goal is true in the end.
+    /// Runs in a simulated world with faulty reports. Also returns `true` if the goal holds in the
+    /// end.
     pub(crate) fn run_badly(
         &self,
         executor: &str,
@@ -202,7 +203,7 @@ impl Scene {
         (report, is_goal)
     }
 
-    /// What the judge says of what was done.
+    /// Validates the execution.
     pub(crate) fn judged(&self, report: &Report) -> validate::Verdict {
         let steps = report.executed.iter().map(|executed| executed.step.clone());
         let plan = TimeTriggeredPlan {
@@ -217,13 +218,13 @@ impl Scene {
     }
 }
 
-/// A file of the project, by its path from the root.
+/// Reads a file of the project, by its path from the root.
 pub(crate) fn read(path: &str) -> String {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     std::fs::read_to_string(root.join(path)).expect("a correct test")
 }
 
-/// How many runs a long test makes: a few, or as many as the variable says.
+/// Returns the number of runs of a long test, from the environment variable or by default.
 pub(crate) fn runs(variable: &str, otherwise: u64) -> u64 {
     std::env::var(variable)
         .ok()

@@ -1,4 +1,4 @@
-//! The seam between two plans: a plan can be begun from the situation for which it was made.
+//! Transitions between plans: a plan can be begun from the situation for which it was made.
 
 use elbowroom::execute::Analyst;
 use elbowroom::execution::run::Verdict;
@@ -22,14 +22,14 @@ const THREE: &str = "(define (problem p) (:domain torch) (:objects a b c - job)
 
 const PLAN: &str = "0: (burn) [10]\n0.001: (work a) [3]\n3.002: (work b) [3]\n6.003: (work c) [3]";
 
-/// Notes what was observed since the last plan was taken up.
+/// Recorder of the observations since the current plan was adopted.
 #[derive(Default)]
 struct Seams {
-    /// The time from which the present plan is, if nothing was observed since.
+    /// Start time of the current plan, if nothing was observed since.
     untouched: Option<Rational>,
-    /// Plans that were given up from the situation for which they were made.
+    /// Plans that were abandoned in the situation for which they were made.
     rejected: Vec<String>,
-    /// Plans with running actions, and how many of them rest on more than there is.
+    /// Number of plans with running actions, and those whose box exceeds the remaining resource.
     amid: usize,
     too_large: Vec<String>,
 }
@@ -58,7 +58,7 @@ impl Recorder for Seams {
 }
 
 impl Seams {
-    /// All jobs of the plan have to fit into what is left of the torch.
+    /// Checks that all jobs of the plan fit into the remaining burning time of the torch.
     fn look_at(&mut self, mission: &Mission) {
         let Some(envelope) = &mission.envelope else {
             return;

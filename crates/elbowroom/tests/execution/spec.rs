@@ -1,4 +1,4 @@
-//! What a run is, as data: written and read without a doubt about what is meant.
+//! Specifications of runs as data: they are written and read without ambiguity.
 
 use std::sync::Arc;
 
@@ -30,7 +30,7 @@ fn read_back(value: Value) -> Result<RunSpec, String> {
     serde_json::from_value(value).map_err(|error| error.to_string())
 }
 
-/// Everything otherwise than by default.
+/// Returns a specification without any default value.
 fn unusual() -> RunSpec {
     let text = |name: &str| NamedText {
         name: name.to_owned(),
@@ -144,7 +144,7 @@ fn a_value_that_means_nothing_is_a_mistake() {
     }
 }
 
-/// As versions wrote it that had no type for it.
+/// Header as written by versions without a type for it.
 #[test]
 fn headers_of_older_traces_are_read() {
     let header = r#"{"domain":{"name":"d","text":"(define)"},"problem":{"name":"p","text":"()"},
@@ -162,12 +162,13 @@ fn headers_of_older_traces_are_read() {
     let mut writer = TraceWriter::new(task, &mut write);
     writer.header(&spec).expect("texts and numbers");
     let words: String = header.split_whitespace().collect();
-    // The time-outs that older traces do not name are those of the default rule.
+    // Older traces without time-outs have those of the default rule.
     let words = words.replace(r#""max_replans""#, r#""timeout":"10x,600","max_replans""#);
     assert_eq!(sink.trim_end(), words);
 }
 
-/// Threads are for whoever plans; a trace says nothing of them, and one that does is none.
+/// The number of threads only concerns the planner. It is not part of traces, and a trace with it
+/// is invalid.
 #[test]
 fn the_planner_has_the_threads_that_no_trace_tells_of() {
     let mut spec = spec();
@@ -211,8 +212,8 @@ fn what_does_not_go_together_is_said_before_the_run() {
     assert!(matches!(wrong, Some(SpecError::Planner(_))), "{wrong:?}");
 }
 
-/// The answer is data, and the trace is lines of types: both are read as they were written, to the
-/// last byte.
+/// The answer and the lines of the trace can be deserialized, and serialized again to the same
+/// bytes.
 #[test]
 fn the_answer_and_each_line_of_the_trace_are_read_as_they_were_written() {
     let world = "format = \"elbowroom-world\"\nversion = 1\n\
@@ -255,7 +256,7 @@ fn the_answer_and_each_line_of_the_trace_are_read_as_they_were_written() {
     }
 }
 
-/// `policy` in this world. The embedded planner makes the plan.
+/// Returns the answer of `policy` in this world. The embedded planner makes the plan.
 fn answer_of_policy(world: &str, budget: &str) -> RunAnswer {
     let spec = RunSpec {
         world: Some(format!(
@@ -283,7 +284,7 @@ fn policy_says_why_it_has_no_table() {
     assert!(reason(varied, "0.000001").is_some_and(|why| why.contains("--planning-budget")));
 }
 
-/// A failure of the first action makes the start of the second one impossible, and does not report that.
+/// A failure of the first action makes the start of the second one impossible, without a report.
 #[test]
 fn policy_does_not_start_a_refused_action_without_end() {
     let named = |name: &str, text: &str| NamedText {

@@ -1,4 +1,4 @@
-//! A run that is driven step by step comes to the same decisions as one that blocks.
+//! A run that is driven step by step has the same decisions as a blocking one.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use elbowroom::sim::{SimWorld, Unreliable};
 
 use crate::scene::{EXECUTORS, Scene};
 
-/// What an event loop keeps from one step to the next, and may move to another thread.
+/// An event loop keeps these between steps, and may move them to another thread.
 #[test]
 fn everything_that_is_assembled_can_be_sent_to_another_thread() {
     fn is_send<T: Send + ?Sized>() {}
@@ -233,7 +233,7 @@ fn answers_to_unknown_requests_change_nothing() {
     assert_eq!(request.urgency, Urgency::Awaited);
     let other = RequestId(request.id.0 + 1);
     let no_plan = || PlannerAnswer::from(PlanAnswer::NoPlanner);
-    // Of the other kind, and of another identifier.
+    // Answers of another kind, and with another identifier.
     run.planned(request.id, no_plan());
     run.answer(Answer::Planned(other, no_plan()));
     let mission = workers.prepare(&request).expect("answered at once");
@@ -242,7 +242,7 @@ fn answers_to_unknown_requests_change_nothing() {
     run.prepared(request.id, mission.clone());
     let command = run.next();
     assert!(matches!(command, Next::Command(_)), "{command:?}");
-    // The answer once more.
+    // A repeated answer.
     run.prepared(request.id, mission);
     assert!(matches!(run.next(), Next::Command(_) | Next::Wait { .. }));
 }

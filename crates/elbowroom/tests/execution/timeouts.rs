@@ -1,5 +1,5 @@
-//! Time-outs: an action that stays inside its interval and ends by its time-out is never cancelled,
-//! and an action without progress is cancelled at its time-out, after a warning.
+//! Time-outs: an action that stays inside its interval and ends by its time-out is never cancelled.
+//! An action without progress is cancelled at its time-out, after a warning.
 
 use std::sync::{Arc, Mutex};
 
@@ -97,7 +97,7 @@ fn number(text: &str) -> Rational {
 
 #[test]
 fn action_that_ends_by_its_time_out_is_not_cancelled() {
-    // Warned of when three quarters of the time behind the planned end have passed.
+    // The warning comes after three quarters of the time between the planned end and the time-out.
     for (timeout, takes, limit, warned) in [
         ("10x,600", "600", "600", "450.5"),
         ("60", "60", "60", "45.5"),
@@ -166,7 +166,7 @@ fn finite_interval_does_not_extend_the_time_out() {
     assert_eq!(noted.cancelled(), [number("600.001")]);
 }
 
-/// The answer about the plan, or about a box.
+/// Returns the answer about the plan, or about a box.
 fn finding(scene: &Scene, contains: Option<&str>) -> EnvelopeFinding {
     let request = EnvelopeRequest::new(&scene.task, scene.plan.clone());
     let request = EnvelopeRequest {

@@ -1,12 +1,12 @@
-//! Durations that the executor chooses: it tells them at the start of the action, and can do
-//! nothing about them later.
+//! Durations that the executor chooses: they are fixed at the start of the action, and cannot be
+//! changed later.
 
 use elbowroom::execution::run::Verdict;
 use elbowroom::num::{End, Rational};
 
 use crate::scene::Scene;
 
-/// A heater that can be set to run for up to an hour, and has to run until the glue is dry.
+/// A heater that can be set to at most an hour, and has to run until the glue is dry.
 const GLUING: &str = "(define (domain gluing)
     (:requirements :durative-actions :duration-inequalities)
     (:predicates (off) (warm) (glued))
@@ -19,8 +19,8 @@ const GLUING: &str = "(define (domain gluing)
 
 const PROBLEM: &str = "(define (problem p) (:domain gluing) (:init (off)) (:goal (glued)))";
 
-/// If the heater could be switched off when the glue is dry, gluing might take anything up to an
-/// hour. It cannot: it was set to 14 when it was switched on.
+/// If the heater could be switched off when the glue is dry, gluing could take an hour. It cannot,
+/// because it was set to 14 when it was switched on.
 #[test]
 fn a_promise_does_not_rest_on_a_duration_that_is_chosen_later() {
     let plan = "0: (heat) [14]\n0.001: (glue) [10]";

@@ -1,4 +1,4 @@
-//! Traces: the same run, the same lines; and a trace that was cut off can be read.
+//! Traces: the same run gives the same lines, and a truncated trace can be read.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ fn traced(scene: &Scene, executor: &str, seed: u64) -> String {
     traced_on_a_grid(scene, executor, seed, &Rational::new(1, 1000))
 }
 
-/// In a world whose times are multiples of the grid.
+/// Returns the trace of a run in a world whose times are multiples of the grid.
 fn traced_on_a_grid(scene: &Scene, executor: &str, seed: u64, grid: &Rational) -> String {
     let mut model = scene.world(
         "[[duration]]\naction = \"*\"\nnormal = { mean = 1, deviation = 0.3, minimum = 0.2 }\n\
@@ -34,7 +34,7 @@ fn traced_on_a_grid(scene: &Scene, executor: &str, seed: u64, grid: &Rational) -
     text
 }
 
-/// Plays a trace back; how many entries agree.
+/// Replays a trace. Returns the number of equal entries.
 fn replayed(scene: &Scene, executor: &str, text: &str) -> usize {
     let stored = Stored::read(text).expect("a correct test");
     let mut replay = Replay::new(&stored, Arc::clone(&scene.task));
@@ -75,7 +75,7 @@ fn a_trace_that_was_cut_off_anywhere_can_be_read_and_played_back() {
     }
 }
 
-/// Clocks of real worlds count in floats: each is read as what was written, to the last digit.
+/// Clocks of real worlds use floats. Each is read exactly as written.
 #[test]
 fn times_with_seventeen_digits_are_played_back_without_differences() {
     let scene = Scene::case("delivery");
@@ -91,7 +91,7 @@ fn times_with_seventeen_digits_are_played_back_without_differences() {
     assert!(longest >= 17, "the floats are awkward: {longest}");
 }
 
-/// A world that fails when it is asked for the nth time, counting commands.
+/// World that fails at its nth call, including commands.
 struct Mortal<W> {
     inner: W,
     left: usize,
@@ -128,7 +128,7 @@ impl<W: World> World for Mortal<W> {
     }
 }
 
-/// Wherever a world fails, the trace plays back to that end, in the same words.
+/// If a world fails, the trace replays to the same end with the same message.
 #[test]
 fn a_run_whose_world_failed_plays_back_to_the_same_end() {
     for scene in [Scene::case("delivery"), Scene::case("match")] {

@@ -18,7 +18,7 @@ const DOMAIN: &str = "
 
 const PLAN: &str = "0: (go) [2]\n0: (clean) [9]";
 
-/// Both files say that half of the attempts to go fail and are undone.
+/// In both files half of the attempts of `go` fail and are undone.
 fn scene(domain: &str, goal: &str) -> Scene {
     let problem = format!(
         "(define (problem p) (:domain robots) (:init (home) (free) (day)) (:goal (and {goal})))"
@@ -109,8 +109,8 @@ fn fact_left_behind_by_a_failure_separates_the_action_that_needs_it() {
     }
 }
 
-/// An action runs when a new plan is adopted, then fails and is undone. The retry has the duration of the
-/// domain, not the remaining duration that the plan had.
+/// An action is running when a new plan is adopted, then fails and is undone. The retry has the
+/// duration of the domain, not the remaining duration in the plan.
 #[test]
 fn repeated_action_has_its_whole_duration_after_a_new_plan() {
     let domain = "
@@ -130,7 +130,7 @@ fn repeated_action_has_its_whole_duration_after_a_new_plan() {
     );
     scene.settings.most_replans = 100;
     scene.settings.running = RunningRule::Keep;
-    // While the robot goes, heating fails and leaves the water warm: that takes a new plan.
+    // Heating fails while the robot moves, and leaves the water warm, which requires a new plan.
     let world = scene.world(
         "[[failure]]\naction = \"go\"\nprobability = 0.5\nundone = true\n[[failure]]\naction = \"heat\"\n\
          probability = 1.0\n[[failure.outcome]]\nprobability = 1.0\nbecomes_true = [\"(warm)\"]\n",
@@ -169,7 +169,8 @@ fn repeated_action_has_its_whole_duration_after_a_new_plan() {
     }
 }
 
-/// An action fails late, and its failure makes the goal true, or possible again, when no plan was known any more.
+/// An action fails late, and its failure makes the goal true, or reachable again, when there was no
+/// plan.
 #[test]
 fn verdict_heeds_facts_that_change_while_actions_end() {
     for (body, step) in [

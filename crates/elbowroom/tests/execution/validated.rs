@@ -21,7 +21,8 @@ const DOMAIN: &str = "
       (:durative-action b :parameters () :duration (= ?duration 2)
         :condition (at start (p)) :effect (at end (q))))";
 
-/// Starts the steps of its plan in order, each at a time and with a duration of its own, whatever the state is.
+/// Executor that starts the steps of its plan in order, each with its own time and duration, in any
+/// state.
 struct Reckless {
     mission: Option<Mission>,
     orders: Vec<(Rational, i64)>,

@@ -1,4 +1,5 @@
-//! Actions that take no time: their over-all conditions are vacuous, and they start and end at one moment.
+//! Actions of duration 0: their over-all conditions are vacuous, and they start and end at one
+//! moment.
 
 use elbowroom::answers::Unwatched;
 use elbowroom::answers::envelope::{EnvelopeRequest, envelope};
@@ -7,7 +8,7 @@ use elbowroom::sim::WorldModel;
 
 use crate::scene::Scene;
 
-/// Executors that follow any valid plan where nothing deviates.
+/// Executors that follow any valid plan without deviations.
 const EXECUTORS: [&str; 4] = ["guarded", "live", "stn", "fixed:1000"];
 
 fn scene(actions: &str, init: &str, goal: &str, plan: &str) -> Scene {
@@ -21,7 +22,7 @@ fn scene(actions: &str, init: &str, goal: &str, plan: &str) -> Scene {
     scene
 }
 
-/// The plan has an envelope, the runs that start under it reach the goal, and the validator agrees.
+/// Checks that the plan has an envelope, and that the runs under it reach the goal and are valid.
 fn assert_works(scene: &Scene) {
     let request = EnvelopeRequest::new(&scene.task, scene.plan.clone());
     let outcome = envelope(&request, &mut Unwatched).expect("within exact analysis");

@@ -1,4 +1,4 @@
-//! Jobs that drain one battery, which has more than they take.
+//! Jobs that drain one battery, which has more charge than they take.
 
 use super::Kind;
 
@@ -16,7 +16,7 @@ const PROBLEM: &str = "(define (problem three-jobs) (:domain workshop)
   (:init (= (charge) 39))
   (:goal (and (done drill) (done grind) (done saw))))";
 
-/// Started together: the jobs need not end together.
+/// Simultaneous starts: the jobs need not end together.
 pub(crate) const THREE_JOBS_AT_ONCE: Kind = Kind {
     name: "three jobs draining one battery at once",
     domain: DOMAIN,
@@ -35,7 +35,7 @@ pub(crate) const THREE_JOBS_AT_ONCE: Kind = Kind {
     not_dynamic: &[],
 };
 
-/// Started one after the other, while the others run: neither must who starts first end first.
+/// Successive starts, with overlaps: the job that starts first need not end first.
 pub(crate) const THREE_JOBS_IN_TURN: Kind = Kind {
     name: "three jobs draining one battery, overlapping",
     domain: DOMAIN,

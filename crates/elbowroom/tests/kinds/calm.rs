@@ -1,8 +1,9 @@
-//! Two ends that fall together in the plan, although neither needs the other.
+//! Two ends that coincide in the plan, although neither needs the other.
 
 use super::Kind;
 
-/// Two fans need it calm all along, as it is from the beginning; each says so again as it stops.
+/// Two fans need it calm throughout, which it is from the beginning. Each also adds that fact at
+/// its end.
 pub(crate) const ENDS_THAT_COINCIDE_WITHOUT_NEED: Kind = Kind {
     name: "ends that coincide although neither needs the other",
     domain: "(define (domain fans)

@@ -1,4 +1,4 @@
-//! The kinds that are cases of their own; their problem files say why these boxes.
+//! Kinds of plans that are cases as well. Their problem files explain the boxes.
 
 use super::Kind;
 

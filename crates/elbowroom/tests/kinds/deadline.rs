@@ -1,8 +1,8 @@
-//! Deadlines for two ends that have nothing to do with each other.
+//! Deadlines for two independent ends.
 
 use super::Kind;
 
-/// Each letter has its own last collection; that one is late does not matter to the other.
+/// Each letter has its own last collection. A late letter does not affect the other.
 pub(crate) const TWO_DEADLINES: Kind = Kind {
     name: "two ends with a deadline each",
     domain: "(define (domain letters)

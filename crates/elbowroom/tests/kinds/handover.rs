@@ -1,8 +1,8 @@
-//! A hand-over: one action must begin and end within another.
+//! Hand-over: one action must begin and end within another.
 
 use super::Kind;
 
-/// One robot holds out a part; the other takes it meanwhile, and the first goes on only then.
+/// One robot holds out a part until the other one has taken it.
 pub(crate) const END_WITHIN_ANOTHER: Kind = Kind {
     name: "an action that must end within another",
     domain: "(define (domain hand-over)

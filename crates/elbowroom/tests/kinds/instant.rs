@@ -2,7 +2,7 @@
 
 use super::Kind;
 
-/// Stamping takes no time, though it is written as an action that could.
+/// Stamping is a durative action with duration 0.
 pub(crate) const NO_TIME_AT_ALL: Kind = Kind {
     name: "actions of duration 0",
     domain: "(define (domain office)

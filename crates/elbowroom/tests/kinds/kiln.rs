@@ -2,7 +2,7 @@
 
 use super::Kind;
 
-/// The finishing ends only after the casting has, and before the kiln is closed at 20.
+/// The finishing must end after the casting, and before the kiln is closed at 20.
 pub(crate) const END_AFTER_AN_END_BEFORE_A_DEADLINE: Kind = Kind {
     name: "an end that needs another end and has a deadline",
     domain: "(define (domain foundry)

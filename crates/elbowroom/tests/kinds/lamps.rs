@@ -1,9 +1,9 @@
-//! Something that holds throughout because of one fact first, and of another one then.
+//! Condition that holds throughout because of one fact first, and of another one afterwards.
 
 use super::Kind;
 
-/// The second lamp is lit before the first one goes out. The two facts change in the time of the watch, which
-/// needs one of them; nothing else reads either.
+/// The second lamp is lit before the first one goes out. Both facts change during the watch, which
+/// needs one of them; no other action reads them.
 pub(crate) const ONE_FACT_TAKES_OVER: Kind = Kind {
     name: "an over-all condition of which one fact takes over from another",
     domain: "(define (domain lamps)

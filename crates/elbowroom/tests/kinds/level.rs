@@ -1,8 +1,8 @@
-//! A strict over-all comparison that becomes an equality exactly at the end.
+//! Strict over-all comparison that becomes an equality exactly at the end.
 
 use super::Kind;
 
-/// The tank must not be full while it is filled, and is full when the filling ends.
+/// The tank must not be full during the filling, and is full at its end.
 pub(crate) const COMPARISON_THAT_ENDS_IN_AN_EQUALITY: Kind = Kind {
     name: "a strict comparison that becomes an equality at the end",
     domain: "(define (domain cistern)

@@ -1,8 +1,8 @@
-//! Two ends at the same instant, of which one needs until then what the other takes away.
+//! Two simultaneous ends: until then, one needs the fact that the other deletes.
 
 use super::Kind;
 
-/// A fuse is mended by a match that goes out at the very moment.
+/// A fuse is mended by a match that goes out at the same moment.
 pub(crate) const ENDS_AT_THE_SAME_INSTANT: Kind = Kind {
     name: "an over-all condition that is spoiled at the very end",
     domain: "(define (domain cellar)

@@ -1,8 +1,8 @@
-//! An end that needs a fact which another action holds only while it runs.
+//! End that needs a fact which another action provides only while it runs.
 
 use super::Kind;
 
-/// Somebody must watch the oven when the loaf is done, and cannot watch it for long.
+/// The oven must be watched when the loaf is done, and cannot be watched for long.
 pub(crate) const END_WHILE_ANOTHER_RUNS: Kind = Kind {
     name: "an end that needs what another action holds while it runs",
     domain: "(define (domain bakery)

@@ -1,5 +1,5 @@
-//! Kinds of plans in which it is easy to promise, or to do, something wrong: one small plan for
-//! each, with what is true of it.
+//! Kinds of plans with frequent errors in guarantees or execution: one small plan for each, with
+//! its known properties.
 #![allow(dead_code, reason = "each test uses some of it")]
 
 use std::sync::Arc;
@@ -22,10 +22,10 @@ mod power;
 mod tide;
 mod van;
 
-/// A plan, and what is true of it.
+/// Plan with its known properties.
 ///
-/// Boxes name the durations of the plan's actions in order of their start, by name where several
-/// start together: `dur_0=[1,2],dur_1=[3,4]`; what is left out is nominal.
+/// Boxes name the durations of the plan's actions in the order of their starts, by name if several
+/// start together: `dur_0=[1,2],dur_1=[3,4]`; missing ones are nominal.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Kind {
     pub(crate) name: &'static str,
@@ -34,21 +34,21 @@ pub(crate) struct Kind {
     pub(crate) plan: &'static str,
     /// Boxes inside the robustness envelope (the weak guarantee).
     pub(crate) inside: &'static [&'static str],
-    /// Boxes that are not.
+    /// Boxes that are not inside.
     pub(crate) outside: &'static [&'static str],
-    /// Of the boxes inside, some whose promise can be kept by deciding from what has been seen.
+    /// Boxes inside that are dynamically controllable (not all of them).
     pub(crate) dynamic: &'static [&'static str],
-    /// Boxes inside whose promise cannot be kept so.
+    /// Boxes inside that are not dynamically controllable.
     pub(crate) not_dynamic: &'static [&'static str],
 }
 
 impl Kind {
-    /// The task and the plan.
+    /// Returns the task and the plan.
     pub(crate) fn read(&self) -> (Arc<Task>, TimeTriggeredPlan) {
         self.read_with(self.plan)
     }
 
-    /// The task, and another text of the plan.
+    /// Returns the task, and a plan from another text.
     pub(crate) fn read_with(&self, plan: &str) -> (Arc<Task>, TimeTriggeredPlan) {
         let source = |part: &str, text: &str| Source::new(format!("{} {part}", self.name), text);
         let problem = read_problem(
@@ -63,7 +63,7 @@ impl Kind {
     }
 }
 
-/// All kinds.
+/// Returns all kinds.
 pub(crate) fn kinds() -> Vec<Kind> {
     vec![
         loaf::END_WHILE_ANOTHER_RUNS,

@@ -1,8 +1,8 @@
-//! An over-all condition that comes from an action starting at the same moment.
+//! Over-all condition that is achieved by an action starting at the same moment.
 
 use super::Kind;
 
-/// The printer runs on what the generator, started together with it, delivers.
+/// The printer needs the power of the generator, which is started together with it.
 pub(crate) const CONDITION_FROM_AN_ACTION_THAT_STARTS_TOGETHER: Kind = Kind {
     name: "an over-all condition from an action that starts together",
     domain: "(define (domain print-room)

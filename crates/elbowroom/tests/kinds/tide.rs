@@ -1,4 +1,4 @@
-//! Timed initials that change what nothing reads, or change it as it should be.
+//! Timed initials that change facts without a reader, or facts of the goal.
 
 use super::Kind;
 
@@ -12,7 +12,7 @@ const DOMAIN: &str = "(define (domain harbour)
   (:durative-action sail :parameters () :duration (= ?duration 10)
     :condition (at start (ebb)) :effect (at end (not (unloaded)))))";
 
-/// The tide would matter to who sails, and nobody does.
+/// The tide would affect sailing, but no ship sails.
 pub(crate) const CHANGES_THAT_NOTHING_READS: Kind = Kind {
     name: "deadlines that nothing reads",
     domain: DOMAIN,
@@ -26,7 +26,7 @@ pub(crate) const CHANGES_THAT_NOTHING_READS: Kind = Kind {
     not_dynamic: &[],
 };
 
-/// The fog lifts long after the ship is unloaded, and nothing has to wait for that.
+/// The fog lifts long after the ship is unloaded, and no action has to wait for that.
 pub(crate) const GOAL_THAT_COMES_BY_ITSELF: Kind = Kind {
     name: "a goal that a timed initial brings about in the end",
     domain: DOMAIN,
@@ -40,8 +40,8 @@ pub(crate) const GOAL_THAT_COMES_BY_ITSELF: Kind = Kind {
     not_dynamic: &[],
 };
 
-/// The shop opens at 10 and closes at 28, and the lamps go out at 30: what is lit before then does
-/// not count, so it takes more than 2 to light one.
+/// The shop opens at 10 and closes at 28, and the lamps go out at 30. Lamps that are lit before
+/// then do not count, so lighting one takes more than 2.
 pub(crate) const GOAL_THAT_IS_TAKEN_AWAY: Kind = Kind {
     name: "a timed initial that takes the goal away from who is too early",
     domain: "(define (domain lamps)

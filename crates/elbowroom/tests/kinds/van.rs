@@ -1,8 +1,8 @@
-//! An end that must fall into a window of timed initials.
+//! End that must fall into a window of timed initials.
 
 use super::Kind;
 
-/// The van stops at the gate from 20 to 30, and the loading must be done while it is there.
+/// The van stops at the gate from 20 to 30, and the loading must end while it is there.
 pub(crate) const END_IN_A_WINDOW: Kind = Kind {
     name: "an end that must fall into a window of timed initials",
     domain: "(define (domain gate)

@@ -1,5 +1,6 @@
-//! Random problems in the middle of their execution, with running actions that may be overdue: the verifier
-//! refuses no proposed certificate, no certificate denies a plan, and changed certificates are refused.
+//! Random problems in the middle of their execution, with running actions that may be overdue. The
+//! verifier accepts all proposed certificates, no certificate contradicts a plan, and modified
+//! certificates are rejected.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -21,7 +22,7 @@ use crate::game::Random;
 
 const OBJECTS: [&str; 3] = ["a", "b", "c"];
 
-/// A problem in the middle of its execution.
+/// Problem in the middle of its execution.
 struct Amid {
     text: String,
     task: Task,
@@ -82,8 +83,8 @@ fn random_object(random: &mut Random) -> usize {
     random.below(OBJECTS.len())
 }
 
-/// Draws a problem with tokens that actions carry between three places. One token too few keeps the goal out of reach;
-/// that needs a closed set of states.
+/// Draws a problem with tokens that actions carry between three places. With one token too few the
+/// goal is unreachable, which needs a closed set of states as its proof.
 fn tokens(random: &mut Random) -> Amid {
     let [carry, wait] = [random.whole(1, 3), random.whole(1, 3)];
     let domain = format!(
@@ -165,7 +166,7 @@ fn amid(random: &mut Random, domain: &str, init: &str, goal: &str, count: usize)
     }
 }
 
-/// Draws a time, the facts then, and up to three running actions.
+/// Draws a time, its facts, and up to three running actions.
 fn situation(random: &mut Random, task: &Task, count: usize) -> (Situation, bool, String) {
     let mut situation = Situation::initial(task);
     situation.time = Rational::new(random.whole(0, 20), 2);
@@ -265,7 +266,7 @@ fn others(situation: &Situation, random: &mut Random) -> Vec<Situation> {
     others
 }
 
-/// Returns certificates of closed sets with one change each. No such certificate is a proof.
+/// Returns certificates of closed sets with one modification each. None of them is a proof.
 fn forged(certificate: &NoPlan) -> Vec<NoPlan> {
     let mut all = Vec::new();
     let Some(closed) = &certificate.closed else {
@@ -283,7 +284,7 @@ fn forged(certificate: &NoPlan) -> Vec<NoPlan> {
     note(&|states| states.clear());
     for state in 0..closed.states.len().min(6) {
         note(&|states| drop(states.remove(state)));
-        // No running action ends any more.
+        // Running actions never end.
         note(&|states| states[state].under_way.clear());
         for place in 0..closed.states[state].under_way.len() {
             note(&|states| {

@@ -1,4 +1,5 @@
-//! Conjuncts of goals that exclude each other: they are unreachable together, and no fewer of them are known to be.
+//! Conjuncts of goals that exclude each other: they are unreachable together, and no proper subset
+//! is known to be.
 
 use elbowroom::model::problem::Condition;
 use elbowroom::model::{Situation, Task};
@@ -6,7 +7,7 @@ use elbowroom::no_plan::{Effort, conflict, no_plan_certificate_within};
 
 use crate::task;
 
-/// Returns the conflict of the task, and the conjuncts of its goal by their words.
+/// Returns the conflict of the task, and the conjuncts of its goal with their texts.
 fn conflict_of(task: &Task) -> (Vec<String>, Vec<(String, Condition)>) {
     let situation = Situation::initial(task);
     let found = conflict(task, &situation, 10_000_000, &mut || true);

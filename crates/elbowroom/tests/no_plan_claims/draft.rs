@@ -12,7 +12,7 @@ use crate::game::Random;
 const FACTS: usize = 4;
 const PLANS: usize = 40;
 
-/// A problem, and a plan that the validator accepts.
+/// Problem with a plan that the validator accepts.
 pub(crate) struct Solved {
     pub(crate) text: String,
     pub(crate) task: Task,
@@ -21,12 +21,13 @@ pub(crate) struct Solved {
 
 struct Action {
     name: String,
-    /// `None` for an instantaneous action.
+    /// Possible durations; `None` for an instantaneous action.
     durations: Option<Vec<&'static str>>,
     text: String,
 }
 
-/// Draws a problem; `None` if none of the plans drawn for it is valid, or the valid one changes nothing.
+/// Draws a problem. Returns `None` if none of the plans drawn for it is valid, or if the valid one
+/// changes nothing.
 pub(crate) fn solved(random: &mut Random) -> Option<Solved> {
     let actions: Vec<Action> = (0..=random.below(3))
         .map(|number| action(random, number))
@@ -81,7 +82,8 @@ pub(crate) fn solved(random: &mut Random) -> Option<Solved> {
     None
 }
 
-/// Up to three literals and comparisons that hold in the state. The first one does not hold initially.
+/// Returns up to three literals and comparisons that hold in the state. The first one does not hold
+/// initially.
 fn goal(random: &mut Random, task: &Task, state: &elbowroom::model::State) -> Option<String> {
     let initial = task.initial();
     let mut new = Vec::new();
@@ -181,7 +183,8 @@ fn effect(random: &mut Random) -> String {
     }
 }
 
-/// An effect at a moment, `at start`, `at end` or none, perhaps with a condition or for all items.
+/// Returns an effect at a moment, `at start`, `at end` or none, perhaps with a condition or for all
+/// items.
 fn effect_at(random: &mut Random, moment: &str) -> String {
     let at = |text: &str| {
         if moment.is_empty() {

@@ -1,4 +1,4 @@
-//! Claims that no plan exists: each has a certificate, and none is about a problem that has a plan.
+//! Claims that no plan exists: each has a certificate, and none is about a problem with a plan.
 
 #![allow(
     clippy::print_stdout,
@@ -55,7 +55,7 @@ fn problem_with_a_random_valid_plan_has_no_certificate() {
         };
         situations::check(&found, &mut random);
     }
-    // The verifier has every rule of the generator, so it refuses no certificate.
+    // The verifier has every rule of the generator, so it rejects no certificate.
     let is_refused = |why: &&String| why.contains("verifier refuses");
     assert_eq!(reasons.iter().find(is_refused), None);
     assert!(solved > PROBLEMS / 6, "{solved} of {PROBLEMS} have a plan");
@@ -85,7 +85,8 @@ fn answer(task: &Task) -> PlanAnswer {
     plan(&mut request, &mut Unwatched).unwrap().answer
 }
 
-/// Domain, initial state, goal and a valid plan, of kinds that a search has wrongly called unsolvable.
+/// Domain, initial state, goal and a valid plan, of kinds that a search has wrongly reported as
+/// unsolvable.
 const SOLVABLE: &[[&str; 5]] = &[
     [
         "own start makes an over-all condition true by a conditional effect",
@@ -263,12 +264,12 @@ fn unsolvable_problem_comes_with_a_certificate_that_is_verified() {
 
 #[test]
 fn refutation_without_a_certificate_is_reported_as_no_plan_found() {
-    // Closed sets of states do not count the least separation, and pairs do not count numbers.
+    // Closed sets of states ignore the least separation, and pairs ignore numbers.
     let domain = "(:requirements :fluents) (:functions (n)) (:predicates (done))
         (:durative-action hold :parameters () :duration (= ?duration 2)
           :condition (over all (>= (n) 2)) :effect (at end (done)))";
     let task = task(domain, "(= (n) 1)", "(done)");
-    // Nothing changes the number, so this one is certified.
+    // No action changes the number, so this problem has a certificate.
     assert!(matches!(answer(&task).finding, PlanFinding::NoPlan { .. }));
     let domain = "(:requirements :fluents) (:functions (n)) (:predicates (free) (done))
         (:action add :parameters () :precondition (< (n) 2) :effect (increase (n) 1))
@@ -336,7 +337,7 @@ fn fluent_without_value_is_named() {
     };
     assert!(reason.contains("(used) has no initial value"), "{reason}");
     assert_eq!(certificate(&task), Ok(Kind::Reached));
-    // An assignment gives it a value.
+    // An assignment gives the fluent a value.
     let domain = format!(
         "{domain} (:action reset :parameters () :precondition () :effect (assign (used) 0))"
     );

@@ -1,4 +1,4 @@
-//! Claims from the middle of a valid plan.
+//! Claims in the middle of a valid plan.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use elbowroom::num::{Interval, Rational};
 use crate::draft::Solved;
 use crate::game::Random;
 
-/// Checks that no certificate denies the remaining plan at a moment in the middle of it.
+/// Checks that no certificate contradicts the remaining plan at a time in the middle of it.
 pub(crate) fn check(solved: &Solved, random: &mut Random) {
     let cut = &solved.plan.makespan() * &Rational::new(random.whole(1, 99), 100);
     let Some((situation, rest)) = middle(&solved.task, &solved.plan, &cut) else {
@@ -34,8 +34,8 @@ pub(crate) fn check(solved: &Solved, random: &mut Random) {
     }
 }
 
-/// The situation at a time, and the rest of the plan from there. `None` if it depends on more than plain
-/// changes of facts.
+/// Returns the situation at a time and the remaining plan, or `None` if the plan depends on more
+/// than unconditional changes of facts.
 fn middle(
     task: &Task,
     plan: &TimeTriggeredPlan,
@@ -101,7 +101,7 @@ fn middle(
     Some((situation, TimeTriggeredPlan { steps }))
 }
 
-/// The changes, if none of them is conditional.
+/// Returns the changes, if all of them are unconditional.
 fn plain(effects: &[Effect]) -> Option<Vec<Change>> {
     let is_plain = effects.iter().all(|effect| effect.guard.is_trivial());
     is_plain.then(|| effects.iter().map(|own| own.change.clone()).collect())

@@ -1,5 +1,6 @@
-//! Random problems that are unsolvable by construction: solvable ones with one change. Each certificate
-//! is accepted from its JSON text. It is refused if it is changed, and for the problem without the change.
+//! Random problems that are unsolvable by construction: solvable ones with one change. Each
+//! certificate is accepted from its JSON text. It is rejected after a modification, and for the
+//! problem without the change.
 
 #[allow(unused_imports, reason = "the planner's answers are for other tests")]
 #[path = "../../../../testing/solvable/mod.rs"]
@@ -19,16 +20,16 @@ use serde_json::json;
 /// Number of random problems for each obstacle.
 const SEEDS: u64 = 60;
 
-/// The most changes of one certificate.
+/// Maximum number of modifications of one certificate.
 const MUTATIONS: usize = 12;
 
-/// A change that makes any problem unsolvable. `(z0)`, `(z1)` and `(z2)` occur in no other place.
+/// Change that makes any problem unsolvable. `(z0)`, `(z1)` and `(z2)` occur in no other place.
 struct Obstacle {
     name: &'static str,
     initial: &'static str,
     actions: &'static str,
     goal: &'static str,
-    /// The number of [`SEEDS`] problems for which a certificate is expected, at least.
+    /// Minimum number of [`SEEDS`] problems for which a certificate is expected.
     least_certified: usize,
 }
 
@@ -109,7 +110,7 @@ fn verdict(task: &Task, certificate: &NoPlan) -> Result<(), String> {
     verify_no_plan(task, &read).map_err(|flaw| flaw.to_string())
 }
 
-/// Returns certificates with one change each. No such certificate is a proof.
+/// Returns certificates with one modification each. None of them is a proof.
 fn mutated(certificate: &NoPlan) -> Vec<NoPlan> {
     let mut all = Vec::new();
     let mut note = |change: &dyn Fn(&mut NoPlan)| {
@@ -128,7 +129,7 @@ fn mutated(certificate: &NoPlan) -> Vec<NoPlan> {
             note(&|own| drop(own.closed.as_mut().unwrap().states.remove(state)));
         }
     }
-    // The list has the earliest time of each fact that is reached, and no other fact.
+    // The list has the earliest time of each reached fact, and no other fact.
     for group in 0..certificate.reached.len() {
         note(&|own| {
             let from = &own.reached[group].from;

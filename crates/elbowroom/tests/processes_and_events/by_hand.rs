@@ -1,4 +1,4 @@
-//! Boxes that are worked by hand.
+//! Boxes that are computed by hand.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -25,7 +25,7 @@ fn kettle(file: &str) -> (Arc<Task>, Source) {
     )
 }
 
-/// The largest box of a plan of few parameters.
+/// Returns the largest box of a plan with few parameters.
 fn largest(task: &Arc<Task>, text: impl Into<Source>) -> DecoupledEnvelope {
     let plan = Arc::new(format::read(text, task).expect("a readable plan"));
     let mut oracle = Oracle::new(task, &plan, Guarantee::Weak).expect("within reach");
@@ -39,7 +39,7 @@ fn largest(task: &Arc<Task>, text: impl Into<Source>) -> DecoupledEnvelope {
     found.expect("within reach").expect("it was found inside")
 }
 
-/// The box is worked by hand in the problem file.
+/// The box is computed by hand in the problem file.
 #[test]
 fn the_kettle_boils_before_the_tea_is_poured() {
     let (task, text) = kettle("tea.stn");
@@ -50,7 +50,7 @@ fn the_kettle_boils_before_the_tea_is_poured() {
     assert_eq!(found.intervals(), expected);
 }
 
-/// Two numbers that rise, and an event that watches both.
+/// Two increasing numbers, and an event with a condition on both.
 const CLIMB: &str = "(define (domain d)
     (:predicates (clashed) (seen))
     (:functions (x) (y))
@@ -62,8 +62,9 @@ const CLIMB: &str = "(define (domain d)
     (:event clash :precondition (and (not (clashed)) (<= (x) 6) (> (y) 4))
      :effect (clashed)))";
 
-/// x rises from s on, and y from 5 on. From 9 on, y is above 4; the event would happen then if x were
-/// at most 6, as it is until s + 6. At the plan's happenings it is never so.
+/// x increases from s on, and y from 5 on. From 9 on, y is above 4. The event would happen then if
+/// x were at most 6, which holds until s + 6. Its condition does not hold at any happening of the
+/// plan.
 #[test]
 fn no_event_may_happen_between_two_happenings() {
     let problem = "(define (problem p) (:domain d)
@@ -78,13 +79,13 @@ fn no_event_may_happen_between_two_happenings() {
         c: second.end - second.start in [10, 10];";
     let until = |last: i64| [Interval::closed(Rational::ZERO, Rational::from(last))];
     assert_eq!(largest(&task, plan).intervals(), until(3));
-    // At 8, x is above 6 as planned and y is not above 4. From there on one of the two has to be as
-    // it is, be it needed or not.
+    // At 8, x is above 6 as planned and y is not above 4. With a happening at that time, the box
+    // must preserve one of the two, even if that is not necessary.
     let looking = format!("{plan} action instance eye : (look); c: eye - .zero in [8, 8];");
     assert_eq!(largest(&task, &looking).intervals(), until(2));
 }
 
-/// A plan with fixed times keeps its order, and the executor as much freedom as all that leaves.
+/// A plan with fixed times keeps its order, and the durations are as free as that order permits.
 #[test]
 fn a_plan_with_fixed_times_leaves_durations_open() {
     let (task, text) = kettle("tea.plan");
@@ -99,7 +100,7 @@ fn a_plan_with_fixed_times_leaves_durations_open() {
     assert_eq!(refuted(&task, &plan, &found, &mut rng), None);
 }
 
-/// The lower end is where the order of the happenings ends, which is no action that takes long.
+/// The lower end is limited by the order of the happenings, not by a longer action.
 #[test]
 fn an_action_is_not_said_to_fit_into_itself() {
     let domain = "(define (domain d) (:predicates (boiled) (fetched)) (:functions (heat))

@@ -1,5 +1,5 @@
-//! Envelopes of plans with processes and events: random worlds and random plans in them. What a box
-//! promises is attacked with the judge, which follows each course on its own, by polynomials.
+//! Envelopes of plans with processes and events, for random worlds and random plans. The boxes are
+//! tested by the validator, which computes each trajectory independently, by polynomials.
 
 mod by_hand;
 mod races;
@@ -22,7 +22,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shared::draw;
 
-/// A random number from a few, so that bounds are often hit exactly.
+/// Returns one of a few random numbers, so that bounds are often hit exactly.
 fn number(rng: &mut ChaCha8Rng, halves: std::ops::RangeInclusive<i64>) -> Rational {
     Rational::new(rng.random_range(halves), 2)
 }
@@ -56,8 +56,8 @@ fn condition(rng: &mut ChaCha8Rng) -> String {
     }
 }
 
-/// What an event watches. A number may pass through all that makes it happen between two happenings,
-/// and of two numbers one may come too early for the other.
+/// Returns the condition of an event. A number may pass through its whole range between two
+/// happenings, or only one of two numbers may be in its range in time.
 fn watched(rng: &mut ChaCha8Rng) -> String {
     match rng.random_range(0..4) {
         0 | 1 => comparison(rng),
@@ -75,7 +75,7 @@ fn watched(rng: &mut ChaCha8Rng) -> String {
     }
 }
 
-/// A change of a number, at once.
+/// Returns an instantaneous change of a number.
 fn change(rng: &mut ChaCha8Rng) -> String {
     let operator = ["increase", "decrease", "assign"].choose(rng).expect("few");
     let fluent = rng.random_range(0..3);
@@ -90,7 +90,7 @@ fn rate(rng: &mut ChaCha8Rng) -> String {
     format!("(increase (x{fluent}) (* #t {rate}))")
 }
 
-/// A domain and a problem.
+/// Returns a domain and a problem.
 fn world(rng: &mut ChaCha8Rng) -> (String, String) {
     let mut domain = "(define (domain d) (:predicates (p0) (p1) (p2))
         (:functions (x0) (x1) (x2) (z))\n"
@@ -104,7 +104,7 @@ fn world(rng: &mut ChaCha8Rng) -> (String, String) {
         .expect("text");
     }
     for index in 0..rng.random_range(0..3) {
-        // Mostly it makes its own condition false.
+        // An event mostly makes its own condition false.
         let own = fact(rng);
         let undone = match own.strip_prefix("(not ") {
             Some(rest) => rest.trim_end_matches(')').to_owned() + ")",
@@ -188,7 +188,8 @@ fn task_of(domain: &str, problem: &str) -> Task {
     }
 }
 
-/// A plan as the judge reads it, and as a network in which each start and each duration may deviate.
+/// Returns a plan for the validator, and the same plan as a network with all starts and durations
+/// as parameters.
 fn plan(rng: &mut ChaCha8Rng) -> (String, String) {
     let (mut fixed, mut open) = (String::new(), String::new());
     let count = rng.random_range(1..4);
@@ -225,7 +226,7 @@ fn plan(rng: &mut ChaCha8Rng) -> (String, String) {
     (fixed, open)
 }
 
-/// A box around the nominal values, often with these at ends of intervals.
+/// Returns a box around the nominal values, which are often ends of intervals.
 fn some_box(plan: &ParametrizedPlan, rng: &mut ChaCha8Rng) -> DecoupledEnvelope {
     let unit = Rational::new(1, 1 << rng.random_range(0..7));
     let intervals = plan.parameters.iter().map(|parameter| {
@@ -237,7 +238,7 @@ fn some_box(plan: &ParametrizedPlan, rng: &mut ChaCha8Rng) -> DecoupledEnvelope 
     DecoupledEnvelope::new(plan, intervals.collect()).expect("an interval for each")
 }
 
-/// The first of some values in a box for which the judge does not accept the plan.
+/// Returns the first of some values in a box for which the validator rejects the plan.
 fn refuted(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -256,15 +257,15 @@ fn refuted(
 #[derive(Debug, Default)]
 struct Count {
     valid: usize,
-    /// Plans that no envelope is computed of, by what stands in the way.
+    /// Number of plans without a computed envelope, by reason.
     refused: BTreeMap<String, usize>,
-    /// Plans that are not found to work as they are.
+    /// Number of plans that are not proved valid at their nominal values.
     not_as_they_are: usize,
-    /// Boxes with more than one value that withstood the attack.
+    /// Number of boxes with more than one value that passed the tests.
     inside: usize,
-    /// Boxes that were rejected, with values in them that break the plan.
+    /// Number of rejected boxes with values that break the plan.
     broken: usize,
-    /// Boxes that were rejected, without such values among those tried.
+    /// Number of rejected boxes without such values among those tried.
     doubted: usize,
 }
 
@@ -278,7 +279,7 @@ fn in_words(refusal: &Refusal) -> String {
     }
 }
 
-/// Boxes of random plans in random worlds, attacked with the judge.
+/// Tests boxes of random plans in random worlds by the validator.
 fn attack(
     worlds: usize,
     rng: &mut ChaCha8Rng,
@@ -332,7 +333,7 @@ fn attack(
     count
 }
 
-/// So many, or as many as the environment asks for.
+/// Returns the number of worlds, from the environment or by default.
 fn worlds(so_many: usize) -> usize {
     let asked = std::env::var("ELBOWROOM_WORLDS").ok();
     asked.and_then(|text| text.parse().ok()).unwrap_or(so_many)

@@ -1,4 +1,4 @@
-//! Random plans in which numbers race each other past what events watch.
+//! Random plans with several changing numbers, whose relation triggers events.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -10,8 +10,8 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{attack, number, worlds};
 
-/// A domain and a problem in which numbers race: each rises on its own from some time on, and what is
-/// watched is how they stand to each other.
+/// Returns a domain and a problem in which numbers increase independently from different times on.
+/// The events depend on their relation.
 fn race(rng: &mut ChaCha8Rng) -> (String, String) {
     let mut domain = "(define (domain d) (:predicates (on0) (on1) (on2) (done0) (done1) (seen))
         (:functions (x0) (x1) (x2)) (:action look :effect (seen))\n"
@@ -42,7 +42,7 @@ fn race(rng: &mut ChaCha8Rng) -> (String, String) {
     (domain + ")", problem.to_owned())
 }
 
-/// A plan for such a race: who begins when, and some looks in between.
+/// Returns a plan for such a problem: the starts of the increases, and some happenings in between.
 fn plan_of_a_race(rng: &mut ChaCha8Rng) -> (String, String) {
     let (mut fixed, mut open) = (String::new(), String::new());
     let mut starts: Vec<i64> = (0..=16).collect();
@@ -62,8 +62,8 @@ fn plan_of_a_race(rng: &mut ChaCha8Rng) -> (String, String) {
     (fixed, open)
 }
 
-/// Between two happenings, an event's condition may come to hold and cease to hold again: only what
-/// is demanded of the time between them keeps boxes from that.
+/// Between two happenings, an event's condition may become true and false again. Only the
+/// requirements for the time in between exclude that from boxes.
 #[test]
 #[allow(clippy::print_stdout, reason = "says what was attacked")]
 fn schedules_in_boxes_of_random_races_pass_the_judge() {

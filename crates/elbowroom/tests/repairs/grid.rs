@@ -1,4 +1,4 @@
-//! Random small plans: no change on a grid costs less than the repair that was found.
+//! Small random plans: no change on a grid costs less than the repair that was found.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A problem with two actions whose durations, and two timed initials whose times, may change.
+/// Problem with two actions whose durations, and two timed initials whose times, may change.
 struct Small {
     domain: String,
     /// Durations, then the times at which the shop opens and closes.
@@ -22,9 +22,9 @@ struct Small {
     plan: String,
 }
 
-/// All numbers are multiples of this; ε is one of it.
+/// All numbers are multiples of 1 / `UNIT`, which is also ε.
 const UNIT: i64 = 2;
-/// No number on the grid is above this, in units.
+/// Maximum number on the grid, in units.
 const MOST: i64 = 14;
 
 impl Small {
@@ -87,7 +87,7 @@ impl Small {
         }
     }
 
-    /// With other numbers, in units.
+    /// Returns the task with other times, in units.
     fn task(&self, timed: [i64; 2]) -> Task {
         let [opens, closes] = timed.map(|time| Rational::new(time, UNIT));
         let problem = format!(
@@ -112,7 +112,7 @@ impl Small {
     }
 }
 
-/// The same step with another start and duration, which its action asks for.
+/// Returns the same step with another start and duration, which becomes the duration of its action.
 fn with_times(step: &Step, start: i64, duration: i64) -> Step {
     use elbowroom::model::ground::{Body, DurationConstraint, Expression};
     use elbowroom::model::problem::Comparison;
@@ -130,7 +130,7 @@ fn with_times(step: &Step, start: i64, duration: i64) -> Step {
     step
 }
 
-/// For each two interfering happenings of different actions, which comes first.
+/// Returns the order of each two interfering happenings of different actions.
 fn order(task: &Task, plan: &TimeTriggeredPlan) -> Vec<std::cmp::Ordering> {
     let happenings: Vec<(usize, Rational, Footprint)> = plan
         .steps
@@ -158,7 +158,7 @@ fn order(task: &Task, plan: &TimeTriggeredPlan) -> Vec<std::cmp::Ordering> {
     order
 }
 
-/// Returns `true` if the grid has a valid schedule with these values: in one of these orders of
+/// Returns `true` if the grid has a valid schedule with these values, in one of these orders of
 /// interfering actions.
 fn has_schedule(
     small: &Small,
@@ -168,7 +168,7 @@ fn has_schedule(
 ) -> bool {
     let wanted = (orders == Orders::Kept).then(|| order(task, plan));
     let changed = small.task([values[2], values[3]]);
-    // Steps are read for the changed task, so that facts mean the same.
+    // Steps are read for the changed task, so that facts have the same numbers.
     let (read, _) = read_plan(&Source::new("plan", small.plan.clone()), &changed).expect("a plan");
     (0..=MOST).any(|first| {
         (0..=MOST).any(|second| {
@@ -184,7 +184,7 @@ fn has_schedule(
     })
 }
 
-/// Repairs random plans, and looks for something cheaper.
+/// Repairs random plans, and searches for cheaper repairs.
 pub(crate) fn compare() {
     let mut rng = ChaCha8Rng::seed_from_u64(14);
     let (mut repaired, mut changed, mut impossible, mut equal) = (0, 0, 0, 0);
@@ -241,7 +241,8 @@ pub(crate) fn compare() {
                         let own = small.cost(values);
                         let is_of_interest = match &cost {
                             Some(cost) => own < *cost || (own == *cost && !is_equal),
-                            // All of them are too many; those near to the plan are enough.
+                            // The grid is too large for all of them; those close to the plan are
+                            // enough.
                             None => own <= Rational::from(2),
                         };
                         if is_of_interest && has_schedule(&small, values, &plan, (&task, orders)) {

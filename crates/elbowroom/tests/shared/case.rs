@@ -1,4 +1,4 @@
-//! An STN plan with its problem, and what the library says of it.
+//! STN plan with its problem, and queries to the library.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::draw;
 
-/// An STN plan with its problem.
+/// STN plan with its problem.
 pub(crate) struct Case {
     pub(crate) task: Arc<Task>,
     pub(crate) plan: Arc<ParametrizedPlan>,
@@ -28,14 +28,14 @@ pub(crate) fn number(text: &str) -> Rational {
 }
 
 impl Case {
-    /// Reads a plan file.
+    /// Reads a plan file with its domain and problem.
     pub(crate) fn read(domain: &Path, problem: &Path, plan: &Path) -> Self {
         let text = std::fs::read_to_string(plan)
             .unwrap_or_else(|error| panic!("{}: {error}", plan.display()));
         Self::of_text(domain, problem, &text)
     }
 
-    /// Reads a plan.
+    /// Reads a plan from a text.
     pub(crate) fn of_text(domain: &Path, problem: &Path, plan: &str) -> Self {
         let task = super::task(domain, problem).unwrap_or_else(|error| panic!("{error}"));
         let plan = format::read(plan.as_bytes(), &task).unwrap_or_else(|error| panic!("{error}"));
@@ -49,14 +49,15 @@ impl Case {
         Oracle::new(&self.task, &self.plan, Guarantee::Weak).expect("within reach")
     }
 
-    /// Whether the plan works everywhere in the box (`dur_0=[7/4,9]`; what is left out is nominal).
+    /// Returns `true` if the plan is valid everywhere in the box (`dur_0=[7/4,9]`; missing ones are
+    /// nominal).
     pub(crate) fn has_inside(&self, text: &str) -> bool {
         self.why_not(text).is_none()
     }
 
-    /// Why the plan does not work everywhere in the box.
+    /// Returns the reason why the plan is not valid everywhere in the box.
     ///
-    /// Where there is a schedule, and the judge can be asked, it must object as well.
+    /// If there is a schedule that the validator can check, it must reject it as well.
     pub(crate) fn why_not(&self, text: &str) -> Option<Explanation> {
         let envelope = parse_box(text, &self.plan).expect("a box of this plan");
         let (objection, explanation) = self.objection(&envelope)?;
@@ -72,7 +73,7 @@ impl Case {
         Some(explanation)
     }
 
-    /// What is broken at the nominal values.
+    /// Returns the violated requirement at the nominal values.
     pub(crate) fn broken(&self) -> Option<Requirement> {
         match self.objection(&DecoupledEnvelope::point(&self.plan.nominal()))? {
             (Objection::Broken(broken), _) => Some(broken.requirement),
@@ -88,8 +89,8 @@ impl Case {
         Some((objection, explanation))
     }
 
-    /// The box that the authors' search finds at this precision, and that box with all ends moved
-    /// onto their limits. Samples of both have passed the judge.
+    /// Returns the box that the authors' search finds at this precision, and that box with all ends
+    /// at their limits. Samples of both have been accepted by the validator.
     pub(crate) fn found(&self, precision: &str) -> [DecoupledEnvelope; 2] {
         let settings = Settings {
             precision: number(precision),
@@ -108,13 +109,13 @@ impl Case {
         [envelope, sharp]
     }
 
-    /// The box with its ends on their limits, as text.
+    /// Returns the box with its ends at their limits, as text.
     pub(crate) fn limits(&self) -> String {
         let [_, sharp] = self.found("1");
         write_box(&sharp, &self.plan)
     }
 
-    /// Random values in the box, random schedules for them: the judge must accept all.
+    /// Checks that the validator accepts random schedules for random values in the box.
     pub(crate) fn assert_withstands(&self, envelope: &DecoupledEnvelope) {
         const SAMPLES: usize = 20;
         let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -2,17 +2,17 @@
 
 use std::fmt::Write as _;
 
-/// What a robot needs on its way.
+/// Resource that a robot needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Needs {
-    /// Nothing but time.
+    /// Only time.
     Time,
-    /// A charge that drops while it goes, and must not be below zero at any moment.
+    /// Charge that decreases during each way, and must never be below zero.
     Charge,
 }
 
-/// A domain, a problem and a plan in which each robot goes to so many places, each way of 10 time
-/// units. The doors close after half as much time again.
+/// Returns a domain, a problem and a plan in which each robot goes `ways` ways of 10 time units
+/// each. The doors close after one and a half times the planned duration.
 pub(crate) fn chains(robots: usize, ways: usize, needs: Needs) -> (String, String, String) {
     let is_charged = needs == Needs::Charge;
     let (functions, condition, effect) = if is_charged {

@@ -1,9 +1,10 @@
-//! Documents in which one number is changed.
+//! Documents with one changed number.
 
 use elbowroom_num::Rational;
 use serde_json::Value;
 
-/// The places of all numbers inside a value; a number's decimal form is for people.
+/// Finds the places of all numbers inside a value, without the decimal forms, which are only for
+/// readers.
 pub(crate) fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(members) => {
@@ -24,7 +25,7 @@ pub(crate) fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
     }
 }
 
-/// The same number, but not quite.
+/// Returns a slightly different number.
 pub(crate) fn changed(value: &Value) -> Value {
     match value {
         Value::String(text) => {

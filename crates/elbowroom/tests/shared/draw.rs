@@ -7,8 +7,8 @@ use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// Values in the box, often at ends of intervals. From an unbounded interval, a value up to a
-/// thousand away from its other end.
+/// Draws values in the box, often at ends of intervals. From an unbounded interval, it draws a
+/// value up to a thousand away from the other end.
 pub(crate) fn valuation(envelope: &DecoupledEnvelope, rng: &mut ChaCha8Rng) -> Valuation {
     envelope
         .intervals()
@@ -28,7 +28,7 @@ fn value(interval: &Interval, rng: &mut ChaCha8Rng) -> Rational {
     &lower + (&upper - &lower) * share(rng)
 }
 
-/// 0 or 1 half of the time, something between otherwise.
+/// Returns 0 or 1 half of the time, and a number in between otherwise.
 fn share(rng: &mut ChaCha8Rng) -> Rational {
     let thousandths = match rng.random_range(0..4) {
         0 => 0,
@@ -38,8 +38,8 @@ fn share(rng: &mut ChaCha8Rng) -> Rational {
     Rational::new(thousandths, 1000)
 }
 
-/// A schedule of the plan at the values: nodes take a time in their window one after another, in
-/// random order, often one of the window's ends. `None` if the plan has no schedule there.
+/// Draws a schedule of the plan at the values: in random order, each node gets a time in its
+/// window, often one of the window's ends. `None` if the plan has no schedule there.
 pub(crate) fn schedule(
     plan: &StnPlan,
     valuation: &Valuation,
@@ -49,7 +49,7 @@ pub(crate) fn schedule(
     let mut network = ConsistentNetwork::try_from(plan.network(valuation)).ok()?;
     let mut nodes: Vec<NodeId> = plan.nodes().map(|(node, _)| node).skip(1).collect();
     nodes.shuffle(rng);
-    // Some schedules are hurried throughout, some late, some neither.
+    // Some schedules are as early as possible, some as late as possible, others mixed.
     let habit = [Some(Rational::ZERO), Some(Rational::ONE), None][rng.random_range(0..3)].clone();
     for node in nodes {
         let node = network_node(node);

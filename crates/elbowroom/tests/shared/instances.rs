@@ -1,8 +1,8 @@
-//! The instances of the paper's experiments (Figures 3 and 4).
+//! Instances of the paper's experiments (Figures 3 and 4).
 
 use std::path::{Path, PathBuf};
 
-/// Files that go together.
+/// Files of an instance.
 #[derive(Clone, Debug)]
 pub(crate) struct Instance {
     /// `auv mission_10_0_3`, …
@@ -12,7 +12,8 @@ pub(crate) struct Instance {
     pub(crate) plan: PathBuf,
 }
 
-/// All `auv`, `generator_linear` and `solar_rover` instances with parameters and nominal values.
+/// Returns all `auv`, `generator_linear` and `solar_rover` instances with parameters and nominal
+/// values.
 pub(crate) fn figure_3(data: &Path) -> Vec<Instance> {
     let envelopes = data.join("envelopes");
     let mut instances = Vec::new();
@@ -59,7 +60,8 @@ pub(crate) fn figure_3(data: &Path) -> Vec<Instance> {
     instances
 }
 
-/// All robot deliveries of `scalability`, with the domain whose drives take as long as they like.
+/// Returns all robot deliveries of `scalability`, with the domain whose drives have unrestricted
+/// durations.
 pub(crate) fn figure_4(data: &Path) -> Vec<Instance> {
     let envelopes = data.join("envelopes");
     let folder = envelopes.join("robot_delivery/scalability");
@@ -86,7 +88,7 @@ pub(crate) fn figure_4(data: &Path) -> Vec<Instance> {
         .collect()
 }
 
-/// The names of the files in a folder, sorted.
+/// Returns the names of the files in a folder, sorted.
 fn files(folder: &Path) -> Vec<String> {
     let entries =
         std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));

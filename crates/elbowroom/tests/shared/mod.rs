@@ -1,5 +1,5 @@
-//! Benchmark files beside the repository. Tests that need them say so and pass where they are
-//! absent.
+//! Benchmark files next to the repository. Tests that need them print a note and pass if they are
+//! missing.
 #![allow(dead_code, reason = "each test uses some of it")]
 
 pub(crate) mod case;
@@ -19,7 +19,7 @@ use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Source, read_plan, read_problem};
 pub(crate) use skipped::skipped;
 
-/// The folder of benchmark data, if it is there.
+/// Returns the folder of benchmark data, if it exists.
 pub(crate) fn data() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     if folder.is_dir() {
@@ -29,19 +29,19 @@ pub(crate) fn data() -> Option<PathBuf> {
     None
 }
 
-/// A file as source text.
+/// Reads a file as source text.
 pub(crate) fn source(path: &Path) -> Source {
     let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     Source::from_bytes(path.display().to_string(), &bytes)
 }
 
-/// Reads a plan; `None` if it is not one for this task.
+/// Reads a plan. Returns `None` if it is not one for this task.
 pub(crate) fn plan(task: &Task, path: &Path) -> Option<TimeTriggeredPlan> {
     let read = read_plan(&source(path), task);
     read.ok().map(|(plan, _)| plan)
 }
 
-/// The task of a domain and a problem file, or what is wrong with them.
+/// Reads the task of a domain and a problem file. The error holds the messages.
 pub(crate) fn task(domain: &Path, problem: &Path) -> Result<Task, String> {
     match read_problem(&source(domain), &source(problem)) {
         Ok((problem, _)) => Ok(Task::new(problem)),

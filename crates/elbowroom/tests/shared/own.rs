@@ -1,4 +1,4 @@
-//! The cases of this repository, read.
+//! The cases of this repository.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use elbowroom_pddl::{read_plan, read_problem};
 
 use super::source;
 
-/// A case with its plan.
+/// Reads a case with its plan.
 pub(crate) fn case(name: &str) -> (Arc<Task>, AnyPlan) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../../cases")

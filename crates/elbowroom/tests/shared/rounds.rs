@@ -2,16 +2,16 @@
 
 use std::fmt::Write as _;
 
-/// The domain of `cases/delivery`.
+/// Domain of `cases/delivery`.
 pub(crate) const DOMAIN: &str = include_str!("../../../../cases/delivery/domain.pddl");
 
-/// The duration of a round of four actions: to the shelf, pick, to the office, drop.
+/// Durations of the four actions of a round: to the shelf, pick, to the office, drop.
 const ROUND: [i64; 4] = [15, 2, 15, 3];
 
-/// A problem with so many parcels, and a plan for it with `4 · parcels + 1` actions.
+/// Returns a problem with this number of parcels, and a plan for it with `4 · parcels + 1` actions.
 ///
-/// The robot begins at the office. Rounds take 35 each, the pauses of ε between actions left
-/// aside; the office closes after twice the time that they all take.
+/// The robot begins at the office. Rounds take 35 each, without the separations of ε between
+/// actions. The office closes after twice the total time.
 pub(crate) fn rounds(parcels: usize) -> (String, String) {
     let round: i64 = ROUND.iter().sum();
     let closes = 2 * round * i64::try_from(parcels).expect("few parcels");

@@ -1,17 +1,16 @@
-//! An executor whose decisions are timed: [`Timed`].
+//! Measurement of an executor's decision times: [`Timed`].
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use elbowroom_execution::{Decided, Executor, Mission, Moment, Need, Planned, Reason, StepId};
 
-/// How long decisions took.
+/// Decision times.
 #[derive(Clone, Default)]
 pub(crate) struct Times(Arc<Mutex<Vec<Duration>>>);
 
 impl Times {
-    /// How many decisions there were; the median of the times that they took, the 99th percentile, and
-    /// the longest.
+    /// Returns the number of decisions, and the median, 99th percentile and maximum of their times.
     pub(crate) fn summary(&self) -> (usize, [String; 3]) {
         let mut times = self.0.lock().expect("no thread has panicked").clone();
         times.sort_unstable();
@@ -23,7 +22,7 @@ impl Times {
     }
 }
 
-/// An executor whose decisions are timed.
+/// Executor whose decisions are timed.
 pub(crate) struct Timed {
     pub(crate) inner: Box<dyn Executor>,
     pub(crate) times: Times,

@@ -1,25 +1,25 @@
-//! With which plans executors begin, where these are chosen by their probability.
+//! First plans of executors that are chosen by their probability.
 
 use elbowroom::execute::Choice;
 use serde::{Deserialize, Serialize};
 
-/// The plan that an executor begins with in all trials of one problem in one column.
+/// First plan of an executor in all trials of one problem in one column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Beginning {
-    /// Which problem, from 0.
+    /// Position of the problem, from 0.
     pub problem: usize,
-    /// Which row.
+    /// Position of the row.
     pub row: usize,
-    /// Which column.
+    /// Position of the column.
     pub column: usize,
-    /// How many actions it has.
+    /// Number of its actions.
     pub actions: usize,
-    /// When it ends, in seconds.
+    /// End time, in seconds.
     pub ends: f64,
-    /// The share of samples of the world in which the executor succeeded with it.
+    /// Share of world samples in which the executor succeeded with it.
     pub probability: f64,
-    /// What it was made for, in words; empty if it is the shortest.
+    /// Purpose for which it was made, in words; empty for the shortest plan.
     pub made_for: String,
 }
 
@@ -42,14 +42,15 @@ impl Beginning {
     }
 }
 
-/// Each once: parts of one experiment begin with the same plans.
+/// Merges the first plans of two parts without duplicates, because parts of one experiment begin
+/// with the same plans.
 pub(super) fn merge(mine: &mut Vec<Beginning>, theirs: &[Beginning]) {
     mine.extend_from_slice(theirs);
     mine.sort_by_key(Beginning::place);
     mine.dedup_by_key(|it| it.place());
 }
 
-/// A sentence for each row and column.
+/// Returns a sentence for each row and column.
 pub(super) fn notes(all: &[Beginning], rows: &[String], columns: &[String]) -> Vec<String> {
     let mut notes = Vec::new();
     for (column, name) in columns.iter().enumerate() {
@@ -67,7 +68,7 @@ pub(super) fn notes(all: &[Beginning], rows: &[String], columns: &[String]) -> V
     notes
 }
 
-/// The plans of one executor in one column.
+/// Describes the plans of one executor in one column.
 #[allow(
     clippy::cast_precision_loss,
     reason = "an experiment has far fewer problems than 2^52"

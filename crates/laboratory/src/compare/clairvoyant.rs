@@ -1,8 +1,8 @@
-//! Plans that are made knowing what will happen: the most that any executor could reach.
+//! Plans with knowledge of the future: an upper bound for all executors.
 //!
-//! The problem is rewritten so that each action takes as long, and changes fluents by as much, as
-//! the world has it do the first time. The planner then knows the future. It knows it exactly
-//! unless a plan does the same action twice; a world with failures it takes for one without.
+//! The problem is rewritten so that each action has the duration and the amounts of its first
+//! execution in the world. With these, the planner knows the future exactly, unless a plan executes
+//! the same action twice. Failures are ignored.
 
 use elbowroom_execution::{PlanAnswer, Planner};
 use elbowroom_model::problem::{
@@ -14,11 +14,11 @@ use elbowroom_sim::{Purpose, WorldModel};
 
 use elbowroom::execute::rewrite::{add_function_of, set_durations};
 
-/// A summary of the row, in one sentence.
+/// Summary of the row, in one sentence.
 pub(super) const SUMMARY: &str = "The share of trials in which the planner, with the executors' \
     limits, finds a plan when everything is known in advance, or one of the executors gets there.";
 
-/// Whether a plan reaches the goal when the world of that seed is known in advance.
+/// Returns `true` if a plan reaches the goal when the world of that seed is known in advance.
 pub(super) fn can_reach(
     task: &Task,
     world: &WorldModel,
@@ -31,7 +31,7 @@ pub(super) fn can_reach(
     matches!(planner.plan(&known, &situation).answer, PlanAnswer::Plan(_))
 }
 
-/// The problem with the durations and amounts of the world of that seed.
+/// Returns the problem with the durations and amounts of the world of that seed.
 fn with_foreknowledge(task: &Task, world: &WorldModel, seed: u64) -> Problem {
     let mut problem = task.problem().clone();
     for index in 0..problem.schemas.len() {

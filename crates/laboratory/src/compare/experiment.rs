@@ -18,7 +18,7 @@ use toml::Spanned;
 
 use file::{File, exact, text_of};
 
-/// An experiment, with the texts of all files that it names.
+/// Experiment, with the texts of all files that it names.
 #[derive(Clone, Debug)]
 pub struct Experiment {
     /// The title.
@@ -27,76 +27,75 @@ pub struct Experiment {
     pub domain: String,
     /// The problem, in PDDL, with blanks: `{name}`.
     pub problem: String,
-    /// What to fill in: each name takes each of its values, with each value of the others.
+    /// Blanks and their values. All combinations are used.
     pub blanks: IndexMap<String, Vec<String>>,
-    /// More to fill in: several names together, row by row.
+    /// Groups of blanks that are filled in together, row by row.
     pub together: Vec<Together>,
     /// The columns.
     pub columns: Vec<Column>,
     /// The rows.
     pub executors: Vec<ExecutorSpec>,
-    /// Whether to add a row for plans that are made knowing what will happen.
+    /// `true` to add a row for plans with knowledge of the future.
     pub clairvoyant: bool,
-    /// Whether to add a row for what the best of all executors could reach without foresight.
+    /// `true` to add a row for the optimal policy.
     pub optimum: bool,
-    /// How many trials of each problem in each column.
+    /// Number of trials of each problem in each column.
     pub trials: u64,
-    /// Where the dice begin.
+    /// Random seed.
     pub seed: u64,
-    /// How to run.
+    /// Settings of the runs.
     pub settings: RunSettings,
-    /// How close to its limit each end of an envelope should come.
+    /// Precision of each end of an envelope.
     pub precision: Rational,
-    /// The objective of envelopes; `None`: they are IRR's.
+    /// Objective of envelopes; `None` for those of IRR.
     pub objective: Option<Objective>,
-    /// The text of the plan that every executor begins with; `None`: the planner makes it.
+    /// Text of the first plan of every executor; `None` to compute it with the planner.
     pub plan: Option<String>,
-    /// By what the first plan is chosen, where the planner is the embedded one.
+    /// Rule that chooses the first plan, if the planner is the embedded one.
     pub first_plan: FirstPlan,
     /// The planner.
     pub planner: Planning,
-    /// How many states the planner looks at for one plan.
+    /// Maximum number of states in the search for a plan.
     pub planner_states: u64,
-    /// How many of them for a better plan than the first.
+    /// Number of these states for a better plan than the first one.
     pub improve_states: u64,
     /// Work limit for each plan, in seconds of one processor ([`elbowroom_num::work`]).
     pub planning_budget: Rational,
-    /// How many states the table of `policy` may have, which no file says: with 0, there is none,
-    /// and moves are tried out.
+    /// Maximum number of states in the table of `policy`, which files cannot set. With 0 there is
+    /// no table, and moves are evaluated by rollouts.
     pub table_states: usize,
-    /// Figures to stand beside ours.
+    /// Published figures for the table.
     pub published: Vec<Published>,
 }
 
-/// The planner of an experiment.
+/// Planner of an experiment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Planning {
     /// The embedded planner.
     #[default]
     Embedded,
-    /// Another program, as in `elbowroom plan --planner`. What it answers may depend on how fast
-    /// the machine is.
+    /// An external planner, as in `elbowroom plan --planner`. Its answers may depend on the speed
+    /// of the machine.
     Another {
         /// Its name, or its command line.
         name: String,
-        /// The time for finding better plans; if nothing is said, its first plan is taken.
+        /// Time to improve plans; `None` to use its first plan.
         seconds: Option<Rational>,
     },
 }
 
-/// A column of the table.
+/// Column of the table.
 #[derive(Clone, Debug)]
 pub struct Column {
     /// Its heading.
     pub name: String,
     /// The world file.
     pub world: String,
-    /// The world file that executors go by, such as one that was learnt; without it, the world's own.
+    /// World file that executors believe in, such as a learnt one; `None` for the world itself.
     pub believed: Option<String>,
-    /// How likely everything is, for executors that go by that: a likelihood file. Without one,
-    /// everything is certain.
+    /// Likelihood file, for executors that use likelihoods; `None` if everything is certain.
     pub likelihoods: Option<String>,
-    /// The quantities that may vary.
+    /// Quantities that may vary.
     pub vary: Vec<VarySpec>,
 }
 
@@ -113,22 +112,22 @@ pub struct Together {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
-    /// Which row they belong to.
+    /// Executor of the row.
     pub executor: String,
     /// Percentages.
     pub coverage: Vec<f64>,
-    /// Mean number of new plans in successful runs; NaN where there were none.
+    /// Mean number of new plans in successful runs; NaN if there were none.
     #[serde(default)]
     pub replans: Vec<f64>,
 }
 
-/// An experiment that cannot be made.
+/// Error in an experiment.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ExperimentError {
-    /// The file, or one that it names, is wrong.
+    /// The file is invalid, or one that it names.
     #[error("{0}")]
     Text(Diagnostics),
-    /// Something else is.
+    /// Another error.
     #[error("{0}")]
     Other(String),
 }
@@ -140,13 +139,13 @@ impl ExperimentError {
 }
 
 impl Experiment {
-    /// All that the results depend on, in an order that stays.
+    /// Returns all data on which the results depend, in a fixed order.
     pub(super) fn identity(&self) -> Value {
-        // Whoever adds a member says here whether results depend on it.
+        // A new member must be listed here, as part of the identity or not.
         let Self {
             title: _,
             published: _,
-            // That many are made as whoever makes them says.
+            // The caller sets the number of trials.
             trials: _,
             domain,
             problem,
@@ -224,7 +223,8 @@ impl Experiment {
             planner_states,
             improve_states,
         ]);
-        // Nothing else depends on these, so results without them stay what they are.
+        // These members are omitted at their defaults, so that the identity of older results does
+        // not change.
         let identity = and(identity, "objective", objective.map(|it| json!(it.name())));
         let identity = and(identity, "plan", plan.as_ref().map(|it| json!(it)));
         let is_usual = first_plan.is_shortest();
@@ -242,7 +242,7 @@ impl Experiment {
         }
     }
 
-    /// Reads an experiment. `file` gives the text of a file that it names.
+    /// Reads an experiment. `file` returns the text of a file that it names.
     ///
     /// # Errors
     /// The first mistake, with its place.
@@ -347,7 +347,7 @@ impl Experiment {
         })
     }
 
-    /// All ways to fill in the blanks; the last blank changes fastest.
+    /// Returns all combinations of values for the blanks; the last blank changes fastest.
     pub fn fillings(&self) -> Vec<Vec<(String, String)>> {
         let mut fillings = vec![Vec::new()];
         for (name, values) in &self.blanks {
@@ -374,7 +374,7 @@ impl Experiment {
         fillings
     }
 
-    /// The names of the rows.
+    /// Returns the names of the rows.
     pub fn rows(&self) -> Vec<String> {
         rows(&self.executors, self.clairvoyant)
     }
@@ -386,10 +386,11 @@ fn rows(executors: &[ExecutorSpec], clairvoyant: bool) -> Vec<String> {
     rows.chain(last).collect()
 }
 
-/// The row for plans that are made knowing what will happen.
+/// Name of the row for plans with knowledge of the future.
 pub(crate) const CLAIRVOYANT: &str = "clairvoyant";
 
-/// The identity with one more member, if it has a value. Without one, it is the identity of older results.
+/// Adds a member to the identity if it has a value. Without one, the identity is that of older
+/// results.
 fn and(identity: Value, label: &str, value: Option<Value>) -> Value {
     match value {
         Some(value) => json!([identity, label, value]),

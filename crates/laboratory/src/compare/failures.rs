@@ -1,4 +1,4 @@
-//! How trials fail: by verdict, cause and action, each with its first trial, and that trial's trace.
+//! Failures of trials by verdict, cause and action, each with its first trial.
 
 use elbowroom_execution::run::{Report, Verdict};
 use serde::{Deserialize, Serialize};
@@ -7,37 +7,37 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Failure {
-    /// How they ended.
+    /// Verdict of the runs.
     pub verdict: String,
-    /// Why the last plan was given up; `None` if none was.
+    /// Cause for which the last plan was abandoned; `None` if none was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cause: Option<String>,
-    /// The action that this was about.
+    /// Action of that cause.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub action: Option<String>,
-    /// The number of runs.
+    /// Number of runs.
     pub runs: u64,
-    /// The first of them.
+    /// First of the runs.
     pub first: TrialId,
 }
 
-/// A trial of an executor in a column.
+/// Trial of an executor in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrialId {
-    /// Which problem, from 0.
+    /// Position of the problem, from 0.
     pub problem: usize,
-    /// Which trial of it, from 0.
+    /// Number of its trial, from 0.
     pub trial: u64,
 }
 
-/// The failed runs of a cell by kind.
+/// Failed runs of a cell by kind.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Failures(Vec<Failure>);
 
 impl Failures {
-    /// All kinds, the most frequent first.
+    /// Returns all kinds, the most frequent first.
     pub fn kinds(&self) -> Vec<&Failure> {
         let mut kinds: Vec<&Failure> = self.0.iter().collect();
         kinds.sort_by(|a, b| b.runs.cmp(&a.runs).then_with(|| a.key().cmp(&b.key())));
@@ -48,12 +48,12 @@ impl Failures {
         self.0.is_empty()
     }
 
-    /// One more run.
+    /// Counts a run.
     pub(super) fn count(&mut self, report: &Report, first: TrialId) {
         if report.verdict == Verdict::GoalReached {
             return;
         }
-        // Where no plan is left, that says more than why the last one was given up.
+        // The reason why no plan is left says more than the reason why the last one was abandoned.
         let reason = report.dead_end.last().or(report.reasons.last());
         self.add(&Failure {
             verdict: report.verdict.name().to_owned(),
@@ -70,7 +70,8 @@ impl Failures {
         }
     }
 
-    /// Kinds are kept in order, so that the same runs give the same list whoever counts them.
+    /// Adds failures of one kind. Kinds are sorted, so the list does not depend on the order of the
+    /// runs.
     pub(crate) fn add(&mut self, failure: &Failure) {
         match self.0.binary_search_by(|own| own.key().cmp(&failure.key())) {
             Ok(place) => {

@@ -1,4 +1,4 @@
-//! The row for the best of all executors: see [`timed`](crate::timed).
+//! Row of the optimal policy: see [`timed`](crate::timed).
 
 use elbowroom::execute::ActionSets;
 use rayon::prelude::*;
@@ -8,29 +8,30 @@ use super::trials::Setting;
 use super::{Column, Experiment, ExperimentError, Part, for_each};
 use crate::timed::{Settings, optimum};
 
-/// The name of the row.
+/// Name of the row.
 pub(super) const ROW: &str = "optimum without foresight";
 
-/// A summary of the row, in one sentence.
+/// Summary of the row, in one sentence.
 pub(super) const SUMMARY: &str = "Bounds, in percent, for what the best of all executors reaches that knows \
     the world's distributions but not what will happen; it replans at any time and in no time.";
 
-/// The optimum of a column: the mean over its problems, or over those of a part of an experiment.
+/// Optimum of a column: the mean over its problems, or over those of a part of an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnOptimum {
-    /// At least this: a multiple of a billionth of one in `problems`, so that parts add up to the same as the whole.
+    /// Lower bound: a multiple of 1e-9 divided by `problems`, so that parts add up exactly.
     pub lower: f64,
-    /// And at most this; the same.
+    /// Upper bound, of the same form.
     pub upper: f64,
-    /// The number of problems.
+    /// Number of problems.
     pub problems: u64,
-    /// Why the bounds say nothing, if they do not.
+    /// Reason why the bounds are trivial, if they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unknown: Option<String>,
 }
 
-/// For each column, of the problems that are a part's: every Nth one. Problems are looked at in parallel, which changes nothing.
+/// Computes the optimum of each column over the problems of a part: every Nth one. Problems are
+/// solved in parallel, and the result does not depend on that.
 pub(super) fn of(
     experiment: &Experiment,
     fillings: &[Vec<(String, String)>],
@@ -85,7 +86,7 @@ fn bounds(
         .map_err(|why| why.to_string()))
 }
 
-/// Bounds are added up as whole numbers of these, of one.
+/// Number of units in 1. Bounds are added up in whole units.
 const SHARES: f64 = 1e9;
 
 fn mean(bounds: &[Result<(f64, f64), String>]) -> ColumnOptimum {
@@ -107,7 +108,7 @@ fn mean(bounds: &[Result<(f64, f64), String>]) -> ColumnOptimum {
     sum.mean(unknown.cloned())
 }
 
-/// The bounds of several problems, in whole numbers of [`SHARES`], which stay far below 2^52.
+/// Bounds of several problems, in whole units of 1 / [`SHARES`], far below 2^52.
 #[derive(Default)]
 struct Sum {
     lower: f64,
@@ -157,32 +158,32 @@ impl ColumnOptimum {
         *self = sum.mean(unknown);
     }
 
-    /// Whether there are bounds at all.
+    /// Returns `true` if the bounds are known.
     pub fn is_known(&self) -> bool {
         self.unknown.is_none() && self.problems > 0
     }
 
-    /// In percent, rounded outwards.
+    /// Returns the bounds in percent, rounded outwards.
     pub(super) fn words(&self) -> String {
         if !self.is_known() {
             return "-".to_owned();
         }
         let tenths = |value: f64| value / 10.0;
-        // What a bound was rounded by, or is off by as a floating-point number, is not shown.
+        // The rounding and floating-point errors of a bound are not shown.
         let lower = tenths((self.lower * 1000.0 + ROUNDING).floor());
         let upper = tenths((self.upper * 1000.0 - ROUNDING).ceil());
         format!("{lower:.1} to {upper:.1}")
     }
 }
 
-/// In tenths of a percentage point.
+/// Tolerance in tenths of a percentage point.
 const ROUNDING: f64 = 1e-5;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Parts add up to the same as the whole, to the last bit, in whatever order; also with a part that has no problem.
+    /// Parts add up exactly to the whole, in any order, and also with a part without problems.
     #[test]
     fn parts_add_up_to_the_whole() {
         let bounds: Vec<Result<(f64, f64), String>> = (0..97)

@@ -1,25 +1,25 @@
-//! Experiments in parts: which parts belong together, and what they make together.
+//! Parts of experiments, and their sum.
 
 use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-/// Results of a part of an experiment, or of several.
+/// Results of one or several parts of an experiment.
 pub(crate) trait Partial: Clone {
-    /// The fingerprint of the experiment, and the number of parts it was split into.
+    /// Returns the fingerprint of the experiment, and the number of parts.
     fn origin(&self) -> (&str, u64);
-    /// Whether both have the same rows and columns.
+    /// Returns `true` if both have the same rows and columns.
     fn has_shape_of(&self, other: &Self) -> bool;
-    /// Into how many parts it was split, and which of them are in here.
+    /// Returns the number of parts, and the positions of those in these results.
     fn parts(&mut self) -> (&mut u64, &mut Vec<u64>);
     /// Adds the counts of another part.
     fn add(&mut self, other: &Self);
 }
 
-/// Puts parts of one experiment together.
+/// Merges parts of one experiment.
 ///
 /// # Errors
-/// When they are parts of different ones, or the same part comes twice; the message for the user.
+/// They belong to different experiments, or a part occurs twice. The text is for the user.
 pub(crate) fn merged<P: Partial>(parts: &[P]) -> Result<P, String> {
     let Some((first, rest)) = parts.split_first() else {
         return Err("there is nothing to put together".to_owned());
@@ -45,13 +45,13 @@ pub(crate) fn merged<P: Partial>(parts: &[P]) -> Result<P, String> {
     Ok(whole)
 }
 
-/// Whether an experiment that is split into `shards` parts has these, each of them once.
+/// Returns `true` if these are distinct parts of an experiment with `shards` parts.
 pub(crate) fn are_possible(shards: u64, parts: &[u64]) -> bool {
     let mut seen = BTreeSet::new();
     !parts.is_empty() && parts.iter().all(|part| *part < shards && seen.insert(part))
 }
 
-/// How many trials of `what` were made, in words; where parts are missing, it says so.
+/// Describes the number of trials of `what`. Missing parts are mentioned.
 pub(crate) fn made(trials: u64, what: &str, shards: u64, parts: &[u64]) -> String {
     let shards = shards.max(1);
     if (0..shards).all(|part| parts.contains(&part)) {
@@ -70,14 +70,14 @@ pub(crate) fn made(trials: u64, what: &str, shards: u64, parts: &[u64]) -> Strin
     )
 }
 
-/// For what is written down only where it is true.
+/// Skips a member in the output if it is `false`.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "what serde asks for")]
 pub(crate) fn is_false(value: &bool) -> bool {
     !value
 }
 
-/// A number that is different for different experiments: FNV-1a over all that their results depend
-/// on. How that is called in here makes no difference, so that stored results stay what they are.
+/// Returns the fingerprint of an experiment: FNV-1a over all data on which its results depend.
+/// Internal names are not part of it, so stored results stay valid.
 pub(crate) fn fingerprint(identity: &Value, trials: u64) -> String {
     let everything = format!("{trials} {identity}");
     let hash = everything

@@ -1,4 +1,4 @@
-//! What all trials of one problem in one column have in common: [`Place`].
+//! Data shared by all trials of one problem in one column: [`Place`].
 
 use std::sync::Arc;
 
@@ -20,27 +20,28 @@ use elbowroom::execute::{
 };
 use elbowroom::timed::{Policy, Settings};
 
-/// A column for one problem.
+/// Column for one problem.
 pub(super) struct Place {
-    /// The world in which runs are made.
+    /// The world of the runs.
     pub(super) world: WorldModel,
     pub(super) likelihoods: Arc<Likelihoods>,
     pub(super) foresight: Foresight,
     pub(super) preparer: RememberingPreparer<Analyst>,
-    /// For executors that look for likelier plans: who makes them, and the same with a memory.
+    /// Search for likelier plans, for executors that use it, and the same with a cache.
     pub(super) odds: SharedLikeliest,
     pub(super) likeliest: RememberingPlanner<SharedLikeliest>,
-    /// For executors that weigh each move: the table, or who tries moves out where there is none.
+    /// Table of the world, for executors that evaluate each move, or rollouts if there is no table.
     pub(super) outlook: Option<Arc<dyn Outlook>>,
     pub(super) rehearse: Option<SharedRehearse>,
-    /// The plan that each executor begins with.
+    /// First plan of each executor.
     pub(super) firsts: Vec<TimeTriggeredPlan>,
-    /// Those of them that were chosen by their probability.
+    /// First plans that were chosen by their probability.
     pub(super) beginnings: Vec<Beginning>,
 }
 
 impl Setting<'_> {
-    /// A column, with the plan that each executor begins with; `first` is the experiment's or the planner's.
+    /// Prepares a column, with the first plan of each executor. `first` is the experiment's plan or
+    /// the planner's.
     pub(super) fn place(
         &self,
         place: usize,
@@ -50,7 +51,7 @@ impl Setting<'_> {
     ) -> Result<Place, ExperimentError> {
         let column = &self.experiment.columns[place];
         let happens = world(column, task)?;
-        // What executors go by.
+        // The world that executors believe in.
         let world = believed(column, task)?.unwrap_or_else(|| happens.clone());
         let likelihoods = Arc::new(match &column.likelihoods {
             None => Likelihoods::certain(),
@@ -95,7 +96,7 @@ impl Setting<'_> {
         });
         let outlook = outlook.flatten();
         let rehearse = (asks_outlook && outlook.is_none()).then(|| {
-            // Who tries moves out is none of those that are tried.
+            // The executor that uses rollouts is not simulated in them.
             let rollouts = self.rollouts(&ExecutorSpec::default(), column, (&world, &likelihoods));
             SharedRehearse::new(Rehearse::new(rollouts, self.embedded()))
         });
@@ -105,7 +106,7 @@ impl Setting<'_> {
         let mut firsts = Vec::with_capacity(self.experiment.executors.len());
         let mut beginnings = Vec::new();
         for (row, spec) in self.experiment.executors.iter().enumerate() {
-            // Who tries out what can be done does so with plans to begin with, too.
+            // An executor that uses rollouts also uses them to choose its first plan.
             let tries_out = spec.asks_outlook() && rehearse.is_some();
             let is_given = self.experiment.plan.is_some();
             let chooses = !is_given && (tries_out || !self.experiment.first_plan.is_shortest());
@@ -139,8 +140,8 @@ impl Setting<'_> {
         })
     }
 
-    /// The first plan that an executor begins with, if it is not the planner's; nor is it where
-    /// choosing was interrupted.
+    /// Returns the first plan of an executor if it differs from the planner's. `None` also after an
+    /// interruption.
     fn chosen(
         &self,
         spec: &ExecutorSpec,
@@ -164,7 +165,7 @@ impl Setting<'_> {
         chooser.choose(task, &Situation::initial(task)).ok()
     }
 
-    /// Trials of an executor in samples of a column's world.
+    /// Returns trials of an executor in samples of a column's world.
     fn rollouts(
         &self,
         spec: &ExecutorSpec,

@@ -1,4 +1,4 @@
-//! Results on a clock as plots.
+//! Plots of results on a clock.
 
 use elbowroom_report::plot::{IntervalPlot, Point, Series};
 use elbowroom_report::statistics::{Mean, Proportion};
@@ -7,8 +7,8 @@ use super::results::Cell;
 use super::{Results, optimum};
 
 impl Results {
-    /// The plots, with a name for a file each: the coverage of each executor in each column, with
-    /// its 95 % interval, and the mean number of new plans of successful runs.
+    /// Returns the plots, with a file name for each: the coverage of each executor in each column
+    /// with its 95 % interval, and the mean number of new plans of successful runs.
     pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
         let mut coverage = self.plot(
             "coverage, with 95 % intervals",
@@ -43,7 +43,7 @@ impl Results {
         }
     }
 
-    /// The upper bound of what the best of all executors reaches, where it says something.
+    /// Returns the upper bound of the optimal policy in each column, where it is known.
     fn reference(&self) -> Option<Series> {
         let point = |column: &super::ColumnOptimum| {
             column.is_known().then_some(Point {

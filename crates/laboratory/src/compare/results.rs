@@ -1,4 +1,4 @@
-//! What came of an experiment, or of a part of it.
+//! Results of an experiment, or of a part of it.
 
 use std::collections::BTreeMap;
 
@@ -15,23 +15,23 @@ use super::optimum::{self, ColumnOptimum};
 use super::parts::{self, Partial, fingerprint};
 use super::{Experiment, Failures, Part, TrialId};
 
-/// Counts by row and column. Everything is a sum, so parts add up exactly, in any order.
+/// Counts by row and column. All counts are sums, so parts add up exactly, in any order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Results {
     format: String,
     version: u64,
-    /// The title of the experiment.
+    /// Title of the experiment.
     pub title: String,
-    /// Distinguishes experiments, so that no apples are added to pears.
+    /// Fingerprint of the experiment. Only parts with the same fingerprint are merged.
     pub fingerprint: String,
-    /// How many trials of each problem and column the whole has.
+    /// Number of trials of each problem and column in the whole experiment.
     pub trials: u64,
-    /// Into how many parts it was split.
+    /// Number of parts of the experiment.
     pub shards: u64,
-    /// Which parts are in here.
+    /// Parts in these results.
     pub parts: Vec<u64>,
-    /// Whether it was interrupted before all trials of these parts were made.
+    /// `true` if it was interrupted before all trials of these parts had run.
     #[serde(default, skip_serializing_if = "parts::is_false")]
     pub is_interrupted: bool,
     /// The rows: executors.
@@ -40,31 +40,31 @@ pub struct Results {
     pub columns: Vec<String>,
     /// By row and column.
     pub cells: Vec<Vec<Cell>>,
-    /// The rows compared in pairs with the first one, by row and column.
+    /// Comparison in pairs of each row with the first one, by row and column.
     pub pairs: Vec<Vec<Pair>>,
-    /// With which plans executors begin, where these were chosen by their probability.
+    /// First plans of executors that were chosen by their probability.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub beginnings: Vec<Beginning>,
-    /// By column, if the experiment asks for it: what the best of all executors could reach.
+    /// Bounds on the optimal policy by column, if the experiment requests them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub optimum: Vec<ColumnOptimum>,
 }
 
-/// The results of one executor in one column.
+/// Results of one executor in one column.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {
-    /// The number of runs.
+    /// Number of runs.
     pub runs: u64,
-    /// How many of them reached the goal.
+    /// Number of runs that reached the goal.
     pub successes: u64,
-    /// How many new plans these made.
+    /// Number of new plans in successful runs.
     pub replans: u64,
-    /// How the runs ended.
+    /// Number of runs by verdict.
     pub verdicts: BTreeMap<String, u64>,
-    /// Why plans were given up.
+    /// Number of abandoned plans by cause.
     pub causes: BTreeMap<String, u64>,
-    /// How the runs failed that did not reach the goal.
+    /// Failed runs by kind.
     #[serde(default, skip_serializing_if = "Failures::is_empty")]
     pub failures: Failures,
     /// Executions that the validator rejects: bugs of the program, whether or not they reached the goal.
@@ -76,7 +76,7 @@ pub struct Cell {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Invalid {
-    /// The number of runs.
+    /// Number of runs.
     pub runs: u64,
     /// The first of them, with its violation.
     pub first: Option<(TrialId, String)>,
@@ -103,17 +103,17 @@ impl Invalid {
     }
 }
 
-/// Trials in which one of two executors reached the goal and the other did not.
+/// Numbers of trials in which exactly one of two executors reached the goal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pair {
-    /// Only the first row's did.
+    /// Only the first row did.
     pub only_first: u64,
-    /// Only this row's did.
+    /// Only this row did.
     pub only_this: u64,
 }
 
-/// Results that cannot be read, or do not belong together.
+/// Results that cannot be read, or that do not belong together.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ResultsError(String);
@@ -121,7 +121,7 @@ pub struct ResultsError(String);
 const FORMAT: &str = "elbowroom-results";
 
 impl Results {
-    /// No trial has been made.
+    /// Creates results without trials.
     pub fn empty(experiment: &Experiment, part: Part) -> Self {
         let rows = experiment.rows();
         let columns: Vec<String> = experiment
@@ -150,7 +150,7 @@ impl Results {
     /// Reads results as JSON.
     ///
     /// # Errors
-    /// When they are none.
+    /// The text does not hold results.
     pub fn read(text: &str) -> Result<Self, ResultsError> {
         let results: Self = serde_json::from_str(text)
             .map_err(|error| ResultsError(format!("no results: {error}")))?;
@@ -172,12 +172,12 @@ impl Results {
         Ok(results)
     }
 
-    /// As JSON.
+    /// Returns the results as JSON.
     pub fn json(&self) -> serde_json::Value {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Whether these are results of that experiment, with any number of trials.
+    /// Returns `true` if these are results of that experiment, with any number of trials.
     pub fn are_of(&self, experiment: &Experiment) -> bool {
         self.fingerprint == fingerprint(&experiment.identity(), self.trials)
             && self.rows == experiment.rows()
@@ -187,16 +187,16 @@ impl Results {
                 .eq(experiment.columns.iter().map(|it| &it.name))
     }
 
-    /// Puts parts of one experiment together.
+    /// Merges parts of one experiment.
     ///
     /// # Errors
-    /// When they are parts of different ones, or the same part comes twice.
+    /// They belong to different experiments, or a part occurs twice.
     pub fn merged(parts: &[Self]) -> Result<Self, ResultsError> {
         parts::merged(parts).map_err(ResultsError)
     }
 
-    /// The table: coverage with its 95 % interval, and mean number of new plans of successful
-    /// runs; beside them the published figures.
+    /// Returns the table: coverage with its 95 % interval, and the mean number of new plans of
+    /// successful runs, beside the published figures.
     pub fn table(&self, experiment: &Experiment) -> Table {
         let mut headings = vec!["executor".to_owned()];
         for column in &self.columns {
@@ -246,8 +246,8 @@ impl Results {
         }
     }
 
-    /// The same for programs: a row for each column and executor, a number in each cell, and names
-    /// that occur once.
+    /// Returns the table for programs: a row for each column and executor, a number in each cell,
+    /// and unique names.
     pub fn records(&self) -> Table {
         let headings = [
             "column",
@@ -329,7 +329,7 @@ impl Results {
     }
 }
 
-/// The summary of each row's executor, as it is registered; each executor once.
+/// Returns the registered summary of each row's executor, without duplicates.
 fn notes(rows: &[String]) -> Vec<String> {
     let mut notes: Vec<String> = Vec::new();
     for row in rows {
@@ -361,7 +361,7 @@ impl Partial for Results {
     fn add(&mut self, other: &Self) {
         self.is_interrupted |= other.is_interrupted;
         beginnings::merge(&mut self.beginnings, &other.beginnings);
-        // What was interrupted may have none.
+        // Interrupted results may have no optimum.
         if self.optimum.is_empty() {
             self.optimum.clone_from(&other.optimum);
         } else {
@@ -396,7 +396,7 @@ impl Partial for Results {
 }
 
 impl Cell {
-    /// One more run.
+    /// Counts a run.
     pub(super) fn count(&mut self, report: &Report, id: TrialId) {
         self.runs += 1;
         self.failures.count(report, id);
@@ -414,7 +414,7 @@ impl Cell {
         }
     }
 
-    /// The share of runs that reached the goal.
+    /// Returns the share of runs that reached the goal.
     pub(super) fn coverage(&self) -> Proportion {
         Proportion {
             successes: self.successes,
@@ -422,7 +422,7 @@ impl Cell {
         }
     }
 
-    /// The mean number of new plans of successful runs.
+    /// Returns the mean number of new plans of successful runs.
     pub(super) fn mean_replans(&self) -> Mean {
         Mean {
             sum: self.replans,
@@ -430,7 +430,7 @@ impl Cell {
         }
     }
 
-    /// [`Self::coverage`] and [`Self::mean_replans`] for the table.
+    /// Returns [`Self::coverage`] and [`Self::mean_replans`] for the table.
     fn words(&self) -> [String; 2] {
         let (coverage, replans) = (self.coverage(), self.mean_replans());
         let percent = |share: f64| format!("{:.1}", share * 100.0);

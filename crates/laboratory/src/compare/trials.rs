@@ -1,4 +1,4 @@
-//! The trials of one problem.
+//! Trials of one problem.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -27,10 +27,10 @@ use elbowroom::{RoundingRule, flow};
 
 use crate::record::{TrialRecord, TrialRecords};
 
-/// The number of plans remembered for one problem: some megabytes.
+/// Number of plans cached for one problem: some megabytes.
 pub(super) const PLANS: usize = 20_000;
 
-/// How many plans made ready are remembered for one problem and column: some megabytes.
+/// Number of prepared plans cached for one problem and column: some megabytes.
 pub(super) const PREPARED: usize = 500;
 
 /// One problem, and some of its trials.
@@ -38,14 +38,14 @@ pub(super) struct Setting<'a> {
     pub(super) experiment: &'a Experiment,
     pub(super) problem: usize,
     pub(super) filling: &'a [(String, String)],
-    /// Which of the part's trials: every `pieces`-th, from this one on.
+    /// Trials of the part: every `pieces`-th, from this one on.
     pub(super) piece: usize,
     pub(super) pieces: usize,
-    /// How many threads the embedded planner may use for one plan.
+    /// Number of threads of the embedded planner.
     pub(super) threads: usize,
 }
 
-/// The data shared by all trials of a problem.
+/// Data shared by all trials of a problem.
 struct Common<'a> {
     task: Arc<Task>,
     planner: RememberingPlanner<Box<dyn Planner + 'a>>,
@@ -53,8 +53,8 @@ struct Common<'a> {
 }
 
 impl Setting<'_> {
-    /// Makes the trials of a part. `tell` is called after each, and says whether to go on;
-    /// `goes_on` says so in between.
+    /// Runs the trials of a part. `tell` is called after each, and returns `false` to stop;
+    /// `goes_on` is polled in between.
     pub(super) fn run(
         &self,
         part: Part,
@@ -68,7 +68,7 @@ impl Setting<'_> {
             return Ok(results);
         }
         let mut common = self.common(goes_on)?;
-        // Whoever was interrupted while getting ready may lack a table, or a plan that was to be chosen.
+        // After an interruption, a table or a chosen plan may be missing.
         if !goes_on() {
             return Ok(results);
         }
@@ -86,14 +86,14 @@ impl Setting<'_> {
         Ok(results)
     }
 
-    /// Reads the problem, makes the first plan, and makes it ready for all executors.
+    /// Reads the problem, computes the first plan, and prepares it for all executors.
     fn common<'a>(
         &self,
         goes_on: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Common<'a>, ExperimentError> {
         let (domain, problem) = self.texts()?;
         let task = Self::task(&domain, &problem)?;
-        // Whoever plans: a plan of another planner could not be carried out.
+        // Checked for all planners, because a plan of another planner could not be executed.
         if let Some(feature) = task.only_judged() {
             return Err(self.wrong(&SpecError::Unheeded(feature).to_string()));
         }
@@ -118,7 +118,7 @@ impl Setting<'_> {
         })
     }
 
-    /// The plan that the experiment names.
+    /// Reads the plan that the experiment names.
     fn given(&self, task: &Task, text: &str) -> Result<TimeTriggeredPlan, ExperimentError> {
         let (plan, _) = RoundingRule::default()
             .read_plan(&Source::new("plan", text), task)
@@ -131,7 +131,7 @@ impl Setting<'_> {
         }
     }
 
-    /// Every executor in the same world. A trial that is interrupted does not count.
+    /// Runs every executor in the same world. An interrupted trial does not count.
     fn trial(
         &self,
         (trial, column): (u64, usize),
@@ -144,7 +144,8 @@ impl Setting<'_> {
         let executors = &self.experiment.executors;
         let mut reports = Vec::with_capacity(executors.len());
         for (row, spec) in executors.iter().enumerate() {
-            // Trials are distributed over threads: with a table of its own, each is independent of the others.
+            // Each trial has its own fact table, so that it does not depend on other trials and
+            // threads.
             let task = Arc::new(common.task.with_own_table());
             reports.push(self.execute(&task, seed, (row, spec), column, common, None));
             if !goes_on() {
@@ -166,7 +167,7 @@ impl Setting<'_> {
         }
         if self.experiment.clairvoyant {
             let world = &common.columns[column].world;
-            // What somebody reached without knowing can be reached knowing.
+            // A goal that an executor has reached is also reachable with knowledge of the future.
             let is_possible = reached.contains(&true)
                 || clairvoyant::can_reach(&common.task, world, seed, &mut self.embedded());
             let cell = &mut results.cells[reached.len()][column];
@@ -181,7 +182,8 @@ impl Setting<'_> {
         }
     }
 
-    /// The same in all columns: their worlds differ only where the columns do.
+    /// Returns the seed of a trial. It is the same in all columns, so their worlds differ only
+    /// where the columns differ.
     fn seed(&self, trial: u64) -> u64 {
         self.experiment
             .seed
@@ -191,7 +193,7 @@ impl Setting<'_> {
             .wrapping_add(trial)
     }
 
-    /// The trace of one trial of the first executor in the first column.
+    /// Returns the trace of one trial of the first executor in the first column.
     pub(super) fn trace(&self, trial: u64) -> Result<String, ExperimentError> {
         let (row, column) = (0, 0);
         if self.experiment.columns[column].believed.is_some() {
@@ -218,7 +220,7 @@ impl Setting<'_> {
         Ok(lines)
     }
 
-    /// The specification of a trial, for its trace.
+    /// Returns the specification of a trial, for its trace.
     fn spec(
         &self,
         column: usize,
@@ -284,7 +286,7 @@ impl Setting<'_> {
         }
     }
 
-    /// The values that were filled in.
+    /// Lists the values of the blanks.
     fn words(&self) -> String {
         let filling = self.filling.iter();
         let filling: Vec<_> = filling
@@ -333,7 +335,7 @@ impl Setting<'_> {
             .with_rehearsal(rehearse.clone().filter(|_| spec.asks_outlook()))
             .planned_by(planner)
             .prepared_by(preparer);
-        // Nobody reads why there is no way on but those who look at a single run.
+        // Explanations of missing plans are only read for single runs.
         let (execution, recorder): (_, Box<dyn Recorder>) = match writer {
             Some(writer) => (execution.explaining(), Box::new(writer)),
             None => (execution, Box::new(NoRecord)),
@@ -395,7 +397,7 @@ impl Setting<'_> {
         Ok(Task::new(problem))
     }
 
-    /// The problem, and the world of a column for it.
+    /// Returns the problem, and the world of a column for it.
     pub(super) fn scene(&self, column: &Column) -> Result<(Task, WorldModel), ExperimentError> {
         let (domain, problem) = self.texts()?;
         let task = Self::task(&domain, &problem)?;
@@ -403,7 +405,7 @@ impl Setting<'_> {
         Ok((task, world))
     }
 
-    /// The domain, and the problem with its blanks filled in.
+    /// Returns the domain, and the problem with its blanks filled in.
     fn texts(&self) -> Result<(Source, Source), ExperimentError> {
         let mut text = self.experiment.problem.clone();
         for (name, value) in self.filling {
@@ -425,7 +427,8 @@ impl Setting<'_> {
     }
 }
 
-/// Why there is no plan. The planner names options of `run`; an experiment has members for them.
+/// Returns the reason why there is no plan. The options of `run` in it are replaced by members of
+/// experiment files.
 fn in_words_of_files(answer: &PlanAnswer) -> String {
     let why = answer.why_not().unwrap_or_default();
     why.replace("--planning-budget", "planning_budget")
@@ -437,7 +440,7 @@ pub(super) fn world(column: &Column, task: &Task) -> Result<WorldModel, Experime
     WorldModel::read(&world, task.problem()).map_err(ExperimentError::Text)
 }
 
-/// The world that executors go by, where it is not the column's own.
+/// Returns the world that executors believe in, if it is not the column's own.
 pub(super) fn believed(
     column: &Column,
     task: &Task,
@@ -450,7 +453,7 @@ pub(super) fn believed(
     world.map(Some).map_err(ExperimentError::Text)
 }
 
-/// Another program.
+/// Returns an external planner.
 fn another<'a>(
     name: &str,
     seconds: Option<&Rational>,

@@ -1,4 +1,4 @@
-//! A trial as a document: `docs/formats/course.md`.
+//! Course of a trial as a document: `docs/formats/course.md`.
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::FactId;
@@ -9,12 +9,12 @@ use crate::untimed::{Course, Entry, ExecutorName, StepKind};
 
 const FORMAT: &str = "elbowroom-course";
 
-/// What happened in a trial in a world without time.
+/// Course of a trial in a world without time.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredCourse {
     format: String,
     version: u64,
-    /// The title of the experiment.
+    /// Title of the experiment.
     pub title: String,
     /// The case.
     pub case: String,
@@ -22,37 +22,37 @@ pub struct StoredCourse {
     pub world: WorldKind,
     /// The executor.
     pub executor: ExecutorName,
-    /// The number of the trial, from 0.
+    /// Number of the trial, from 0.
     pub trial: u64,
     /// Its seed.
     pub seed: u64,
-    /// How it ended: `goal-reached`, or why not.
+    /// Ending: `goal-reached`, or the kind of failure.
     pub ended: String,
-    /// The plans, one of each round.
+    /// Plans, one for each round.
     pub plans: Vec<StoredPlan>,
 }
 
-/// A round.
+/// Round.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredPlan {
-    /// The plan's actions, by start.
+    /// Actions of the plan, by start.
     pub actions: Vec<String>,
-    /// What was done.
+    /// Executed steps.
     pub steps: Vec<StoredStep>,
 }
 
-/// An attempt to start an action, or its end.
+/// Attempt to start an action, or its end.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredStep {
-    /// `started`, `not-started` or `ended`.
+    /// `started`, `not-started`, `ended` or `failed`.
     pub step: String,
     /// The action.
     pub action: String,
-    /// The facts that have become true.
+    /// Facts that it made true.
     pub became_true: Vec<String>,
-    /// The facts that have become false.
+    /// Facts that it made false.
     pub became_false: Vec<String>,
-    /// Whether the goal cannot be reached any more; absent where nobody knows.
+    /// `true` if the goal cannot be reached any more; absent if dead ends are not detected.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_dead_end: bool,
 }
@@ -72,7 +72,7 @@ impl StoredCourse {
                     steps: Vec::new(),
                 }),
                 (entry, Some(plan)) => plan.steps.extend(step(&setting.task, entry)),
-                // Nothing is done without a plan.
+                // There are no steps without a plan.
                 (_, None) => {}
             }
         }
@@ -91,17 +91,17 @@ impl StoredCourse {
         }
     }
 
-    /// As JSON on one line.
+    /// Returns the document as JSON on one line.
     pub fn text(&self) -> String {
         let mut text = serde_json::to_string(self).unwrap_or_default();
         text.push('\n');
         text
     }
 
-    /// Reads such a document.
+    /// Reads a document.
     ///
     /// # Errors
-    /// When it is none.
+    /// The text does not hold the course of a trial.
     pub fn read(text: &str) -> Result<Self, PerturbedError> {
         let course: Self = serde_json::from_str(text)
             .map_err(|error| PerturbedError::other(format!("no course of a trial: {error}")))?;

@@ -11,25 +11,25 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use toml::Spanned;
 
-/// The `format` of such files.
+/// `format` of these files.
 const FORMAT: &str = "elbowroom-perturbed-experiment";
 
-/// An experiment, with the texts of all files that it names.
+/// Experiment, with the texts of all files that it names.
 #[derive(Clone, Debug)]
 pub struct PerturbedExperiment {
     /// The title.
     pub title: String,
-    /// Trials of each case, world and executor.
+    /// Number of trials of each case, world and executor.
     pub trials: u64,
-    /// Where the dice begin.
+    /// Random seed.
     pub seed: u64,
-    /// Planning rounds of a trial.
+    /// Number of planning rounds of a trial.
     pub rounds: usize,
-    /// In which worlds.
+    /// The worlds.
     pub worlds: Vec<WorldKind>,
-    /// With which executors.
+    /// The executors.
     pub executors: Vec<ExecutorName>,
-    /// The facts that change by themselves in the world as published.
+    /// Facts that change spontaneously in the world as published.
     pub perturbation: Option<PerturbationNames>,
     /// The planner.
     pub planner: PlannerKind,
@@ -37,7 +37,7 @@ pub struct PerturbedExperiment {
     pub cases: Vec<Case>,
 }
 
-/// Likelihoods to try.
+/// Case: a problem with likelihoods.
 #[derive(Clone, Debug)]
 pub struct Case {
     /// The name.
@@ -46,50 +46,50 @@ pub struct Case {
     pub domain: String,
     /// The problem, in PDDL.
     pub problem: String,
-    /// For the optimum: how many actions are under way at once at most.
+    /// Maximum number of concurrent actions, for the optimum.
     pub most_running: usize,
-    /// By which other rules the optimum is calculated, too.
+    /// Other rules for which the optimum is also computed.
     pub also: Vec<OptimumRules>,
-    /// A likelihood file (`docs/formats/likelihoods.md`).
+    /// Likelihood file (`docs/formats/likelihoods.md`).
     pub likelihoods: String,
-    /// Measurements by others in the world as published.
+    /// Published measurements in the world as published.
     pub published: Option<Published>,
 }
 
-/// Successes that were published.
+/// Published numbers of successes.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
-    /// Of how many trials.
+    /// Number of trials.
     pub trials: u64,
-    /// By executor.
+    /// Successes by executor.
     pub successes: BTreeMap<ExecutorName, u64>,
 }
 
-/// A model of a perturbed world.
+/// Model of a perturbed world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum WorldKind {
     /// All draws are independent.
     Sound,
-    /// As the published results were made.
+    /// The world that made the published results.
     AsPublished,
 }
 
-/// The planner, for the first plan and for replanning.
+/// Planner, for the first plan and for replanning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlannerKind {
-    /// As few actions as possible, one after the other; of several such plans the one whose
+    /// Sequential plans with a minimum number of actions; of several such plans the one whose
     /// actions come first by schema and objects.
     #[default]
     Shortest,
-    /// The temporal planner that is built in.
+    /// The embedded temporal planner.
     Embedded,
 }
 
 impl PlannerKind {
-    /// As in files.
+    /// Returns the name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Shortest => "shortest",
@@ -99,7 +99,7 @@ impl PlannerKind {
 }
 
 impl WorldKind {
-    /// As in files.
+    /// Returns the name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sound => "sound",
@@ -108,21 +108,21 @@ impl WorldKind {
     }
 }
 
-/// Rules by which the optimum is calculated beside those of the trials. Those are: a step that ends
-/// in a dead end uses up a planning round; conditions over all are not looked at.
+/// Additional rules for the optimum. By the rules of the trials, a step that ends in a dead end
+/// uses up a planning round, and over-all conditions are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OptimumRules {
     /// A run in a dead end is lost.
     DeadEndsLost,
-    /// An action without what it needs over all breaks off at once.
+    /// An action whose over-all condition does not hold fails at once.
     OverAllKept,
-    /// Both.
+    /// Both rules.
     DeadEndsLostOverAllKept,
 }
 
 impl OptimumRules {
-    /// As in files.
+    /// Returns the name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::DeadEndsLost => "dead-ends-lost",
@@ -131,12 +131,12 @@ impl OptimumRules {
         }
     }
 
-    /// Whether a run in a dead end is lost.
+    /// Returns `true` if a run in a dead end is lost.
     pub fn loses_dead_ends(self) -> bool {
         matches!(self, Self::DeadEndsLost | Self::DeadEndsLostOverAllKept)
     }
 
-    /// Whether an action without what it needs over all breaks off at once.
+    /// Returns `true` if an action whose over-all condition does not hold fails at once.
     pub fn keeps_over_all(self) -> bool {
         matches!(self, Self::OverAllKept | Self::DeadEndsLostOverAllKept)
     }
@@ -151,10 +151,10 @@ pub struct PerturbationNames {
 }
 
 impl PerturbationNames {
-    /// The predicates of a task.
+    /// Returns the predicates of a task.
     ///
     /// # Errors
-    /// When it has none of that name.
+    /// The domain has no predicate of that name.
     pub fn find(&self, task: &Task) -> Result<Perturbation, PerturbedError> {
         let count = u32::try_from(task.problem().predicates.len()).unwrap_or(u32::MAX);
         let find = |name: &str| {
@@ -175,13 +175,13 @@ impl PerturbationNames {
     }
 }
 
-/// An experiment that cannot be made.
+/// Error in an experiment.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PerturbedError {
-    /// The file, or one that it names, is wrong.
+    /// The file is invalid, or one that it names.
     #[error("{0}")]
     Text(Diagnostics),
-    /// Something else is.
+    /// Another error.
     #[error("{0}")]
     Other(String),
 }
@@ -191,7 +191,7 @@ impl PerturbedError {
         Self::Other(message.into())
     }
 
-    /// The file is wrong there.
+    /// Creates an error at a place in the file.
     fn at(source: &Source, span: Span, message: impl Into<String>) -> Self {
         let found = Diagnostic::new(Severity::Error, source, span, message);
         Self::Text(found.into())
@@ -253,12 +253,12 @@ fn ten() -> usize {
 }
 
 impl PerturbedExperiment {
-    /// All that the results depend on, in an order that stays.
+    /// Returns all data on which the results depend, in a fixed order.
     pub(super) fn identity(&self) -> Value {
-        // Whoever adds a member says here whether results depend on it.
+        // A new member must be listed here, as part of the identity or not.
         let Self {
             title: _,
-            // That many are made as whoever makes them says.
+            // The caller sets the number of trials.
             trials: _,
             seed,
             rounds,
@@ -279,12 +279,12 @@ impl PerturbedExperiment {
                 likelihoods,
                 published,
             } = case;
-            // Results have these figures beside their own.
+            // The results contain the published figures.
             let published = published
                 .as_ref()
                 .map(|it| json!([it.trials, it.successes]));
             let own = json!([name, domain, problem, most_running, likelihoods, published]);
-            // Results of experiments that do not ask for it stay what they are.
+            // Omitted if empty, so that the identity of older results does not change.
             if also.is_empty() {
                 own
             } else {
@@ -303,15 +303,15 @@ impl PerturbedExperiment {
         ])
     }
 
-    /// Whether a text says that it is such an experiment.
+    /// Returns `true` if the text has the format of such an experiment.
     pub fn is_one(text: &str) -> bool {
         toml::from_str::<Head>(text).is_ok_and(|head| head.format == FORMAT)
     }
 
-    /// Reads an experiment; `file` reads the files it names.
+    /// Reads an experiment; `file` reads the files that it names.
     ///
     /// # Errors
-    /// When something is missing, misspelt or cannot be read.
+    /// A member is missing, misspelt or cannot be read.
     pub fn read(
         source: impl Into<Source>,
         file: &dyn Fn(&str) -> Result<String, String>,
@@ -356,7 +356,7 @@ impl PerturbedExperiment {
         })
     }
 
-    /// The cases of another experiment.
+    /// Reads the cases of another experiment.
     fn included(
         source: &Source,
         file: &dyn Fn(&str) -> Result<String, String>,
@@ -370,7 +370,7 @@ impl PerturbedExperiment {
     }
 }
 
-/// The file as it stands, of a version that is known.
+/// Parses the file, and checks its version.
 fn parsed(source: &Source) -> Result<File, PerturbedError> {
     let read: File =
         elbowroom_text::toml::read(source).map_err(|found| PerturbedError::Text(found.into()))?;
@@ -382,7 +382,7 @@ fn parsed(source: &Source) -> Result<File, PerturbedError> {
     Ok(read)
 }
 
-/// The text of a file that another one names.
+/// Reads a file that another one names.
 fn named(
     source: &Source,
     name: &Spanned<String>,
@@ -391,7 +391,7 @@ fn named(
     file(name.get_ref()).map_err(|error| PerturbedError::at(source, name.span(), error))
 }
 
-/// The cases that a file has itself, with the files that it names.
+/// Reads the cases of a file itself, with the files that it names.
 fn own_cases(
     source: &Source,
     read: &File,

@@ -1,4 +1,4 @@
-//! The planner that is built in, for worlds without time: [`EmbeddedPlans`].
+//! Embedded planner for worlds without time: [`EmbeddedPlans`].
 
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
@@ -11,13 +11,13 @@ use elbowroom_planner::embedded;
 
 use elbowroom::execute::Embedded;
 
-/// Plans by the state they begin in, made once each.
+/// Cache of plans by their initial state.
 pub(super) struct EmbeddedPlans {
     task: Arc<Task>,
     known: BTreeMap<BTreeSet<FactId>, Option<Arc<TimeTriggeredPlan>>>,
 }
 
-/// More states than this are not looked at; then it counts as if there were no plan.
+/// Maximum number of states in a search. A larger search counts as finding no plan.
 const MOST_STATES: u64 = 100_000;
 
 impl EmbeddedPlans {
@@ -28,7 +28,7 @@ impl EmbeddedPlans {
         }
     }
 
-    /// The plan from here, if one is found.
+    /// Returns the plan from a state, if one is found.
     pub(super) fn plan(&mut self, state: &State) -> Option<Arc<TimeTriggeredPlan>> {
         if let Some(known) = self.known.get(&state.facts) {
             return known.clone();
@@ -37,11 +37,12 @@ impl EmbeddedPlans {
             settings: embedded::Settings::default(),
             most_states: MOST_STATES,
             improve_states: 0,
-            // Whether a plan exists makes no difference to a trial.
+            // A proof that no plan exists makes no difference to a trial.
             certificate_work: 0,
             ..Embedded::default()
         };
-        // Rows are made in parallel, and each is the same whatever the others have mentioned.
+        // Rows run in parallel. With its own table, each is independent of facts that the others
+        // add.
         let task = self.task.with_own_table();
         let situation = Situation {
             state: state.clone(),
@@ -70,7 +71,7 @@ mod tests {
 
     use super::EmbeddedPlans;
 
-    /// A domain of the experiments.
+    /// Reads a task of the experiments.
     fn task(name: &str) -> Task {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments/olisipo");
         let source = |what: &str| {
@@ -81,8 +82,7 @@ mod tests {
         Task::new(problem)
     }
 
-    /// Whatever is true: each fact or its opposite, as a row of bits says that does not repeat
-    /// itself soon.
+    /// Generates pseudorandom states by a linear congruential generator.
     fn states(task: &Task, count: usize) -> Vec<State> {
         let facts: Vec<FactId> = (0..).map(FactId).take(task.fact_count()).collect();
         let mut bits = 1_u64;
@@ -112,7 +112,7 @@ mod tests {
                 assert_eq!(plan.is_some(), known.is_some(), "{name}: {state:?}");
                 counts[usize::from(plan.is_some())] += 1;
                 let Some(plan) = plan else { continue };
-                // The same question, the same plan: executors remember what they made of it.
+                // The same state gives the same plan, because executors cache results by plan.
                 assert!(Arc::ptr_eq(&plan, &embedded.plan(&state).unwrap()));
                 let situation = Situation {
                     state,

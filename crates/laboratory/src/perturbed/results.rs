@@ -1,4 +1,4 @@
-//! What trials in perturbed worlds came to.
+//! Results of trials in perturbed worlds.
 
 use std::collections::BTreeMap;
 
@@ -11,26 +11,26 @@ use crate::compare::parts::{self, Partial, fingerprint};
 use crate::compare::{Failure, Failures, Part, TrialId};
 use crate::untimed::{ActionName, ExecutorName, StepKind};
 
-/// Counts by case, world and executor. Everything is a sum, so parts add up exactly, in any order.
+/// Counts by case, world and executor. All counts are sums, so parts add up exactly, in any order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PerturbedResults {
     format: String,
     version: u64,
-    /// The title of the experiment.
+    /// Title of the experiment.
     pub title: String,
-    /// Distinguishes experiments, so that no apples are added to pears.
+    /// Fingerprint of the experiment. Only parts with the same fingerprint are merged.
     pub fingerprint: String,
-    /// How many trials of each row the whole has.
+    /// Number of trials of each row in the whole experiment.
     pub trials: u64,
-    /// Into how many parts it was split.
+    /// Number of parts of the experiment.
     pub shards: u64,
-    /// Which parts are in here.
+    /// Parts in these results.
     pub parts: Vec<u64>,
-    /// Whether it was interrupted before all trials of these parts were made.
+    /// `true` if it was interrupted before all trials of these parts had run.
     #[serde(default, skip_serializing_if = "parts::is_false")]
     pub is_interrupted: bool,
-    /// The rows: case by case, world by world.
+    /// The rows, by case and world.
     pub rows: Vec<Row>,
 }
 
@@ -54,7 +54,7 @@ impl PerturbedResults {
     /// Reads results as JSON.
     ///
     /// # Errors
-    /// When they are none.
+    /// The text does not hold results.
     pub fn read(text: &str) -> Result<Self, PerturbedError> {
         let results: Self = serde_json::from_str(text)
             .map_err(|error| PerturbedError::other(format!("no results: {error}")))?;
@@ -69,20 +69,20 @@ impl PerturbedResults {
         Ok(results)
     }
 
-    /// As JSON.
+    /// Returns the results as JSON.
     pub fn json(&self) -> serde_json::Value {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Whether these are results of that experiment, with any number of trials.
+    /// Returns `true` if these are results of that experiment, with any number of trials.
     pub fn are_of(&self, experiment: &PerturbedExperiment) -> bool {
         self.fingerprint == fingerprint(&experiment.identity(), self.trials)
     }
 
-    /// Puts parts of one experiment together.
+    /// Merges parts of one experiment.
     ///
     /// # Errors
-    /// When they are parts of different ones, or the same part comes twice.
+    /// They belong to different experiments, or a part occurs twice.
     pub fn merged(parts: &[Self]) -> Result<Self, PerturbedError> {
         parts::merged(parts).map_err(PerturbedError::other)
     }
@@ -112,7 +112,7 @@ impl Partial for PerturbedResults {
     }
 }
 
-/// The trials of one case in one world with one executor.
+/// Trials of one case in one world with one executor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
@@ -122,32 +122,32 @@ pub struct Row {
     pub world: WorldKind,
     /// The executor.
     pub executor: ExecutorName,
-    /// How many succeeded.
+    /// Share of trials that succeeded.
     pub success: Proportion,
-    /// Replans in trials that succeeded.
+    /// Number of replans in trials that succeeded.
     pub replans: Mean,
-    /// The work in trials that succeeded.
+    /// Steps in trials that succeeded.
     pub succeeded: Work,
-    /// The work in trials that failed.
+    /// Steps in trials that failed.
     pub failed: Work,
-    /// The published rate in that world.
+    /// Published success rate in that world.
     pub published: Option<Proportion>,
-    /// The best success probability there can be, where it is known.
+    /// Maximum success probability of all executors, where it is known.
     pub optimum: Option<f64>,
-    /// The same by other rules, if the experiment asks for it.
+    /// Maximum success probabilities by other rules, if the experiment requests them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub other_optima: BTreeMap<OptimumRules, f64>,
-    /// The trials that failed: how they ended, and their last step.
+    /// Failed trials by their ending and their last step.
     #[serde(default, skip_serializing_if = "Failures::is_empty")]
     pub failures: Failures,
 }
 
-/// Rounded to as many digits as are read back as they were written.
+/// Rounds to the number of digits that survives writing and reading.
 pub(super) fn rounded(probability: f64) -> f64 {
     (probability * 1e12).round() / 1e12
 }
 
-/// What the last step was, as the cause of a failure.
+/// Names the last step, as the cause of a failure.
 fn after(step: StepKind) -> &'static str {
     match step {
         StepKind::Started => "after-start",
@@ -157,15 +157,15 @@ fn after(step: StepKind) -> &'static str {
     }
 }
 
-/// Means of what was done.
+/// Means of the numbers of steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Work {
     /// Starts and ends.
     pub messages: Mean,
-    /// Starts that failed.
+    /// Failed starts.
     pub failed_starts: Mean,
-    /// Actions that were started.
+    /// Started actions.
     pub actions: Mean,
 }
 
@@ -199,7 +199,7 @@ impl Row {
         }
     }
 
-    /// The trial of that number; `name` gives the name of an action.
+    /// Adds the trial of that number; `name` returns the name of an action.
     pub(super) fn add(&mut self, number: u64, trial: &Trial, name: &dyn Fn(&ActionName) -> String) {
         if let Some(lost) = &trial.lost {
             let last = lost.last.as_ref();
@@ -244,8 +244,9 @@ impl Row {
         }
     }
 
-    /// How far the published share is from ours, in standard deviations of the difference: both
-    /// are samples, and if they are of the same probability, all trials together say which.
+    /// Returns the difference between the published share and ours, in standard deviations of the
+    /// difference. Both are samples, and their common probability is estimated from all trials
+    /// together.
     pub fn distance(&self) -> Option<f64> {
         let published = self.published?;
         let mut both = self.success;
@@ -256,12 +257,12 @@ impl Row {
         Some((ours - theirs) / deviation.max(f64::MIN_POSITIVE))
     }
 
-    /// Whether the published share could, at the 5 % level, be of the same probability as ours.
+    /// Returns `true` if the published share is consistent with ours at the 5 % level.
     pub fn agrees(&self) -> Option<bool> {
         Some(self.distance()?.abs() <= 1.96)
     }
 
-    /// Whether our share lies in the 95 % interval (Wilson) of what was published.
+    /// Returns `true` if our share lies in the 95 % interval (Wilson) of the published one.
     pub fn is_inside(&self) -> Option<bool> {
         let (lower, upper) = self.published?.wilson()?;
         let share = self.success.share()?;

@@ -1,4 +1,4 @@
-//! Results of perturbed experiments as a table, and as plots.
+//! Results of perturbed experiments as a table and as plots.
 
 use elbowroom_report::plot::{IntervalPlot, Point, Series};
 use elbowroom_report::statistics::{Mean, Proportion};
@@ -9,7 +9,7 @@ use crate::compare::parts;
 use super::{OptimumRules, PerturbedResults, Row, WorldKind};
 use crate::untimed::ExecutorName;
 
-/// The results as a table.
+/// Returns the results as a table.
 pub fn table(results: &PerturbedResults) -> Table {
     let mut title = results.title.clone();
     let made = parts::made(results.trials, "each row", results.shards, &results.parts);
@@ -33,7 +33,7 @@ pub fn table(results: &PerturbedResults) -> Table {
     }
 }
 
-/// The results for programs: a number in each cell.
+/// Returns the results for programs: a number in each cell.
 pub fn records(results: &PerturbedResults) -> Table {
     let ends = |row: &Row| {
         let interval = row.success.wilson();
@@ -50,7 +50,7 @@ fn percent(share: Option<f64>) -> String {
     share.map_or_else(String::new, |share| format!("{:.1}", 100.0 * share))
 }
 
-/// Without a caption; `interval` has the cells under `interval_headings`.
+/// Returns the table without a caption; `interval` has the cells under `interval_headings`.
 fn of_rows(
     rows: &[Row],
     interval_headings: &[&str],
@@ -120,7 +120,7 @@ fn of_rows(
     }
 }
 
-/// How the published success rates compare with ours.
+/// Describes the agreement of the published success rates with ours.
 fn agreement(rows: &[Row]) -> Option<String> {
     let compared = rows.iter().filter(|row| row.published.is_some()).count();
     let inside = rows.iter().filter(|row| row.is_inside() == Some(true));
@@ -137,7 +137,7 @@ fn agreement(rows: &[Row]) -> Option<String> {
     })
 }
 
-/// How near the best executor comes to what can be.
+/// Describes the ratio of the best executor's success rate to the optimum.
 fn nearness(rows: &[Row]) -> Option<String> {
     let cases = cases(rows);
     let best = cases.iter().filter_map(|case| {
@@ -156,9 +156,9 @@ fn nearness(rows: &[Row]) -> Option<String> {
     ))
 }
 
-/// The pictures of the paper, world by world: a name for a file, and the plot. Success with the
-/// optimum (its Table 1), replans (Figure 4), and actions, as the paper counts them, in trials that
-/// succeeded and that failed (Figures 5 and 6).
+/// Returns the figures of the paper for each world, with file names: success with the optimum (its
+/// Table 1), replans (Figure 4), and actions, as the paper counts them, in trials that succeeded
+/// and that failed (Figures 5 and 6).
 pub fn plots(results: &PerturbedResults) -> Vec<(String, IntervalPlot)> {
     let mut worlds: Vec<WorldKind> = results.rows.iter().map(|row| row.world).collect();
     worlds.sort_unstable();
@@ -252,7 +252,7 @@ fn picture(
     }
 }
 
-/// A share in percent, with Wilson's interval.
+/// Returns a share in percent, with Wilson's interval.
 fn share(of: Proportion) -> Option<Point> {
     Some(Point {
         value: 100.0 * of.share()?,
@@ -260,7 +260,7 @@ fn share(of: Proportion) -> Option<Point> {
     })
 }
 
-/// The published results, executor by executor.
+/// Returns the published results of each executor.
 fn published(results: &PerturbedResults, world: WorldKind) -> Vec<Series> {
     let published = |row: &Row| row.published.and_then(share);
     let mut series = picture(results, world, ("", ""), &published).series;
@@ -271,7 +271,7 @@ fn published(results: &PerturbedResults, world: WorldKind) -> Vec<Series> {
     series
 }
 
-/// The optimum, where it is known.
+/// Returns the optimum, where it is known.
 fn reference(results: &PerturbedResults, world: WorldKind) -> Option<Series> {
     let point = |case: String| {
         let mut rows = results.rows.iter();

@@ -1,4 +1,4 @@
-//! Olisipo as the paper has it: [`Adaptable`].
+//! Olisipo as in the paper: [`Adaptable`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -16,15 +16,15 @@ use elbowroom_probability::{
 
 use super::{Stage, UntimedExecutor, start_of};
 
-/// After every step, the lattermost layer that fits says what is next; where none fits, the order
-/// most likely to succeed from here is looked for; where there is none, the plan is given up
-/// (paper 2, Algorithm 1 and section 2.2.1).
+/// Olisipo's executor. After every step, it continues with the happening after the lattermost layer
+/// that fits. If no layer fits, it searches for the order most likely to succeed from the current
+/// state. If there is none, it abandons the plan (paper 2, Algorithm 1 and section 2.2.1).
 ///
-/// A plan is not given up where there is no other: in a dead end, orders count that succeed only if
-/// something changes by itself ([`Candidates::All`]). The paper leaves open what is done there; its
-/// P(A ∩ G) of such an order is not 0, and giving up is no better.
+/// It never abandons a plan if there is no other one: in a dead end, it also accepts orders that
+/// succeed only after spontaneous changes ([`Candidates::All`]). The paper does not specify this
+/// case. Its P(A ∩ G) of such an order is not 0, and abandoning the plan is no better.
 ///
-/// What was chosen is remembered by order, state and what is under way.
+/// Choices are cached by order, state and running actions.
 #[derive(Clone, Debug)]
 pub struct Adaptable {
     task: Arc<Task>,
@@ -33,30 +33,30 @@ pub struct Adaptable {
     plans: Vec<(Arc<TimeTriggeredPlan>, Option<Prepared>)>,
 }
 
-/// A plan, and what was found out about it.
+/// Plan, with its search and the cached choices.
 #[derive(Clone, Debug)]
 struct Prepared {
     search: OrderSearch,
-    /// The search for orders that count on luck.
+    /// Search for orders that rely on spontaneous changes.
     lucky: OrderSearch,
     /// All orders found so far.
     orders: Vec<TotalOrderPlan>,
     known: BTreeMap<Key, Chosen>,
 }
 
-/// The present order, what is true, and what is under way.
+/// Current order, true facts and running actions.
 type Key = (Option<usize>, BTreeSet<FactId>, Vec<InstanceId>);
 
 #[derive(Clone, Copy, Debug)]
 struct Chosen {
-    /// The happening; `None` to give up, or if the goal is reached.
+    /// The happening; `None` if the goal is reached or the plan is abandoned.
     next: Option<NodeId>,
     order: Option<usize>,
 }
 
 impl Adaptable {
-    /// For plans of this task in a world of these likelihoods. `semantics` is how orders are
-    /// valued: as in the paper, or as the world is.
+    /// Creates an executor for plans of this task in a world of these likelihoods. `semantics`
+    /// selects the valuation of orders: that of the paper, or that of the world.
     pub fn new(task: Arc<Task>, likelihoods: Arc<Likelihoods>, semantics: Semantics) -> Self {
         Self {
             task,
@@ -89,7 +89,8 @@ impl Adaptable {
     }
 }
 
-/// The model of a plan's happenings; `None` if the likelihoods say nothing of one of its actions.
+/// Returns the model of a plan's happenings, or `None` if the likelihoods do not cover one of its
+/// actions.
 pub(super) fn model(
     task: &Task,
     plan: &TimeTriggeredPlan,
@@ -104,7 +105,7 @@ pub(super) fn model(
     Model::new(task, plan, likelihoods, semantics).ok()
 }
 
-/// The believed state, with the actions under way.
+/// Returns the believed state with the running actions.
 pub(super) fn circumstances(state: &State, running: &[InstanceId]) -> Circumstances {
     let mut circumstances = Circumstances::observed(Rational::ZERO, state);
     let under_way = running.iter().map(|&instance| Running {
@@ -115,7 +116,8 @@ pub(super) fn circumstances(state: &State, running: &[InstanceId]) -> Circumstan
     circumstances
 }
 
-/// Does a happening of a plan, and follows what is under way. Says whether it could be done.
+/// Executes a happening of a plan, and updates the running actions. Returns `false` if its
+/// condition does not hold.
 pub(super) fn perform(
     model: &Model,
     node: NodeId,
@@ -176,7 +178,7 @@ impl Prepared {
             let next = Some(self.orders[index].sequence[at]);
             return Chosen { next, order };
         }
-        // A condition that couples too many facts: as if there were no order.
+        // A condition that couples too many facts counts as if there were no order.
         let found = self.search.best_order(now, &mut patient).ok();
         let Some(found) = found.and_then(|found| found.order) else {
             if is_dead_end && let Some(next) = self.by_luck(now) {
@@ -185,8 +187,9 @@ impl Prepared {
                     order: None,
                 };
             }
-            // The plan does not lead to the goal from here. What is under way ends before it is
-            // given up: a robot that is let go between two places is at neither.
+            // The plan does not reach the goal from here. Running actions end before it is
+            // abandoned, because a robot whose motion is abandoned would be at neither of two
+            // places.
             let model = self.search.model();
             let first = now.running.first();
             let end = first.and_then(|first| {
@@ -213,7 +216,8 @@ impl Prepared {
         }
     }
 
-    /// The first happening of the order most likely to succeed, though it cannot without luck.
+    /// Returns the first happening of the order most likely to succeed with the help of spontaneous
+    /// changes.
     fn by_luck(&mut self, now: &Circumstances) -> Option<NodeId> {
         let found = self.lucky.best_order(now, &mut patient).ok()?;
         found.order?.sequence.first().copied()

@@ -1,11 +1,11 @@
-//! What was done in a trial, step by step: [`Course`].
+//! Record of the steps of a trial: [`Course`].
 
 use elbowroom_model::ground::{Action, FactId};
 use elbowroom_model::{State, TimeTriggeredPlan};
 
 use super::Ending;
 
-/// What a step was.
+/// Kind of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepKind {
     /// A start that succeeded.
@@ -18,32 +18,32 @@ pub enum StepKind {
     Failed,
 }
 
-/// What is told of a trial.
+/// Entry of a course.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Entry {
-    /// A round begins with this plan: the names of its actions, by start.
+    /// Start of a round with this plan: the names of its actions, by start.
     Plan(Vec<String>),
-    /// A step.
+    /// One step.
     Step {
-        /// What it was.
+        /// Its kind.
         kind: StepKind,
-        /// The action's name.
+        /// Name of the action.
         action: String,
-        /// The facts that are true since then.
+        /// Facts that it made true.
         became_true: Vec<FactId>,
-        /// The facts that are no longer true.
+        /// Facts that it made false.
         became_false: Vec<FactId>,
-        /// Whether the goal cannot be reached any more, as far as somebody looks out for that.
+        /// `true` if the goal cannot be reached any more, if dead ends are detected.
         is_dead_end: bool,
     },
 }
 
-/// A trial from its beginning to its end.
+/// Course of a trial from its beginning to its end.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Course {
-    /// What happened, in order.
+    /// Entries, in their order.
     pub entries: Vec<Entry>,
-    /// How it ended; `None` if the goal was reached, or while it goes on.
+    /// Ending of the trial; `None` if the goal was reached, or during the trial.
     pub ending: Option<Ending>,
 }
 

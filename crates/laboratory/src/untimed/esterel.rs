@@ -1,4 +1,4 @@
-//! Paper 2's baseline: [`Esterel`].
+//! Baseline of paper 2: [`Esterel`].
 
 use std::sync::Arc;
 
@@ -11,11 +11,11 @@ use super::{Stage, UntimedExecutor, start_of};
 
 /// Executes the deordered plan like `ROSPlan`'s Esterel dispatcher, node by node.
 ///
-/// In passes over the happenings in the order of the plan, each is done as soon as all are done
-/// that the network puts before it; the end of an action not in the pass in which it was started. A
-/// failed start ends the pass, and is tried again in the next one, without limit. A condition that
-/// does not hold when its happening is due ends the execution. Over-all conditions and effects are
-/// not watched, and the goal is not looked at before everything is done.
+/// Each pass visits the happenings in the order of the plan, and executes each one whose
+/// predecessors in the network are done. An action does not end in the pass of its start. A failed
+/// start ends the pass, and is retried in the next one, without limit. If the condition of a due
+/// happening does not hold, the execution ends. Over-all conditions and effects are not monitored,
+/// and the goal is not checked before the plan is completed.
 #[derive(Clone, Debug)]
 pub struct Esterel {
     task: Arc<Task>,
@@ -25,14 +25,14 @@ pub struct Esterel {
 #[derive(Clone, Debug)]
 struct Happening {
     action: Arc<Action>,
-    /// The position of its start, if it is an end.
+    /// Position of its start, if it is an end.
     start: Option<usize>,
-    /// The steps that must be over first.
+    /// Positions of its predecessors.
     after: Vec<usize>,
 }
 
 impl Esterel {
-    /// For plans of this task.
+    /// Creates an executor for plans of this task.
     pub fn new(task: Arc<Task>) -> Self {
         Self {
             task,
@@ -56,7 +56,7 @@ impl UntimedExecutor for Esterel {
         let happenings = &self.networks[index].1;
         let mut is_done = vec![false; happenings.len()];
         while !is_done.iter().all(|&done| done) {
-            // That an action has started is heard between passes.
+            // Starts are reported between passes.
             let has_started = is_done.clone();
             for (index, happening) in happenings.iter().enumerate() {
                 let is_due = happening.after.iter().all(|&before| is_done[before])
@@ -74,7 +74,7 @@ impl UntimedExecutor for Esterel {
                     return;
                 }
                 if body.is_some() {
-                    // An action that has failed is the end of the plan.
+                    // The plan ends with a failed action.
                     if !stage.end(action) {
                         return;
                     }
@@ -87,14 +87,14 @@ impl UntimedExecutor for Esterel {
     }
 }
 
-/// The happenings of a plan, with what must be done before each.
+/// Returns the happenings of a plan with their predecessors.
 fn happenings(task: &Task, plan: &TimeTriggeredPlan, state: &State) -> Vec<Happening> {
     let mut situation = Situation::initial(task);
     situation.state = state.clone();
     let task = task.beginning_at(&situation);
     let deordered = deorder(&task, plan);
     let is_ordered = deordered.is_ok();
-    // A planner that makes plans that do not work: what is listed first is done first.
+    // A planner may return an infeasible plan. Its actions are executed in the order of the list.
     let network = deordered.map_or_else(
         |_| StnPlan::unconstrained(&task, listed(plan)),
         |deordered| deordered.plan,
@@ -124,7 +124,7 @@ fn happenings(task: &Task, plan: &TimeTriggeredPlan, state: &State) -> Vec<Happe
     happenings
 }
 
-/// The actions of a plan as they are listed.
+/// Returns the actions of a plan in the order of the list.
 fn listed(plan: &TimeTriggeredPlan) -> Vec<Instance> {
     let instance = |(index, step): (usize, &Step)| Instance {
         label: format!("n{index}"),

@@ -1,4 +1,4 @@
-//! The executor that knows the world: [`Foresighted`].
+//! Executor with the optimal policy of the world: [`Foresighted`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use elbowroom_probability::{Likelihoods, Model, Semantics};
 use super::adaptable::{circumstances, perform};
 use super::{ActionName, Stage, UntimedExecutor};
 
-/// Does what is best in the world of the likelihoods, whatever the plan says: `lookahead` without a
+/// Optimal policy in the world of the likelihoods, independent of the plan: `lookahead` without a
 /// clock.
 #[derive(Clone, Debug)]
 pub struct Foresighted {
@@ -28,7 +28,7 @@ pub enum NoForesight {
     /// Likelihoods are missing.
     #[error(transparent)]
     Missing(#[from] Missing),
-    /// The world is too large, or of another kind.
+    /// The world is too large, or of an unsupported kind.
     #[error(transparent)]
     NotSmall(#[from] NotSmall),
 }
@@ -37,7 +37,7 @@ impl Foresighted {
     /// Tabulates the world.
     ///
     /// # Errors
-    /// When likelihoods are missing, or the world is too large.
+    /// Likelihoods are missing, or the world is too large.
     pub fn new(
         task: &Arc<Task>,
         actions: Vec<Action>,
@@ -60,15 +60,15 @@ impl Foresighted {
         })
     }
 
-    /// Whether who plans finds no plan from here; what is not in the table is not called a dead
-    /// end. See [`Game::dead_ends`](super::Game::dead_ends).
+    /// Returns `true` if a planner finds no plan from here. A state that is not in the table does
+    /// not count as a dead end. See [`Game::dead_ends`](super::Game::dead_ends).
     pub fn is_dead_end(&self, state: &State, running: &[ActionName]) -> bool {
         let find = |name: &ActionName| self.instances.get(name).copied();
         let running: Option<Vec<InstanceId>> = running.iter().map(find).collect();
         running.is_some_and(|running| self.process.is_dead_end_at(state, &running))
     }
 
-    /// The best success probability that any executor can have from the beginning.
+    /// Returns the maximum success probability of all executors from the beginning.
     pub fn value(&self) -> f64 {
         let initial = self.process.model().task().initial();
         self.optimum
@@ -81,7 +81,8 @@ impl UntimedExecutor for Foresighted {
         let model = Arc::clone(self.process.model());
         let mut running: Vec<InstanceId> = Vec::new();
         while !(stage.is_over() || running.is_empty() && stage.is_goal()) {
-            // Where nobody looks out for dead ends, luck is not tried, as it could be for ever.
+            // Without detection of dead ends, it does not wait for spontaneous changes, because
+            // that could take forever.
             if stage.is_dead_end().is_none() && self.process.is_dead_end_at(stage.state(), &running)
             {
                 return;

@@ -1,4 +1,4 @@
-//! Olisipo as it was when the paper's table was made: [`AsPublished`].
+//! Olisipo in the version that made the paper's table: [`AsPublished`].
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -13,23 +13,23 @@ use elbowroom_probability::{
 use super::adaptable::{circumstances, model, perform};
 use super::{Stage, UntimedExecutor, apply, holds, start_of};
 
-/// The published program, with the faults that its results depend on:
+/// The published program, with the faults on which its results depend:
 ///
 /// - the search returns the *last* order found, not the best;
-/// - the belief is never brought up to date, so that no later search finds anything: there is one
-///   order in each trial;
-/// - where a layer fits and something is under way, it ends, whatever the layer; so one action is
-///   executed after the other. Only layers before a start count otherwise.
+/// - the belief is never updated, so that no later search finds an order: there is one order in
+///   each trial;
+/// - if a layer fits and an action is running, that action ends, whatever the layer; so actions are
+///   executed one after the other. Otherwise, only layers before a start count.
 ///
-/// One thing differs. When the order did not fit any more, the program went on in the rounds left
-/// with the old order applied to the happenings of new plans. As that never led to the goal, it
-/// is not done here.
+/// There is one difference. When no layer fitted any more, the program continued in the remaining
+/// rounds with the old order applied to the happenings of new plans. This never reached the goal,
+/// and is omitted here.
 #[derive(Clone, Debug)]
 pub struct AsPublished {
     task: Arc<Task>,
     likelihoods: Arc<Likelihoods>,
     found: Vec<(Arc<TimeTriggeredPlan>, Option<Found>)>,
-    /// Whether this trial's order has been given up.
+    /// `true` if this trial's order was abandoned.
     is_given_up: bool,
 }
 
@@ -37,12 +37,12 @@ pub struct AsPublished {
 struct Found {
     model: Arc<Model>,
     sequence: Vec<NodeId>,
-    /// Facts that must be true; negative conditions were mistaken for positive ones.
+    /// Facts that must be true. Negative conditions were treated as positive ones.
     layers: Vec<BTreeSet<FactId>>,
 }
 
 impl AsPublished {
-    /// For plans of this task, in a world of these likelihoods.
+    /// Creates an executor for plans of this task in a world of these likelihoods.
     pub fn new(task: Arc<Task>, likelihoods: Arc<Likelihoods>) -> Self {
         Self {
             task,
@@ -107,7 +107,7 @@ impl Found {
     }
 }
 
-/// The last order that the published search finds.
+/// Returns the last order that the published search finds.
 fn last_order(model: Arc<Model>, state: &State) -> Option<Found> {
     let mut search = LastOrder {
         orders: OrderSearch::new(Arc::clone(&model), SearchSettings::default()),
@@ -138,7 +138,7 @@ fn layers(model: &Arc<Model>, state: &State, sequence: &[NodeId]) -> Option<Tota
         .ok()
 }
 
-/// Depth first, happenings in the order of the plan; the published cut and no other.
+/// Depth-first search with happenings in the order of the plan, and with the published cut only.
 struct LastOrder<'m> {
     orders: OrderSearch,
     network: PrunedNetwork<'m>,

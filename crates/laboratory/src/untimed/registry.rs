@@ -1,5 +1,5 @@
-//! The executors without time: one list of them all. To add one: a file with its
-//! [`UntimedExecutor`], and an entry in [`EXECUTORS`].
+//! Registry of the executors without time. To add an executor, write a file with its
+//! [`UntimedExecutor`] and an entry in [`EXECUTORS`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,31 +13,31 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Adaptable, AsPublished, Esterel, Foresighted, NoForesight, UntimedExecutor};
 
-/// The registry entry of an executor: name, documentation and constructor.
+/// Registry entry of an executor: name, documentation and constructor.
 #[derive(Clone, Copy)]
 pub struct Registered {
-    /// Its name. What exists on a clock, too, has the same name there
+    /// Its name. An executor that also exists on a clock has the same name there
     /// ([`executors::EXECUTORS`]).
     pub name: &'static str,
-    /// A summary, in one sentence or two.
+    /// Summary, in one or two sentences.
     pub summary: &'static str,
-    /// Where it comes from.
+    /// Its source.
     pub paper: &'static str,
-    /// Makes one.
+    /// Constructor.
     make: fn(&Means<'_>) -> Result<Box<dyn UntimedExecutor>, NoForesight>,
 }
 
-/// The services that an executor may use.
+/// Services for the construction of an executor.
 pub struct Means<'m> {
     /// The problem.
     pub task: Arc<Task>,
-    /// The likelihoods of failures and spontaneous changes.
+    /// Likelihoods of failures and spontaneous changes.
     pub likelihoods: Arc<Likelihoods>,
-    /// The table of the sound world, made when it is first asked for.
+    /// The table of the sound world, computed at its first use.
     pub foresight: &'m dyn Fn() -> Result<Foresighted, NoForesight>,
 }
 
-/// Every executor, in the order in which results list them.
+/// All executors, in the order of the results.
 pub const EXECUTORS: &[Registered] = &[
     Registered {
         name: "esterel",
@@ -93,31 +93,31 @@ impl fmt::Debug for Registered {
     }
 }
 
-/// An executor of the list, by its name; in the order of the list.
+/// Executor of the list. Names are sorted in the order of the list.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ExecutorName(usize);
 
 impl ExecutorName {
-    /// The entry registered under the name.
+    /// Returns its registry entry.
     pub fn registered(self) -> &'static Registered {
         &EXECUTORS[self.0]
     }
 
-    /// The name.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         self.registered().name
     }
 
-    /// Makes the executor.
+    /// Creates the executor.
     ///
     /// # Errors
-    /// When it needs a table of the world, and there can be none.
+    /// It needs a table of the world, and there can be none.
     pub fn build(self, means: &Means<'_>) -> Result<Box<dyn UntimedExecutor>, NoForesight> {
         (self.registered().make)(means)
     }
 }
 
-/// There is no executor of that name where there is no time.
+/// There is no executor of that name without a clock.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "there is no executor `{name}`{clock}; choose one of {known}",
@@ -125,9 +125,9 @@ impl ExecutorName {
     known = EXECUTORS.iter().map(|known| known.name).collect::<Vec<_>>().join(", ")
 )]
 pub struct UnknownExecutor {
-    /// The name that was asked for.
+    /// The given name.
     pub name: String,
-    /// Whether there is one on a clock.
+    /// `true` if there is such an executor on a clock.
     pub needs_clock: bool,
 }
 

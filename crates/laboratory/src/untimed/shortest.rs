@@ -1,4 +1,4 @@
-//! A planner for worlds without time: [`Shortest`].
+//! Planner for worlds without time: [`Shortest`].
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -9,12 +9,12 @@ use elbowroom_num::Rational;
 
 use super::{apply, holds, start_of};
 
-/// Plans with as few actions as possible, one after the other; of several such plans the one whose
-/// first action comes first in the list of actions, and so on.
+/// Planner of sequential plans with a minimum number of actions. Of several such plans it returns
+/// the lexicographically first one, in the order of the list of actions.
 ///
-/// Over-all conditions must hold from before the start, as the authors' search has it, and from
-/// after it. Plans are remembered by the state they begin in. For small problems only: it goes
-/// through all states that are nearer than the goal.
+/// Over-all conditions must hold from before the start, as in the authors' search, and from after
+/// it. Plans are cached by their initial state. Only for small problems, because the search visits
+/// all states that are nearer than the goal.
 #[derive(Clone, Debug)]
 pub struct Shortest {
     task: Arc<Task>,
@@ -23,7 +23,7 @@ pub struct Shortest {
 }
 
 impl Shortest {
-    /// A planner that uses these actions, and prefers those that come first.
+    /// Creates a planner with these actions. Earlier ones are preferred.
     pub fn new(task: Arc<Task>, actions: Vec<Action>) -> Self {
         Self {
             task,
@@ -32,7 +32,7 @@ impl Shortest {
         }
     }
 
-    /// The plan from here, if there is one.
+    /// Returns the plan from a state, if there is one.
     pub fn plan(&mut self, state: &State) -> Option<Arc<TimeTriggeredPlan>> {
         if let Some(known) = self.plans.get(&state.facts) {
             return known.clone();
@@ -42,7 +42,8 @@ impl Shortest {
         plan
     }
 
-    /// Breadth first; states are met in the order of their lexicographically first shortest plans.
+    /// Breadth-first search. States are visited in the order of their lexicographically first
+    /// shortest plans.
     fn search(&self, from: &State) -> Option<Vec<usize>> {
         let mut came_from: BTreeMap<BTreeSet<FactId>, Option<(usize, BTreeSet<FactId>)>> =
             BTreeMap::from([(from.facts.clone(), None)]);
@@ -72,7 +73,7 @@ impl Shortest {
         None
     }
 
-    /// One second for each action, and ε between them.
+    /// Schedules one second for each action, with ε between them.
     fn timed(&self, steps: &[usize]) -> TimeTriggeredPlan {
         let mut now = Rational::ZERO;
         let mut timed = Vec::new();
@@ -91,7 +92,7 @@ impl Shortest {
     }
 }
 
-/// The state after the whole of an action, if it can be done.
+/// Returns the state after an action has ended, or `None` if it is not applicable.
 fn done(action: &Action, state: &State) -> Option<State> {
     let mut after = state.clone();
     if !holds(&start_of(action).condition, state) {

@@ -1,4 +1,4 @@
-//! The likelihoods of a task's facts and actions, ready to be drawn: [`Chances`].
+//! Likelihoods of a task's facts and actions, prepared for sampling: [`Chances`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,27 +8,27 @@ use elbowroom_model::problem::{ObjectId, SchemaId};
 use elbowroom_probability::likelihoods::{Aftermath, Missing};
 use elbowroom_probability::{Flip, Likelihoods};
 
-/// The random events of a perturbed world, with their probabilities.
+/// Random events of a perturbed world, with their probabilities.
 #[derive(Clone, Debug)]
 pub struct Chances {
-    /// How each fact changes by itself.
+    /// Spontaneous changes of each fact.
     pub(super) flips: Vec<(FactId, Flip)>,
     actions: BTreeMap<(SchemaId, Vec<ObjectId>), ActionChances>,
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct ActionChances {
-    /// An attempt to start succeeds.
+    /// Probability that an attempt to start succeeds.
     pub(super) start: f64,
     pub(super) start_effects: Vec<EffectChance>,
     pub(super) end_effects: Vec<EffectChance>,
-    /// The end succeeds.
+    /// Probability that the end succeeds.
     pub(super) end: f64,
-    /// What a failed end leaves behind.
+    /// Outcomes of a failed end.
     pub(super) aftermaths: Vec<Aftermath>,
 }
 
-/// An effect; in lists of them, deletions come first.
+/// Effect with its probability. In lists, deletions come first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EffectChance {
     pub(super) fact: FactId,
@@ -37,12 +37,12 @@ pub(super) struct EffectChance {
 }
 
 impl Chances {
-    /// The chances of all facts of the task and of these actions.
+    /// Computes the chances of all facts of the task and of these actions.
     ///
-    /// Facts that no action changes, and that the likelihoods do not mention, never change.
+    /// A fact that is neither changed by an action nor mentioned by the likelihoods never changes.
     ///
     /// # Errors
-    /// When the likelihoods say nothing of something that matters.
+    /// A likelihood that is needed is missing.
     pub fn new(
         task: &Task,
         actions: &[Action],
@@ -87,7 +87,8 @@ impl Chances {
         })
     }
 
-    /// Those of an action. One that is not among those of [`Chances::new`] never starts.
+    /// Returns the chances of an action, or `None` if it was not passed to [`Chances::new`]. Such
+    /// an action never starts.
     pub(super) fn of(&self, action: &Action) -> Option<&ActionChances> {
         self.actions.get(&(action.schema, action.arguments.clone()))
     }
@@ -105,7 +106,7 @@ fn effects(
         Change::Update { .. } => None,
     };
     let mut changes: Vec<_> = snap.effects.iter().filter_map(change).collect();
-    // Stable: otherwise in the order of the domain.
+    // A stable sort, which keeps the order of the domain otherwise.
     changes.sort_by_key(|(makes_true, _)| *makes_true);
     let with_likelihood = |(makes_true, fact): (bool, FactId)| {
         Ok(EffectChance {

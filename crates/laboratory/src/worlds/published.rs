@@ -1,4 +1,4 @@
-//! The world as the authors' programs made it: [`PublishedWorld`].
+//! World of the authors' programs: [`PublishedWorld`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,36 +13,36 @@ use super::chances::{Chances, EffectChance};
 use super::rand_c::RandC;
 use elbowroom_sim::draw::{Purpose, keyed};
 
-/// What changes by itself in a [`PublishedWorld`]: the authors' program knows two predicates, of
-/// one argument each.
+/// Predicates of the spontaneous changes in a [`PublishedWorld`]. The authors' program has two,
+/// with one argument each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Perturbation {
-    /// Facts that come and go: `machine_is_maintained`.
+    /// Facts that may become true and false: `machine_is_maintained`.
     pub achieved: PredicateId,
-    /// Facts that go and never come back: `machine_is_working`.
+    /// Facts that may only become false: `machine_is_working`.
     pub needed: PredicateId,
 }
 
-/// The published experiments' world, with the artefacts that its results depend on:
+/// World of the published experiments, with the artefacts on which its results depend:
 ///
-/// - Whether starts and effects succeed comes from `rand()`, never seeded: it is the same in all
-///   trials. One sequence is for the starts, and one for the effects of each schema.
-/// - Of all facts only those of [`Perturbation`] change by themselves. What is needed is lost only
-///   while it is not achieved; every object is drawn for twice (the lists of them are filled
-///   twice), and for each of its facts but those achieved; each such draw is first for losing what
-///   is needed, and otherwise for achieving.
-/// - Only one fact changes each time: the first change drawn says which, and the last one drawn
-///   says whether it comes or goes, whatever that last change was about.
-/// - Whether a message starts or ends an action is known by counting: an action that was given up
-///   after its start has its end effects when it is started again.
+/// - Starts and effects succeed by `rand()`, which is never seeded: the values are the same in all
+///   trials. There is one sequence for the starts, and one for the effects of each schema.
+/// - Only the facts of [`Perturbation`] change spontaneously. A needed fact is lost only while it
+///   is not achieved. Every object is drawn twice (its lists are filled twice), and once for each
+///   of its facts other than those achieved. Each such draw first decides the loss of the needed
+///   fact, and otherwise the achievement.
+/// - Only one fact changes each time. The first drawn change selects the fact, and the last drawn
+///   change decides whether it becomes true or false, even if it is about another fact.
+/// - Messages are counted to find out whether they start or end an action. An action that was
+///   abandoned after its start has its end effects when it is started again.
 ///
-/// Only the changes by themselves depend on the seed.
+/// Only the spontaneous changes depend on the seed.
 #[derive(Clone, Debug)]
 pub struct PublishedWorld<'a> {
     chances: &'a Chances,
     perturbed: &'a PerturbedFacts,
     state: State,
-    /// The true facts, in the order in which they became true.
+    /// True facts, in the order in which they became true.
     facts: Vec<FactId>,
     starts: RandC,
     effects: BTreeMap<SchemaId, RandC>,
@@ -50,10 +50,10 @@ pub struct PublishedWorld<'a> {
     changes: ChaCha8Rng,
 }
 
-/// A [`Perturbation`] of the facts of a task.
+/// [`Perturbation`] of the facts of a task.
 #[derive(Clone, Debug)]
 pub struct PerturbedFacts {
-    /// By fact: its first object, and whether it is achieved.
+    /// By fact: its first object, and `true` if it is an achieved fact.
     of_fact: Vec<Option<(ObjectId, bool)>>,
     /// By object.
     achieved: BTreeMap<ObjectId, (FactId, f64, f64)>,
@@ -62,7 +62,7 @@ pub struct PerturbedFacts {
 }
 
 impl Perturbation {
-    /// Which facts it concerns, and how likely they are to change.
+    /// Returns the facts concerned, with the probabilities of their changes.
     pub fn facts(self, task: &Task, chances: &Chances) -> PerturbedFacts {
         let count = u32::try_from(task.fact_count()).unwrap_or(u32::MAX);
         let atom = |fact| {
@@ -97,7 +97,7 @@ impl Perturbation {
 }
 
 impl<'a> PublishedWorld<'a> {
-    /// The world of that seed, at the beginning.
+    /// Creates the world of that seed.
     pub fn new(chances: &'a Chances, perturbed: &'a PerturbedFacts, seed: u64) -> Self {
         let facts = perturbed.initial.clone();
         Self {
@@ -124,7 +124,8 @@ impl<'a> PublishedWorld<'a> {
         }
     }
 
-    /// The simulated action hears of its start or its end, and takes it for what is next.
+    /// Delivers a start or end message to the simulated action, which takes it for the one that is
+    /// due.
     fn message(&mut self, action: &Action) {
         let chances = self.chances;
         let Some(chances) = chances.of(action) else {
@@ -158,7 +159,7 @@ impl<'a> PublishedWorld<'a> {
                 None => {}
             }
         }
-        // The first change drawn, and whether the last one drawn adds or removes.
+        // The fact of the first drawn change, and the truth value of the last one.
         let mut change: Option<(FactId, bool)> = None;
         let mut drawn = |fact: FactId, truth: bool| {
             change = Some((change.map_or(fact, |(first, _)| first), truth));
@@ -209,7 +210,7 @@ impl UntimedWorld for PublishedWorld<'_> {
     fn end(&mut self, action: &Action) -> bool {
         self.message(action);
         self.perturb();
-        // In the authors' program ends do not fail.
+        // Ends do not fail in the authors' program.
         true
     }
 }

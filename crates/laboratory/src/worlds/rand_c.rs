@@ -1,12 +1,12 @@
-//! The numbers that the C library's `rand()` gives to a program that never seeds it.
+//! The sequence of the C library's `rand()` without a seed.
 
 use std::collections::VecDeque;
 
-/// GNU's `rand()` with its initial seed 1: an additive feedback generator,
-/// o(i) = o(i − 3) + o(i − 31) mod 2³², of which the upper 31 bits are given out.
+/// GNU's `rand()` with its initial seed 1: an additive feedback generator, o(i) = o(i − 3) + o(i −
+/// 31) mod 2³², whose upper 31 bits are returned.
 #[derive(Clone, Debug)]
 pub(super) struct RandC {
-    /// The last 31 numbers.
+    /// The last 31 numbers of the sequence.
     last: VecDeque<u32>,
 }
 
@@ -18,7 +18,7 @@ impl RandC {
         while seeds.len() < 31 {
             seeds.push(seeds[seeds.len() - 1] * 16_807 % MODULUS);
         }
-        // The first three that are added are those at 0, 1 and 2: the state is read from 3 on.
+        // The first three summands are those at 0, 1 and 2, because the state is read from 3 on.
         let low = |seed: &u64| u32::try_from(*seed).unwrap_or(u32::MAX);
         let mut last: VecDeque<u32> = seeds.iter().map(low).collect();
         // Numbers 31, 32 and 33 repeat numbers 0, 1 and 2.
@@ -37,7 +37,7 @@ impl RandC {
         next >> 1
     }
 
-    /// `rand() / RAND_MAX`, in [0, 1].
+    /// Returns `rand() / RAND_MAX`, in [0, 1].
     pub(super) fn share(&mut self) -> f64 {
         f64::from(self.next()) / 2_147_483_647.0
     }

@@ -1,4 +1,4 @@
-//! A world that does what the likelihoods say: [`SoundWorld`].
+//! World with exactly the given likelihoods: [`SoundWorld`].
 
 use crate::untimed::UntimedWorld;
 use elbowroom_model::State;
@@ -10,16 +10,16 @@ use rand_chacha::ChaCha8Rng;
 use super::chances::{Chances, EffectChance};
 use elbowroom_sim::draw::{Purpose, keyed};
 
-/// Every draw is independent of all others.
+/// World with independent draws.
 ///
-/// An attempt to start, and an end, succeeds with its probability; an effect takes place with its
-/// own, and otherwise leaves the fact as it was, deletions before additions. An end that fails has
-/// none of its effects, but one of its failure's outcomes. After each attempt and each end,
-/// successful or not, every fact may change by itself once.
+/// An attempt to start succeeds with its probability, and so does an end. Each effect takes place
+/// with its own probability, and otherwise leaves the fact unchanged; deletions come before
+/// additions. A failed end has none of its effects, but one of the outcomes of its failure. After
+/// each attempt and each end, successful or not, every fact may change spontaneously once.
 ///
 /// It is the world of [`optimum`](elbowroom_probability::optimum). Starts, ends, effects and
-/// changes draw from sources of their own that depend on the seed only, so two executors that do
-/// the same meet the same.
+/// changes have separate random sources that depend only on the seed, so two executors with the
+/// same steps have the same results.
 #[derive(Clone, Debug)]
 pub struct SoundWorld<'a> {
     chances: &'a Chances,
@@ -31,7 +31,7 @@ pub struct SoundWorld<'a> {
 }
 
 impl<'a> SoundWorld<'a> {
-    /// The world of that seed, in this state.
+    /// Creates the world of that seed in this state.
     pub fn new(chances: &'a Chances, initial: &State, seed: u64) -> Self {
         Self {
             chances,
@@ -56,14 +56,14 @@ impl<'a> SoundWorld<'a> {
         }
     }
 
-    /// One of the ways in which things may stand after a failure.
+    /// Applies a random outcome of a failure.
     fn leave(&mut self, aftermaths: &[Aftermath]) {
         let mut left = self.ends.random::<f64>();
         let drawn = aftermaths.iter().find(|aftermath| {
             left -= aftermath.probability;
             left < 0.0
         });
-        // What does not add up to 1 by a rounding is the last one's.
+        // If a rounding error keeps the sum below 1, the last outcome has the rest.
         let Some(aftermath) = drawn.or(aftermaths.last()) else {
             return;
         };

@@ -1,7 +1,7 @@
-//! Executors in random small worlds whose failures are undone or have outcomes, beside each other and beside the promise
-//! of the table of `lookahead`.
+//! Executors in small random worlds whose failures are undone or have outcomes, in comparison with
+//! each other and with the value of the table of `lookahead`.
 //!
-//! `ELBOWROOM_WORLDS=1000` draws that many seeds, and the figures are printed (`--nocapture`).
+//! `ELBOWROOM_WORLDS=1000` sets the number of seeds, and the figures are printed (`--nocapture`).
 
 use std::sync::Arc;
 
@@ -20,11 +20,11 @@ use crate::twin::SmallWorld;
 
 const RUNS: u64 = 100;
 
-/// Executors that use likelihoods, then those that do not.
+/// Executors that use likelihoods, followed by those that do not.
 const EXECUTORS: [&str; 5] = ["adaptable", "lookahead", "esterel", "guarded", "live"];
 const WITH_LIKELIHOODS: usize = 2;
 
-/// A random world, ready to be executed in.
+/// Random world, prepared for execution.
 struct Scene {
     task: Arc<Task>,
     model: WorldModel,
@@ -34,7 +34,7 @@ struct Scene {
 }
 
 impl Scene {
-    /// The world of a seed; `None` if it has no plan.
+    /// Returns the world of a seed, or `None` if it has no plan.
     fn of(seed: u64) -> Option<Self> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let world = SmallWorld::with_costly_failures(&mut rng);
@@ -75,14 +75,14 @@ impl Scene {
         (0..RUNS).map(verdict).collect()
     }
 
-    /// The probability of success by the table of `lookahead`, if there is one.
+    /// Returns the success probability by the table of `lookahead`, if there is one.
     fn promise(&self) -> Option<f64> {
         let table = Table::new(&self.task, &self.likelihoods)?;
         Some(table.value(&Circumstances::initial(&self.task)))
     }
 }
 
-/// Three standard errors of the share of runs that succeed.
+/// Returns three standard errors of the share of runs that succeed.
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
 fn doubt(share: f64) -> f64 {
     let share = share.clamp(0.0, 1.0);
@@ -96,7 +96,8 @@ fn table_is_reached_and_no_other_executor_is_better_than_those_with_likelihoods(
     let seeds = seeds.map_or(60, |seeds| seeds.parse().expect("a number of seeds"));
     let (mut worlds, mut promises) = (0, 0);
     let mut broken = Vec::new();
-    // By executor with and without likelihoods: runs that only the second and only the first wins.
+    // By executor with and without likelihoods: the number of runs that only the second wins, and
+    // that only the first wins.
     let mut pairs = [[(0.0_f64, 0.0_f64); EXECUTORS.len()]; WITH_LIKELIHOODS];
     for seed in 0..seeds {
         let Some(scene) = Scene::of(seed) else {

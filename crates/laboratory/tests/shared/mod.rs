@@ -1,5 +1,5 @@
-//! Benchmark files beside the repository. Tests that need them say so and pass where they are
-//! absent.
+//! Benchmark files next to the repository. Tests that need them print a note and pass if they are
+//! missing.
 #![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
 
-/// The folder of benchmark data, if it is there.
+/// Returns the folder of benchmark data, if it exists.
 pub(crate) fn data() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     if folder.is_dir() {
@@ -18,7 +18,7 @@ pub(crate) fn data() -> Option<PathBuf> {
     None
 }
 
-/// The task of a domain and a problem file, or what is wrong with them.
+/// Reads the task of a domain and a problem file. The error holds the messages.
 pub(crate) fn task(domain: &Path, problem: &Path) -> Result<Task, String> {
     let source = |path: &Path| {
         let read = std::fs::read(path);
@@ -31,7 +31,7 @@ pub(crate) fn task(domain: &Path, problem: &Path) -> Result<Task, String> {
     }
 }
 
-/// A number as one writes it.
+/// Parses a number.
 pub(crate) fn number(text: &str) -> Rational {
     text.parse().expect("a correct test")
 }

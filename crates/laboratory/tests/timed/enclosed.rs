@@ -1,4 +1,4 @@
-//! The bounds of small worlds enclose what a plain recursion finds.
+//! The bounds of small worlds enclose the values of a plain recursion.
 
 use elbowroom_laboratory::timed::{Settings, TimedOptimum};
 use rand::SeedableRng;
@@ -7,7 +7,8 @@ use rand_chacha::ChaCha8Rng;
 use super::bounds;
 use super::twin::{self, SmallWorld};
 
-/// The bounds of a small world on one grid, which enclose what the recursion found but for a `slack`.
+/// Returns the bounds of a small world on one grid, and checks that they enclose the values of the
+/// recursion up to `slack`.
 fn enclosing(
     world: &SmallWorld,
     first_cells: u32,
@@ -17,7 +18,7 @@ fn enclosing(
     let settings = Settings {
         first_cells: first_cells as usize,
         horizon: Some(i64::from(twin::ENDS).into()),
-        // One grid and no other.
+        // No refinement of the grid.
         gap: 1.0,
         ..Settings::default()
     };
@@ -49,8 +50,8 @@ fn bounds_enclose_what_a_plain_recursion_finds() {
     );
 }
 
-/// Whoever keeps to some of the actions, and acts only when something has happened, is no better than the
-/// best: never so in random worlds, and nearly as good in some.
+/// A policy with a subset of the actions that acts only at events is never better than the optimum.
+/// In some random worlds it is nearly as good.
 #[test]
 fn who_keeps_to_some_actions_is_never_better_than_the_best() {
     let mut near = 0;
@@ -105,7 +106,7 @@ fn bounds_enclose_what_a_plain_recursion_finds_where_failures_leave_something_be
     );
 }
 
-/// With numbers that vary; in half of the worlds everything happens at known times.
+/// Worlds with amounts that vary; in half of them everything happens at known times.
 #[test]
 fn bounds_enclose_what_a_plain_recursion_finds_where_numbers_change() {
     let (mut close, mut matters) = ([0; 2], 0);
@@ -132,7 +133,7 @@ fn bounds_enclose_what_a_plain_recursion_finds_where_numbers_change() {
     );
 }
 
-/// Facts and failures, where everything happens at known times.
+/// Facts and failures, with everything at known times.
 #[test]
 fn bounds_enclose_what_a_plain_recursion_finds_at_known_times() {
     let mut close = 0;
@@ -158,7 +159,7 @@ fn bounds_enclose_what_a_plain_recursion_finds_at_known_times() {
 
 #[test]
 fn bounds_enclose_what_a_plain_recursion_finds_where_facts_change_at_rates() {
-    // More than twice in a second, which the recursion leaves out.
+    // The recursion ignores more than two changes in a second.
     const LEFT_OUT: f64 = 5e-4;
     let mut close = 0;
     for number in 0..200 {
@@ -179,7 +180,7 @@ fn bounds_enclose_what_a_plain_recursion_finds_where_facts_change_at_rates() {
     );
 }
 
-/// So many worlds, or as many as the environment asks for.
+/// Returns the number of worlds, from the environment or by default.
 fn worlds(count: u64) -> u64 {
     let asked_for = std::env::var("ELBOWROOM_WORLDS").ok();
     asked_for.map_or(count, |text| text.parse().expect("a number of worlds"))

@@ -1,15 +1,15 @@
-//! The best value of a small world by plain recursion: at each whole second the agent starts and cancels what
-//! it likes, and a second later happens what happens, in the worst order or in the best one.
+//! Optimal value of a small world by plain recursion: at each whole second the agent starts and
+//! cancels any actions, and a second later the events occur, in the worst order or in the best one.
 //!
-//! It knows neither cells nor bounds, and reads neither PDDL nor world files.
+//! It uses neither cells nor bounds, and reads neither PDDL nor world files.
 
 use std::collections::BTreeMap;
 
 use super::{Change, ENDS, Literal, Measure, SmallAction, SmallWorld};
 
 impl SmallWorld {
-    /// The best that can be reached from time 0 if what happens at the same second happens in the
-    /// worst order, and in the best one.
+    /// Returns the optimal value from time 0 if events of the same second occur in the worst order,
+    /// and in the best one.
     pub(crate) fn best(&self) -> (f64, f64) {
         let start = Now {
             time: 0,
@@ -19,7 +19,7 @@ impl SmallWorld {
             begun: 0,
             number: self.number.unwrap_or_default(),
         };
-        // What comes within half a second comes at once.
+        // Changes within the first half second occur at once.
         let value = |choice: Choice| {
             let mut known = BTreeMap::new();
             let begun = self.often(0.5).into_iter().map(|(p, changes)| {
@@ -46,8 +46,8 @@ impl SmallWorld {
         (value(f64::min), value(f64::max))
     }
 
-    /// Which changes come in so many seconds, as often as they do, with how likely that is; more
-    /// than twice is left out.
+    /// Returns the possible changes within `seconds`, with their probabilities; more than two of
+    /// one kind are ignored.
     fn often(&self, seconds: f64) -> Vec<(f64, Vec<usize>)> {
         let mut all = vec![(1.0, Vec::new())];
         for (index, change) in self.changes.iter().enumerate() {
@@ -65,7 +65,7 @@ impl SmallWorld {
         all
     }
 
-    /// The run is over when the goal holds and everything that is under way has been let go.
+    /// Returns `true` if the goal holds and no running action prevents the end of the run.
     fn is_won(&self, now: &Now) -> bool {
         let holds_up = |action: &SmallAction| action.outcomes.iter().any(|it| it.delay > 0);
         let mut running = now.running.iter();
@@ -75,8 +75,7 @@ impl SmallWorld {
             && !running.any(|running| holds_up(&self.actions[running.action]))
     }
 
-    /// All courses that an action may still take which has been under way for so long; as shares
-    /// they add up to 1.
+    /// Returns the courses that remain possible at this `age` of an action. Their weights add up to 1.
     fn courses(&self, running: Running, age: u32) -> Vec<Course> {
         let action = &self.actions[running.action];
         let mut all = Vec::new();
@@ -113,7 +112,7 @@ impl SmallWorld {
         all
     }
 
-    /// How likely nobody can let an action go.
+    /// Returns the probability that an action cannot be cancelled.
     fn is_broken(&self, running: Running, time: u32) -> f64 {
         let age = time - running.since;
         let courses = self.courses(running, age + 1).into_iter();
@@ -125,7 +124,7 @@ impl SmallWorld {
         if self.is_won(now) {
             return 1.0;
         }
-        // The run ends, and nothing that happens later is of use.
+        // The run ends, and later events do not count.
         if now.time == ENDS {
             return 0.0;
         }
@@ -171,7 +170,7 @@ impl SmallWorld {
                 after.facts = action.at_start.map_or(now.facts, |it| set(it, now.facts));
                 after.number -= action.amount.taken;
                 self.break_off(&mut after);
-                // Nobody starts what breaks off at once.
+                // An action that fails at once is never started.
                 if !after.running.iter().any(|running| running.action == index) {
                     continue;
                 }
@@ -184,7 +183,7 @@ impl SmallWorld {
         best
     }
 
-    /// A second passes, and then happens what happens, in the order of that choice.
+    /// Advances the time by a second, and applies the events in the order of `choice`.
     fn wait(&self, now: &Now, choice: Choice, known: &mut BTreeMap<Now, f64>) -> f64 {
         let time = now.time + 1;
         let ends = now.running.iter().map(|&running| {
@@ -307,8 +306,8 @@ impl SmallWorld {
     }
 }
 
-/// One way in which an action may go: how likely that is, how long it takes until nothing but a
-/// failure can come of it or it ends, how long it is under way, and as what it ends.
+/// Possible course of an action: its probability, the time until it ends or is bound to fail, the
+/// total running time, and the kind of end.
 #[derive(Clone, Copy, Debug)]
 struct Course {
     weight: f64,
@@ -319,14 +318,15 @@ struct Course {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Ending {
-    /// With that one of the amounts, if there is one.
+    /// Success with that one of the amounts, if there is one.
     Well(usize),
-    /// With that outcome, if any.
+    /// Failure with that outcome, if any.
     Badly(Option<usize>),
 }
 
 impl SmallAction {
-    /// How many times it may begin at one time: once is enough, if each start does not take more of the number.
+    /// Returns the maximum number of simultaneous starts. One is enough unless each start takes
+    /// more of the number.
     fn most_begun(&self) -> u32 {
         if self.amount.taken > 0 { 4 } else { 1 }
     }
@@ -352,7 +352,7 @@ impl Change {
     }
 }
 
-/// Which of two values the order leads to.
+/// Choice between the values of two orders.
 type Choice = fn(f64, f64) -> f64;
 
 #[derive(Clone, Copy, Debug)]
@@ -366,11 +366,11 @@ enum Happening {
 struct Running {
     action: usize,
     since: u32,
-    /// How long it had been under way when somebody wanted to let it go and could not.
+    /// Age of an action at which an attempt to cancel it found that it cannot be cancelled.
     found_broken: Option<u32>,
 }
 
-/// All orders of those.
+/// Returns all permutations.
 fn orders<T: Copy>(of: &[T]) -> Vec<Vec<T>> {
     let mut all = vec![Vec::new()];
     for (count, item) in of.iter().enumerate() {
@@ -392,12 +392,12 @@ struct Now {
     facts: u32,
     running: Vec<Running>,
     happened: u32,
-    /// How many times each began at this very time, in three bits each.
+    /// Number of starts of each action at this time, in three bits each.
     begun: u32,
     number: i32,
 }
 
-/// What is won stays won.
+/// Applies a random change to all states that have not reached the goal.
 fn branch<T: Copy>(
     all: Vec<(f64, Now)>,
     ways: &[(f64, T)],

@@ -1,4 +1,4 @@
-//! Sets of actions for when a plan has failed.
+//! Sets of actions for recovery after the failure of a plan.
 
 use elbowroom::execute::{ActionSets, Embedded};
 use elbowroom_laboratory::timed::{Settings, optimum, supported};
@@ -6,8 +6,9 @@ use elbowroom_sim::WorldModel;
 
 use super::task;
 
-/// A casting weighs 6 as planned, and is sold from 5 on. Whoever has cast too little melts it down, and
-/// has time to cast with the second mould, which always does. A mould is good for once.
+/// A casting weighs 6 as planned, and can be sold from 5 on. A casting that is too light is melted
+/// down, and there is time for another one with the second mould, which never fails. A mould can be
+/// used once.
 const DOMAIN: &str = "
 (define (domain foundry)
   (:requirements :strips :fluents :durative-actions :timed-initial-literals)
@@ -60,7 +61,8 @@ fn a_set_gets_what_it_needs_of_the_plan_before_and_no_more() {
         with(&["melt", "sell-second"], &before),
         named(&["melt", "sell-second", "cast-first"])
     );
-    // What can begin by itself needs nothing, and neither does what none of the others makes possible.
+    // An action that is applicable by itself needs nothing, and neither does one whose conditions
+    // no other action achieves.
     assert_eq!(
         with(&["cast-second", "sell-second"], &before),
         named(&["cast-second", "sell-second"])
@@ -68,8 +70,8 @@ fn a_set_gets_what_it_needs_of_the_plan_before_and_no_more() {
     assert_eq!(with(&["sell-second"], &before), named(&["sell-second"]));
 }
 
-/// The planner's plan casts once, which succeeds in five of six cases. What is done in the others is no plan from the
-/// beginning.
+/// The planner's plan casts once, and succeeds in five of six cases. The recovery in the other
+/// cases is not a plan from the beginning.
 #[test]
 fn what_is_done_when_the_plan_has_failed_is_found_in_samples() {
     let task = task(DOMAIN, PROBLEM);
@@ -78,7 +80,8 @@ fn what_is_done_when_the_plan_has_failed_is_found_in_samples() {
     let mut later = named(&["cast-first", "cast-second", "melt", "sell-second"]);
     later.sort_unstable();
     assert!(sets.fallbacks.contains(&later), "{sets:?}");
-    // Among all actions it is found, too, where these are few: whoever keeps to the plan alone reaches less.
+    // If all actions are few, the recovery is found among them as well. A policy restricted to the
+    // plan is worse.
     let settings = Settings {
         plans: vec![named(&["cast-first", "sell-first"])],
         ..Settings::default()

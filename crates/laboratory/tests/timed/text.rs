@@ -122,7 +122,7 @@ impl SmallWorld {
 }
 
 impl SmallWorld {
-    /// The failures of the world as a likelihood file. Facts do not change by themselves there.
+    /// Returns the failures of the world as a likelihood file, without spontaneous changes.
     #[allow(dead_code, reason = "not all tests that share this have likelihoods")]
     pub(crate) fn likelihoods(&self) -> String {
         let mut text = "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\nstart = 1.0\n\
@@ -152,7 +152,7 @@ impl SmallWorld {
 }
 
 impl SmallOutcome {
-    /// The changes, as world and likelihood files have them.
+    /// Returns the changes in the common format of world and likelihood files.
     fn changes_text(&self) -> String {
         let list = |truth: bool| {
             let facts = self.changes.iter().filter(|change| change.1 == truth);

@@ -1,5 +1,5 @@
-//! Small worlds in which all durations and times are whole and even: drawn here, [written out](text) as PDDL
-//! and as a world file, and worth what a [plain recursion](recursion) finds.
+//! Small worlds in which all durations and times are whole and even. They are generated here,
+//! [written](text) as PDDL and as a world file, and solved by a [plain recursion](recursion).
 
 mod recursion;
 mod text;
@@ -7,12 +7,12 @@ mod text;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// The run ends then, and with it all hope is gone.
+/// End of the run, the deadline of the goal.
 pub(crate) const ENDS: u32 = 8;
 
 const FACTS: usize = 4;
 
-/// A fact, and whether it must be true.
+/// Fact, and its required truth value.
 type Literal = (usize, bool);
 
 #[derive(Clone, Debug)]
@@ -22,28 +22,28 @@ pub(crate) struct SmallWorld {
     changes: Vec<SmallChange>,
     initial: u32,
     goal: Vec<usize>,
-    /// What the number is to begin with, if there is one.
+    /// Initial value of the number, if there is one.
     number: Option<i32>,
-    /// What it has to be in the end.
+    /// Final condition on the number.
     wanted: Option<Measure>,
 }
 
-/// What the number must be: at least so much, or at most.
+/// Lower or upper bound on the number.
 #[derive(Clone, Copy, Debug)]
 struct Measure {
     at_least: bool,
     bound: i32,
 }
 
-/// What an action has to do with the number.
+/// Conditions and effects of an action on the number.
 #[derive(Clone, Debug, Default)]
 struct SmallAmount {
     start: Option<Measure>,
     over_all: Option<Measure>,
     end: Option<Measure>,
-    /// What its start takes.
+    /// Amount that its start takes.
     taken: i32,
-    /// What its end does, with one of these amounts.
+    /// Change by its end, with one of these amounts.
     at_end: Option<(Change, Vec<i32>)>,
 }
 
@@ -63,19 +63,19 @@ struct SmallAction {
     at_end: Literal,
     durations: Vec<u32>,
     fails: f64,
-    /// Whether a failure undoes what the start did.
+    /// `true` if a failure undoes the start effects.
     is_undone: bool,
     outcomes: Vec<SmallOutcome>,
     amount: SmallAmount,
 }
 
-/// What a failure leaves behind.
+/// Outcome of a failure.
 #[derive(Clone, Debug)]
 struct SmallOutcome {
-    /// Of the failures.
+    /// Share of the failures.
     share: f64,
     changes: Vec<Literal>,
-    /// How much later it fails; nobody can let it go until then.
+    /// Delay of the failure. The action cannot be cancelled until then.
     delay: u32,
 }
 
@@ -86,7 +86,7 @@ struct SmallEvent {
     probability: f64,
 }
 
-/// A fact that becomes so again and again, so many times a second. The world counts whole seconds.
+/// Spontaneous change of a fact, with its rate per second. The world has whole seconds.
 #[derive(Clone, Debug)]
 struct SmallChange {
     change: Literal,
@@ -94,8 +94,8 @@ struct SmallChange {
 }
 
 impl SmallWorld {
-    /// The same kind of world, with facts that change at a rate; fewer actions and events, as there
-    /// are many orders.
+    /// Returns a random world with facts that change at a rate. It has fewer actions and events,
+    /// because there are many orders.
     pub(crate) fn with_rates(rng: &mut ChaCha8Rng, asks_for_less: bool) -> Self {
         let mut world = Self::random(rng, asks_for_less);
         world.actions.truncate(2);
@@ -106,13 +106,13 @@ impl SmallWorld {
             rate: if rng.random_bool(0.5) { 0.02 } else { 0.05 },
         });
         world.changes = changes.collect();
-        // One direction of a fact has one rate.
+        // One rate for each direction of a fact.
         world.changes.sort_by_key(|change| change.change);
         world.changes.dedup_by_key(|change| change.change);
         world
     }
 
-    /// The same kind of world, with failures that leave something behind and take time.
+    /// Returns a random world with failures that have outcomes and delays.
     pub(crate) fn with_outcomes(rng: &mut ChaCha8Rng, asks_for_less: bool) -> Self {
         let mut world = Self::random(rng, asks_for_less);
         world.events.truncate(1);
@@ -137,7 +137,8 @@ impl SmallWorld {
         world
     }
 
-    /// A world without events. Its goal can become unreachable, because starts use up facts and failures delete others.
+    /// Returns a random world without events. Its goal can become unreachable, because starts use
+    /// up facts and failures delete others.
     #[allow(dead_code, reason = "not all tests that share this ask for it")]
     pub(crate) fn with_costly_failures(rng: &mut ChaCha8Rng) -> Self {
         let mut world = Self::with_outcomes(rng, false);
@@ -157,7 +158,7 @@ impl SmallWorld {
             action.at_end = (added, true);
             for outcome in &mut action.outcomes {
                 outcome.delay = 0;
-                // No failure is a way to the goal.
+                // Failures must not help to reach the goal.
                 outcome.changes.truncate(1);
                 if outcome.changes[0].1 {
                     outcome.changes[0].0 = needed;
@@ -167,7 +168,7 @@ impl SmallWorld {
         world
     }
 
-    /// The same world, but that failures leave nothing behind.
+    /// Returns the same world without outcomes of failures.
     #[allow(
         dead_code,
         reason = "one of the tests that share this compares with it"
@@ -181,7 +182,8 @@ impl SmallWorld {
         plain
     }
 
-    /// `asks_for_less`: conditions may ask for facts to be false, and ends may delete.
+    /// Returns a random world. With `asks_for_less`, conditions may require facts to be false, and
+    /// ends may delete facts.
     pub(crate) fn random(rng: &mut ChaCha8Rng, asks_for_less: bool) -> Self {
         let literal = |rng: &mut ChaCha8Rng| {
             (
@@ -230,7 +232,7 @@ impl SmallWorld {
         }
     }
 
-    /// The same kind of world, with a number that actions change by amounts that vary.
+    /// Returns a random world with a number that actions change by random amounts.
     #[allow(dead_code, reason = "not all tests that share this have numbers")]
     pub(crate) fn with_numbers(rng: &mut ChaCha8Rng, asks_for_less: bool) -> Self {
         let mut world = Self::random(rng, asks_for_less);
@@ -262,7 +264,7 @@ impl SmallWorld {
         world
     }
 
-    /// The same world, in which nothing asks for a number.
+    /// Returns the same world without conditions on the number.
     #[allow(dead_code, reason = "not all tests that share this have numbers")]
     pub(crate) fn without_numbers(&self) -> Self {
         let mut plain = self.clone();
@@ -279,7 +281,7 @@ impl SmallWorld {
         durations.all(|count| count == 1) && self.events.iter().all(|event| event.times.len() == 1)
     }
 
-    /// The same world, in which all that happens does so at known times.
+    /// Returns the same world with all events at known times.
     #[allow(dead_code, reason = "not all tests that share this have known times")]
     pub(crate) fn with_known_times(mut self) -> Self {
         for action in &mut self.actions {

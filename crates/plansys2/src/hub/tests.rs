@@ -1,8 +1,8 @@
-//! Each row of the table in `docs/plansys2.md`.
+//! Tests of each row of the table in `docs/plansys2.md`.
 
 use super::*;
 
-/// A hub with one robot or more around it, and what came of it.
+/// Hub with one performer or more, and its outputs.
 struct Scene {
     hub: Hub,
     now: Duration,
@@ -32,7 +32,7 @@ impl Scene {
         }
     }
 
-    /// `text` as in a plan, without the parentheses.
+    /// Begins an action. `text` is that of a plan, without parentheses.
     fn begin(&mut self, ticket: Ticket, text: &str) {
         let (name, arguments) = split(text);
         let action = Action {
@@ -75,7 +75,7 @@ impl Scene {
         self.settle();
     }
 
-    /// Time passes; whoever is `alive` says so each second.
+    /// Advances the time. The performer `alive` reports its status each second.
     fn after(&mut self, seconds: u32, alive: Option<(&str, i8)>) {
         for quarter in 1..=seconds * 4 {
             self.now += Duration::from_millis(250);

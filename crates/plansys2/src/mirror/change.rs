@@ -1,17 +1,17 @@
-//! Facts and numbers, by the names that both sides have for them.
+//! Facts and fluents, by the names on both sides.
 
 use std::collections::BTreeMap;
 
 use super::Call;
 use crate::knowledge::{Node, Param, node};
 
-/// What is so: of a fluent its value, of a fact 1 where it is true; else nothing.
+/// Value of a fluent, or 1 for a true fact; `None` for a false fact or an undefined fluent.
 pub(super) type Value = Option<f64>;
 
-/// All that is known of one side.
+/// Known state of one side.
 pub(super) type State = BTreeMap<Key, Value>;
 
-/// A fact or a fluent: its words, in lower case.
+/// Fact or fluent, as its words in lower case.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Key {
     /// A fact.
@@ -20,12 +20,12 @@ pub enum Key {
     Number(Vec<String>),
 }
 
-/// Something that others have changed.
+/// Change made by others.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Seen {
-    /// This fact is so now.
+    /// New truth value of a fact.
     Fact(String, bool),
-    /// This fluent has this value now.
+    /// New value of a fluent.
     Value(String, f64),
 }
 
@@ -38,7 +38,7 @@ impl Key {
         Self::Number(words(name))
     }
 
-    /// As the problem expert has it, whose spelling is noted.
+    /// Returns the key of a fact of the problem expert, and records the spelling of its words.
     pub(super) fn of_fact(node: &Node, spelling: &mut BTreeMap<String, String>) -> Self {
         Self::Fact(noted(node, spelling))
     }
@@ -52,12 +52,12 @@ impl Key {
         words
     }
 
-    /// `(at r1 gate)`.
+    /// Returns the fact or fluent as PDDL, such as `(at r1 gate)`.
     fn name(&self) -> String {
         format!("({})", self.words().join(" "))
     }
 
-    /// In words.
+    /// Returns the fact or fluent with its value, as PDDL.
     pub(super) fn told(&self, value: Value) -> String {
         match (self, value) {
             (Self::Fact(_), Some(_)) => self.name(),
@@ -69,7 +69,7 @@ impl Key {
 }
 
 impl Seen {
-    /// A fluent that has lost its value is none that a run could be told of.
+    /// Returns the change. A fluent that has lost its value cannot be reported to a run.
     pub(super) fn of(key: &Key, value: Value) -> Option<Self> {
         match key {
             Key::Fact(_) => Some(Self::Fact(key.name(), value.is_some())),
@@ -78,7 +78,7 @@ impl Seen {
     }
 }
 
-/// By which call the problem expert comes to have that.
+/// Returns the call that makes the change in the problem expert.
 pub(super) fn change_of(
     key: &Key,
     value: Value,

@@ -36,15 +36,15 @@ fn name(node: &Node) -> String {
         .join(" ")
 }
 
-/// As `PlanSys2` has it: spelled as it was told, case and all.
+/// Problem expert of `PlanSys2`, which preserves the spelling of names.
 #[derive(Default)]
 struct Expert {
     facts: BTreeSet<String>,
     numbers: BTreeMap<String, f64>,
-    /// What it was told, in order.
+    /// Received changes, in order.
     told: Vec<String>,
     refuses: Option<&'static str>,
-    /// Since the last time that this was asked.
+    /// `true` if its state has changed since the last notification.
     has_changed: bool,
 }
 
@@ -98,7 +98,7 @@ impl Expert {
             "remove" => {
                 self.facts.remove(&name);
             }
-            // What was not defined cannot be updated.
+            // An undefined fluent cannot be updated.
             "update" if !is_known => return Answer::Done(Err("function not valid".to_owned())),
             "define" | "update" => {
                 self.numbers.insert(name, node.value);
@@ -111,7 +111,7 @@ impl Expert {
         Answer::Done(Ok(()))
     }
 
-    /// Answers until nothing is asked any more.
+    /// Answers calls until none is due.
     fn talk(&mut self, mirror: &mut Mirror, now: Duration) {
         loop {
             if std::mem::take(&mut self.has_changed) {
@@ -138,7 +138,7 @@ fn number(name: &str, value: f64) -> (String, Option<f64>) {
     (name.to_owned(), Some(value))
 }
 
-/// A run that believes that a robot is at a, with a charge of 5.
+/// Starts a run that believes that robot r is at a with a charge of 5.
 fn begun(expert: &mut Expert) -> Mirror {
     let mut mirror = Mirror::default();
     mirror.found(true);
@@ -192,7 +192,7 @@ fn what_others_change_is_seen_once_and_not_told_back() {
         Seen::Value("(charge r)".to_owned(), 1.0),
     ];
     assert_eq!(mirror.seen(), seen);
-    // The run says that it believes so now.
+    // The run confirms the belief.
     mirror.believe(
         &[fact("(at r a)", false), fact("(blocked b)", true)],
         &[number("(charge r)", 1.0)],
@@ -230,7 +230,7 @@ fn what_is_changed_while_it_is_read_is_not_taken_back_by_what_was_read() {
     let mut mirror = begun(&mut expert);
     mirror.notified();
     mirror.tick(at(1));
-    // It answers with what it has; meanwhile the run changes that.
+    // The run changes the state while the answers are pending.
     let asked = mirror.calls();
     let answers: Vec<_> = asked
         .iter()
@@ -357,12 +357,12 @@ fn words_are_told_as_the_problem_and_the_problem_expert_write_them() {
     );
 }
 
-/// A run and a problem expert, between which messages are late and lost.
+/// Run and problem expert, connected by messages that may be late or lost.
 struct Play {
     rng: ChaCha8Rng,
     expert: Expert,
     mirror: Mirror,
-    /// What the run believes: what it was told, and what it does.
+    /// Beliefs of the run, from its own actions and reported changes.
     facts: BTreeMap<String, bool>,
     value: f64,
     open: Vec<(CallId, Call)>,
@@ -399,7 +399,8 @@ impl Play {
         self.mirror.believe(&[], &[number("(n)", value)]);
     }
 
-    /// Something happens; once all is quiet, only messages get through, and none is lost.
+    /// Makes a random change, or delivers an answer. When `is_busy` is `false`, answers are only
+    /// delivered, and none is lost.
     fn act(&mut self, is_busy: bool, others_act: bool) {
         let it = *["p a", "p b", "q"].choose(&mut self.rng).expect("some");
         match self.rng.random_range(0..8) {
@@ -438,7 +439,8 @@ impl Play {
         }
     }
 
-    /// What is due, and what the run sees, which it believes.
+    /// Collects the pending calls. Returns the changes that the run sees, after it has adopted
+    /// them.
     fn settle(&mut self, now: Duration, is_busy: bool) -> Vec<Seen> {
         if std::mem::take(&mut self.expert.has_changed) {
             self.mirror.notified();
@@ -460,8 +462,8 @@ impl Play {
     }
 }
 
-/// Run and others change the same facts and numbers at random, while messages are late and lost. When all is quiet, both
-/// sides have the same; and as long as others change nothing, nothing is seen.
+/// The run and others change the same facts and fluents at random, while messages are late and
+/// lost. Finally both sides have the same state. If others change nothing, the run sees no change.
 #[test]
 fn both_sides_come_to_the_same_whoever_changes_what_and_when() {
     let (mut seen_of_others, mut conflicts) = (0, 0);
@@ -486,7 +488,7 @@ fn both_sides_come_to_the_same_whoever_changes_what_and_when() {
         assert_eq!(held, Some(play.value.to_bits()), "seed {seed}");
         assert!(play.mirror.is_idle(), "seed {seed}");
     }
-    // Scripts in which nothing happens would show nothing.
+    // The random scripts must contain enough events.
     assert!(
         seen_of_others > 200 && conflicts > 500,
         "{seen_of_others}, {conflicts}"

@@ -28,7 +28,7 @@ class Interface:
     def __init__(self, name, spec, log):
         self.name, self.spec, self.log = name, spec, log
         rospy.init_node(name)
-        # Its last word is repeated to whoever comes later, as that of ROSPlan's own is.
+        # Late subscribers receive the last message, as from ROSPlan's own interfaces.
         topics = "/rosplan_plan_dispatcher/action_dispatch", "/rosplan_plan_dispatcher/action_feedback"
         self.says = rospy.Publisher(topics[1], ActionFeedback, queue_size=10, latch=True)
         rospy.Subscriber(topics[0], ActionDispatch, self.hear, queue_size=1000)

@@ -23,10 +23,10 @@ ELBOWROOM = os.path.abspath(sys.argv[1])
 YARD = [os.path.join(HERE, "..", "ros2", "yard", it) for it in ("domain.pddl", "problem.pddl", "plan.plan")]
 MATCH = [os.path.join(ROOT, "cases", "match", it) for it in ("domain.pddl", "problem.pddl", "plan.plan")]
 SHARE = "/usr/share/diagnostic_msgs/msg"
-# How long anything is waited for. Only what hangs takes so long, and is told where it does.
+# Time limit of each wait, in seconds. Only a hanging process reaches it.
 PATIENCE = 300
 AT_A_TIME = 4
-# How a run ends that finds no plan: with a certificate that none exists, or without one.
+# Exit codes of a run without a plan: with a certificate that none exists, or without one.
 NO_PLAN = (1, 3)
 DRIVERS = {
     "driver1": {"action": "move", "lasts": 2, "only": "r1"},
@@ -70,7 +70,7 @@ class Stage:
         return subprocess.run(command, env=self.environment, text=True, capture_output=True, timeout=PATIENCE)
 
     def has_master(self):
-        # Its log of all nodes comes last.
+        # The log of all nodes is the last one to start.
         return "/rosout" in self.ask("rosnode", "list").stdout
 
     def begin(self, interfaces):
@@ -162,7 +162,7 @@ def an_interface_ends_three_times_and_its_last_word_is_repeated_to_the_next_run(
     def at(event, interface):
         return sorted(it["at"] for it in stage.log() if (it["event"], it["interface"]) == (event, interface))
 
-    # What was said of the first run would let the second end before anything is done: r2 would be said to have arrived
+    # Reports of the first run would end the second one too early: r2 would be reported as arrived
     # before it has. (Nothing waits for r1.)
     assert len(at("ends", "driver2")) == len(at("begins", "signaller")) == 2
     assert all(arrived < signal for arrived, signal in zip(at("ends", "driver2"), at("begins", "signaller")))
@@ -177,10 +177,11 @@ def a_failure_has_its_reason(stage):
 def what_is_late_has_its_reason(stage):
     stage.begin({"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 2.2}})
     stage.play(MATCH, speed=10)
-    # The rest of the plan is executed without a guarantee; ROSPlan's interfaces cannot be cancelled, so that the last
-    # inspection may succeed after the light has gone out.
+    # The remaining plan is executed without a guarantee. ROSPlan's interfaces cannot be cancelled,
+    # so the last inspection may succeed after the light has gone out.
     words = " ".join(stage.out.split())
-    # Milliseconds decide which of the two inspections is named, and whether its end is late or the rest lacks time.
+    # Milliseconds decide which of the two inspections is named, and whether its end is late or the
+    # remaining time is too short.
     assert stage.code in (0, *NO_PLAN) and "too little time is left" in words and "end of (inspect " in words
     assert '"cancel"' in stage.trace()
 
@@ -188,7 +189,7 @@ def what_is_late_has_its_reason(stage):
 def a_refusal_has_its_reason(stage):
     stage.begin({**DRIVERS, "driver2": dict(DRIVERS["driver2"], refuses="the brake is on")})
     stage.play(YARD)
-    # It is asked again in each new plan, as long as the run makes new ones.
+    # Each new plan requests it again, as long as the run replans.
     assert stage.code == 3 and "why: the brake is on" in stage.out and "why: the brake is on" in stage.trace()
     assert {it["event"] for it in stage.log() if it["interface"] == "driver2"} == {"refuses"}
 

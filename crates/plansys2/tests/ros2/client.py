@@ -18,7 +18,7 @@ from plansys2_msgs.srv import GetOrderedSubGoals, GetPlan, GetStates, ValidateDo
 from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-# How long anything is waited for: only what hangs takes so long.
+# Time limit of each wait, in seconds. Only a hanging process reaches it.
 PATIENCE = 120
 SERVICES = {
     "planner/get_plan": GetPlan,
@@ -45,8 +45,8 @@ class Client:
     def __init__(self):
         rclpy.init()
         self.node = rclpy.create_node("client")
-        # At the beginning, as PlanSys2's terminal does: the first request of a client whose peer does not know it yet
-        # takes three seconds.
+        # Created at the beginning, as in PlanSys2's terminal. The first request of an undiscovered
+        # client takes three seconds.
         self.clients = {name: self.node.create_client(kind, name) for name, kind in SERVICES.items()}
         self.states = [self.node.create_client(GetStates, f"problem_expert/get_problem_{it}")
                        for it in ("predicates", "functions")]  # fmt: skip

@@ -22,7 +22,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-# How long anything is waited for: only what hangs takes so long.
+# Time limit of each wait, in seconds. Only a hanging process reaches it.
 PATIENCE = 120
 QOS = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(10), Policy.Durability.Volatile)
 
@@ -87,7 +87,7 @@ class Client:
         answers = []
 
         def heard():
-            # One who has left is told of by a sample without content.
+            # A sample without content reports a writer that has left.
             answers.extend(it for it in self.reader.take(10) if not isinstance(it, InvalidSample))
             return [it for it in answers if (it.guid, it.seq) == (self.guid, self.number)]
 

@@ -119,7 +119,7 @@ class Expert:
     def serve(self):
         for reader, answer in self.services:
             for request in reader.take(10):
-                # One who has left is told of by a sample without content.
+                # A sample without content reports a writer that has left.
                 if not isinstance(request, InvalidSample):
                     answer(request)
 

@@ -21,10 +21,10 @@ ELBOWROOM, PROGRAM = (os.path.abspath(it) for it in sys.argv[1:3])
 PYTHON_WORLD = f"{sys.executable} {os.path.join(ROOT, 'examples', 'plansys2_world.py')}"
 YARD = [os.path.join(HERE, "yard", it) for it in ("domain.pddl", "problem.pddl", "plan.plan")]
 MATCH = [os.path.join(ROOT, "cases", "match", it) for it in ("domain.pddl", "problem.pddl", "plan.plan")]
-# How long anything is waited for. Only what hangs takes so long, and is told where it does.
+# Time limit of each wait, in seconds. Only a hanging process reaches it.
 PATIENCE = 300
 AT_A_TIME = 4
-# How a run ends that finds no plan: with a certificate that none exists, or without one.
+# Exit codes of a run without a plan: with a certificate that none exists, or without one.
 NO_PLAN = (1, 3)
 DRIVERS = {
     "driver1": {"action": "move", "lasts": 2, "only": "r1"},
@@ -52,7 +52,7 @@ class Stage:
         there = self.start([sys.executable, script, json.dumps(performers), self.log_file])
         run = None
         try:
-            # A robot's nodes are up before its plan begins.
+            # The nodes of a robot start before its plan.
             self.wait_for("the performers", lambda: os.path.exists(self.log_file), there)
             time.sleep(1)
             line = [ELBOWROOM, command, *files, *options]
@@ -105,7 +105,7 @@ class Stage:
         if not os.path.exists(self.log_file):
             return []
         with open(self.log_file, encoding="utf-8") as file:
-            # The last line may be half written.
+            # The last line may be incomplete.
             return [json.loads(line) for line in file if line.endswith("\n")]
 
     def events(self):
@@ -132,7 +132,7 @@ def end(*processes):
     for it in processes:
         if it is not None:
             try:
-                # Now and then, rclpy sleeps on after the signal.
+                # Occasionally rclpy does not end after the signal.
                 it.wait(timeout=30)
             except subprocess.TimeoutExpired:
                 it.kill()
@@ -145,7 +145,7 @@ def two_robots_at_a_time(stage):
     assert stage.when("begins", second) < stage.when("ends", first)
     assert stage.when("begins", first) < stage.when("ends", second)
     assert stage.when("begins", "(signal r2 gate)") > stage.when("ends", second)
-    # A second driver may be discovered after the run has begun, which needs one.
+    # A second driver may be discovered after the run has begun, which needs only one.
     performers = next(line for line in stage.errors.splitlines() if "performers: " in line)
     assert "(move)" in performers and "signaller (signal)" in performers
 
@@ -253,7 +253,7 @@ def serve(stage, crew, *options, meanwhile=None, expert=None):
                              stdout=subprocess.PIPE, stderr=subprocess.PIPE)  # fmt: skip
         there.append(client)
         if meanwhile:
-            # What goes wrong here is told before what follows from it.
+            # An error here is reported before its consequences.
             meanwhile(client)
         stage.hear(client)
         assert stage.code == 0
@@ -287,7 +287,8 @@ def a_plan_is_asked_for_and_executed(stage):
     assert said["idle"] == 3 * ["no plan is being executed"]
     assert said["known"] is None and stage.program.count("no problem expert is there") == 1
     assert said["followed"] == [True, sorted(executed["actions"])], "tools can follow"
-    # The performers' process and the client: the program does not say what nodes of another distribution cannot bear.
+    # The performers' process and the client. The program does not publish node information, on
+    # which nodes of another distribution abort.
     publishers, nodes = said["nodes"]
     assert publishers == 2 and set(nodes) == {"client", *DRIVERS}
     assert stage.events().count("ends") == 3
@@ -297,7 +298,7 @@ def an_executed_plan_is_cancelled(stage):
     crew = {name: dict(spec, lasts=30) for name, spec in DRIVERS.items()}
     said = serve(stage, crew, "2")
     executed = said["executed"]
-    # Nothing of it has ended.
+    # No action has ended.
     goals = ["(and (at r1 gate))", "(and (at r2 gate))", "(and (signalled gate))"]
     assert executed["asked"] == [*2 * [said["planned"][1]], goals]
     assert executed["outcome"] == "canceled" and not executed["success"]
@@ -348,7 +349,7 @@ def what_is_done_is_told_to_the_problem_expert(stage):
     assert known == AT_THE_GATE and said["known"] == AT_THE_GATE
     assert {who for who, _ in told} == {"the run"}
     told = [it for _, it in told]
-    # The number that it did not have is defined, the other one updated.
+    # The undefined fluent is defined, the other one updated.
     first, last = {"remove at r1 shed", "remove at r2 barn"}, "add signalled gate"
     between = {"add at r1 gate", "add at r2 gate", "update trips r1 1", "add trips r2 1"}
     assert len(told) == 7 and set(told[:2]) == first and set(told[2:6]) == between and told[6] == last
@@ -364,7 +365,8 @@ def what_others_tell_the_problem_expert_is_heeded(stage):
     assert len(moves) == 2
     told, (facts, numbers) = changes(stage)
     assert facts == AT_THE_GATE[0] and numbers["trips r2"] == 2.0
-    # The other robot arrives at about that time: its trip is counted before, from 0, or, where that was heard of, from 7.
+    # The other robot arrives at about that time. Its trip is counted before the change, from 0, or
+    # after it, from 7.
     assert numbers["trips r1"] in (7.0, 1.0, 8.0)
     assert [it for who, it in told if who == "somebody else"] == then[0]["then"]
 
@@ -381,7 +383,8 @@ def a_problem_expert_that_does_not_answer_delays_nothing(stage):
     expert = begin_expert(stage, mute=True)
 
     def leave(client):
-        # The client would ask it, too, and wait: it is gone before that.
+        # The client would ask the problem expert as well, and wait. The problem expert ends before
+        # that.
         stage.wait_for("it to be said", lambda: "has not answered" in read(stage), client)
         end(expert)
 

@@ -1,5 +1,5 @@
-//! Records that begin anew in the middle of a run: what follows is decided as if all that was before
-//! were known.
+//! Rotation of records in the middle of a run: the following decisions are the same as with the
+//! whole record.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -20,8 +20,7 @@ use crate::scene::irr;
 
 const HEADER: &str = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
 
-/// Errands that take charge while they last, and in which what is found depends on the lamp at their
-/// start and throughout.
+/// Errands that consume charge, and whose effects depend on the lamp at their start and throughout.
 const DOMAIN: &str =
     "(define (domain errands) (:requirements :durative-actions :typing :fluents :conditional-effects)
     (:types robot item)
@@ -50,8 +49,8 @@ fn task(init: &str) -> Arc<Task> {
 
 const ITEMS: [&str; 5] = ["book", "cup", "key", "pen", "map"];
 
-/// What people ask, what others do, and reports on what is long over, never was, or comes to something
-/// else than was said.
+/// Returns random requests, changes by others, and reports about actions that have ended, never
+/// existed, or end in another way than reported before.
 fn script(task: &Task, dice: &mut Dice) -> Vec<(Rational, Event)> {
     let fluent = task.fluent_named("(charge)").expect("a correct test");
     let mut script = Vec::new();
@@ -91,18 +90,18 @@ fn script(task: &Task, dice: &mut Dice) -> Vec<(Rational, Event)> {
     script
 }
 
-/// A part of a record, with the snapshot that it begins with.
+/// Segment of a record, with its initial snapshot.
 #[derive(Default)]
 struct Segment {
     snapshot: Option<String>,
     lines: Vec<String>,
 }
 
-/// Begins anew at some of the moments at which it can.
+/// Recorder that rotates at some of the possible times.
 struct Rotating {
     task: Arc<Task>,
     segments: Arc<Mutex<Vec<Segment>>>,
-    /// How likely, and by which dice.
+    /// Probability of a rotation in percent, and its random numbers.
     percent: u64,
     dice: Dice,
 }
@@ -115,7 +114,7 @@ impl Recorder for Rotating {
     }
 
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
-        // It is asked all the time as long as it rests.
+        // While the run is idle, there are many possible times.
         let is_at_rest = matches!(stand().doing, Doing::Rests { .. });
         if self.dice.below(100) >= self.percent || (is_at_rest && self.dice.below(6) > 0) {
             return false;
@@ -132,13 +131,13 @@ impl Recorder for Rotating {
     }
 }
 
-/// A run by a random script.
+/// Run by a random script.
 #[derive(Clone, Copy, Debug)]
 struct Case {
     executor: &'static str,
     seed: u64,
     is_aside: bool,
-    /// Whether plans are made ready beside the run, too.
+    /// `true` if plans are also prepared in the background.
     readies: bool,
 }
 
@@ -166,7 +165,7 @@ impl Case {
             .explaining()
     }
 
-    /// Its record, which begins anew at so many of a hundred moments at which it can.
+    /// Returns its record, which is rotated at this percentage of the possible times.
     fn recorded(self, percent: u64) -> Vec<Segment> {
         let task = self.task();
         let dice = &mut Dice(self.seed);
@@ -202,8 +201,8 @@ impl Case {
         std::mem::take(&mut *segments.lock().expect("not poisoned"))
     }
 
-    /// Plays a segment, or its beginning, and says how much came out as it did, and the first line that
-    /// did not.
+    /// Replays a segment, or its beginning. Returns the number of equal lines, and the first
+    /// difference.
     fn played(self, segment: &Segment, lines: &[String]) -> (usize, Option<String>) {
         let snapshot = segment.snapshot.as_ref();
         let all = [HEADER].into_iter();
@@ -229,7 +228,7 @@ impl Case {
     }
 }
 
-/// A line without what depends on how far the record reaches back.
+/// Returns a line without the parts that depend on the beginning of the record.
 fn plain(line: &str) -> Line {
     let mut line: Line = serde_json::from_str(line).expect("a line");
     match &mut line {
@@ -260,8 +259,8 @@ fn cases() -> impl Iterator<Item = Case> {
     })
 }
 
-/// Whether a record begins anew, and when, changes nothing of what is done; and each of its segments
-/// alone leads to the same decisions, down to the words, wherever it is cut off.
+/// Rotations do not change any decision. Each segment alone, also if truncated anywhere, replays
+/// with the same decisions and the same texts.
 #[test]
 fn a_record_that_begins_anew_in_the_middle_of_a_run_leads_to_the_same_decisions() {
     let (mut taken_up, mut resting, mut under_way, mut with_news, mut turning) = (0, 0, 0, 0, 0);
@@ -316,7 +315,7 @@ fn a_record_that_begins_anew_in_the_middle_of_a_run_leads_to_the_same_decisions(
     );
 }
 
-/// A snapshot that a run of this problem cannot have been at is refused, in words.
+/// A snapshot that is impossible in this problem is rejected with a message.
 #[test]
 fn a_snapshot_that_does_not_fit_is_refused() {
     let case = Case {
@@ -350,7 +349,7 @@ fn a_snapshot_that_does_not_fit_is_refused() {
     }
 }
 
-/// What a plan is taken up from stands in its snapshot.
+/// The snapshot contains the knowledge behind the current plan.
 #[test]
 fn what_a_busy_run_knows_stands_in_its_snapshot() {
     let case = Case {

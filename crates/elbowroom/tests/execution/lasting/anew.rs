@@ -1,5 +1,5 @@
-//! Records that begin where a run rested: what follows is decided as if all that was before were
-//! known.
+//! Records that begin while a run is idle: the following decisions are the same as with the whole
+//! record.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,7 +15,8 @@ use elbowroom::report::trace::{
 
 use super::scripted::{Dice, Scripted, Slow, abandon, fact, pursue, task};
 
-/// The lines of a run's record, and after how many of them it could have begun anew, with what.
+/// Recorder of a run's lines, and of the possible rotations: the number of lines before each, and
+/// its snapshot.
 struct Tape<'a> {
     task: Arc<Task>,
     lines: &'a mut Vec<String>,
@@ -48,7 +49,8 @@ fn day() -> Arc<Task> {
     )
 }
 
-/// Goals that come and go, what others do, and reports on what is long over or never was.
+/// Returns random requests, changes by others, and reports about actions that have ended or never
+/// existed.
 fn script(task: &Task, dice: &mut Dice) -> Vec<Observation> {
     let fluent = task.fluent_named("(charge)").expect("a correct test");
     let mut script = Vec::new();
@@ -89,7 +91,7 @@ fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
         .explaining()
 }
 
-/// The lines of a run by a random script, and where it could have begun anew.
+/// Returns the lines of a run by a random script, and the possible rotations.
 fn taped(executor: &str, seed: u64) -> (Vec<String>, Vec<(usize, String)>) {
     let task = day();
     let is_to_end = Arc::new(AtomicBool::new(false));
@@ -114,8 +116,8 @@ fn taped(executor: &str, seed: u64) -> (Vec<String>, Vec<(usize, String)>) {
     (lines, beginnings)
 }
 
-/// Wherever a run rests without goals and with nothing under way, its record can begin anew: played
-/// from there, every line that follows comes out as it did, down to the words of each reason.
+/// Whenever a run is idle without goals and without running actions, its record can be rotated. A
+/// replay from there reproduces every following line, including the text of each reason.
 #[test]
 fn a_run_goes_on_from_where_it_rested_as_if_all_before_were_known() {
     let header = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
@@ -127,7 +129,7 @@ fn a_run_goes_on_from_where_it_rested_as_if_all_before_were_known() {
         let (lines, beginnings) = taped(executor, seed);
         let mut last = 0;
         for (count, snapshot) in beginnings {
-            // While it goes on resting, hardly anything changes.
+            // While the run remains idle, hardly anything changes.
             if count < last + 5 && last > 0 {
                 continue;
             }
@@ -148,7 +150,7 @@ fn a_run_goes_on_from_where_it_rested_as_if_all_before_were_known() {
                 .run_in(&mut ReplayWorld::new(&stored, &task));
             let (mut agreed, difference) = replay.outcome();
             if let Some(difference) = &difference {
-                // The report at the end has only what was done since then.
+                // The final report only contains the actions since then.
                 let is_end = matches!(difference.stored, Line::Over(_));
                 assert!(is_end, "{executor}, {seed}, after {count}: {difference:#?}");
                 let (Line::Over(one), Line::Over(other)) =
@@ -172,7 +174,8 @@ fn a_run_goes_on_from_where_it_rested_as_if_all_before_were_known() {
     );
 }
 
-/// The members of snapshots as they were when records began anew only at rests without goals.
+/// Members of snapshots in the earlier format. Records were only rotated while the run was idle
+/// without goals.
 const EARLIER: [&str; 15] = [
     "event",
     "now",
@@ -191,8 +194,8 @@ const EARLIER: [&str; 15] = [
     "doubtful_numbers",
 ];
 
-/// Journals with snapshots of the earlier form are gone on with: the run rests without goals, and takes
-/// the next one.
+/// Journals with snapshots of the earlier format can be resumed: the run is idle without goals, and
+/// accepts the next one.
 #[test]
 fn a_snapshot_of_the_earlier_form_is_gone_on_from() {
     let header = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
@@ -249,7 +252,7 @@ fn a_snapshot_of_the_earlier_form_is_gone_on_from() {
     assert!(lines.iter().any(is_reached), "{lines:#?}");
 }
 
-/// A snapshot of another problem is refused, in words.
+/// A snapshot of another problem is rejected with a message.
 #[test]
 fn a_snapshot_of_another_problem_is_refused() {
     let (_, beginnings) = taped("guarded", 1);

@@ -1,4 +1,4 @@
-//! Runs that end with their goal, and can be paused and given up.
+//! Runs that end with their goal, and that can be paused and abandoned.
 
 use elbowroom::execution::run::Verdict;
 use elbowroom::execution::{Event, Request};
@@ -43,7 +43,7 @@ fn an_attended_run_is_paused_between_two_actions() {
         "{}",
         told.report.time
     );
-    // A goal that is given up while it is paused ends it, too.
+    // Abandoning the goal during a pause also ends the run.
     let script = vec![
         (5, Event::Asked(Request::Pause)),
         (6, abandon("problem")),

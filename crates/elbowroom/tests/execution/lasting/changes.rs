@@ -1,4 +1,4 @@
-//! Changes of facts and numbers, and what nobody expected.
+//! Changes of facts and numbers, and unexpected events.
 
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::Verdict;
@@ -17,7 +17,7 @@ fn a_changed_fact_that_the_plan_can_bear_changes_nothing_and_another_makes_a_new
     let task = task("", "(and (have book) (have cup))");
     let told = run(&task, 60, vec![(5, fact(&task, "(here key)", false))]);
     assert_eq!(told.plans, 1, "{:#?}", told.notes);
-    // Somebody has brought the cup already, and taken it from where it was.
+    // The cup was already brought, and is no longer at its place.
     let gone = [
         fact(&task, "(here cup)", false),
         fact(&task, "(have cup)", true),
@@ -80,7 +80,7 @@ fn news_end_a_rest_but_not_more_often_than_once_a_second() {
         script.push(at(time.clone(), "(here book)", truth));
         script.push(at(time, "(here cup)", truth));
     }
-    // Something else flickers a hundred times in two seconds.
+    // An unrelated fact changes a hundred times in two seconds.
     script.extend((0..100).map(|n| at(Rational::new(1000 + n, 50), "(here key)", n % 2 == 1)));
     let told = run(&task, 60, script);
     assert_has(
@@ -115,8 +115,8 @@ fn what_makes_no_sense_is_passed_over_with_a_remark() {
     assert_eq!(told.plans, 1);
 }
 
-/// Whatever is asked, in whatever order: nothing is started while the run is paused, nothing is
-/// started twice at a time, and tickets are never given again.
+/// For any sequence of requests, nothing is started while the run is paused, nothing is started
+/// twice at a time, and tickets are unique.
 #[test]
 fn whatever_is_asked_the_run_stays_in_order() {
     let task = task("(free s)", "(have book)");
@@ -183,7 +183,8 @@ fn whatever_is_asked_the_run_stays_in_order() {
     }
 }
 
-/// What the embedded planner answers, after so many seconds of the world's time, at this time.
+/// Planner with the answers of the embedded planner and a planning time that depends on the time of
+/// the world.
 struct Slow(fn(&Rational) -> i64);
 
 impl Planner for Slow {
@@ -197,7 +198,7 @@ impl Planner for Slow {
     }
 }
 
-/// The starts of a run of which the goals are asked for at these times.
+/// Returns the starts of a run whose goals are requested at these times.
 fn starts(planner: Slow, goals: &[(i64, &str, &str)], end: i64) -> Vec<(String, Rational)> {
     let task = task("", "(and)");
     let is_to_end = Arc::new(AtomicBool::new(false));
@@ -233,8 +234,8 @@ fn a_plan_that_was_made_for_goals_that_have_changed_since_is_not_begun() {
     assert_eq!(names, ["(fetch r key)"]);
 }
 
-/// One search took a hundred seconds. The plan after it is made for as late a start, but not all
-/// that follow.
+/// One search took a hundred seconds. The next plan is made for an equally late start, but not all
+/// of the following plans.
 #[test]
 fn one_long_search_does_not_delay_all_plans_that_come_after_it() {
     let goals = [

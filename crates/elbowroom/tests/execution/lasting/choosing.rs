@@ -77,7 +77,7 @@ fn an_impossible_goal_that_is_given_later_leaves_the_plan_as_it_is() {
     assert!(!has(&told, "cancel"), "{:#?}", told.notes);
 }
 
-/// A robot that moves between rooms, each move in ten seconds.
+/// Returns a task with a robot that moves between rooms, in ten seconds each.
 fn rooms(goal: &str) -> Arc<Task> {
     let domain = "(define (domain rooms) (:requirements :durative-actions :typing)
       (:types room) (:predicates (at ?x - room))
@@ -194,7 +194,7 @@ fn lateness_of_a_single_goal_is_stated_with_its_certificate() {
     );
 }
 
-/// In the delete relaxation one robot fetches all at once, so that the certified bound is 10.
+/// In the delete relaxation one robot fetches all items at once, so the certified bound is 10.
 #[test]
 fn lateness_without_certificate_is_that_of_the_earliest_plan_found() {
     let all = "(and (have book) (have cup) (have key))";
@@ -296,7 +296,7 @@ fn a_deadline_that_is_added_to_a_running_plan_is_met() {
     );
 }
 
-/// A room that timed initials open and close.
+/// Returns a task with a room that timed initials open and close.
 fn with_opening_hours(timed: &str) -> Arc<Task> {
     let domain = "(define (domain hours) (:requirements :durative-actions)
       (:predicates (open) (idle) (done))

@@ -1,4 +1,4 @@
-//! Goals that come and go.
+//! Goals that are added and removed during a run.
 
 use elbowroom::execute::{Embedded, Execution, read_goal};
 use elbowroom::execution::run::Verdict;
@@ -177,7 +177,7 @@ fn a_goal_is_read_as_in_a_problem_and_mistakes_are_named() {
     }
 }
 
-/// Answers this until the power is back, and plans then.
+/// Planner that returns this answer until the power is back, and plans afterwards.
 struct Powered(PlanAnswer);
 
 impl Planner for Powered {

@@ -1,4 +1,4 @@
-//! Pauses.
+//! Pauses of a run.
 
 use elbowroom::execution::{Ending, Event, Request};
 use elbowroom::num::Rational;

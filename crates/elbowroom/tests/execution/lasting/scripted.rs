@@ -1,4 +1,4 @@
-//! A world that follows a script, and what is noted of a run in it.
+//! World that follows a script, and notes on a run in it.
 
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::{Report, RunSettings, Verdict};
@@ -12,7 +12,7 @@ use elbowroom::pddl::{self, Source};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Robots that fetch things, in ten seconds, as long as there is power.
+/// Robots that fetch items in ten seconds, if there is power.
 pub(super) const DOMAIN: &str =
     "(define (domain errands) (:requirements :durative-actions :typing :fluents)
     (:types robot item)
@@ -36,16 +36,16 @@ pub(crate) fn task(init: &str, goal: &str) -> Arc<Task> {
     Arc::new(Task::new(read.expect("a correct test").0))
 }
 
-/// A world in which actions take as long as planned, and in which a script says what else is seen
-/// and asked. At its end, the run is asked to end.
+/// World without deviations of durations, with other observations and requests by a script. At its
+/// end, the run is asked to end.
 pub(crate) struct Scripted {
     pub(crate) now: Rational,
     pub(crate) coming: Vec<Observation>,
     pub(crate) end: Rational,
     pub(crate) is_to_end: Arc<AtomicBool>,
-    /// An action that takes so long, however long it was planned to.
+    /// Action with this duration, independent of the planned one.
     pub(crate) slow: Option<(&'static str, Rational)>,
-    /// What is seen when something was cancelled.
+    /// Event that is reported after a cancellation.
     pub(crate) on_cancel: Option<Event>,
 }
 
@@ -115,7 +115,7 @@ impl World for Scripted {
     }
 }
 
-/// What is said of each entry that matters here.
+/// Notes on the relevant entries.
 #[derive(Clone, Default)]
 pub(crate) struct Notes(pub(crate) Arc<Mutex<Vec<String>>>);
 
@@ -189,7 +189,7 @@ impl Recorder for Notes {
     }
 }
 
-/// An embedded planner that counts how often it is asked.
+/// Embedded planner that counts its calls.
 pub(super) struct Counting(Arc<Mutex<usize>>);
 
 impl Planner for Counting {
@@ -209,12 +209,12 @@ pub(super) struct Told {
     pub(super) report: Report,
 }
 
-/// A run of that script until `end`, which goes on when its goal is reached.
+/// Makes a persistent run with that script until `end`.
 pub(super) fn run(task: &Arc<Task>, end: i64, script: Vec<(impl Into<Rational>, Event)>) -> Told {
     scripted(task, end, script, |execution| execution.lasting(true))
 }
 
-/// A run of that script until `end`, which can be paused and whose goal can be given up.
+/// Runs with that script until `end`. The run can be paused, and its goal abandoned.
 pub(super) fn attended(
     task: &Arc<Task>,
     end: i64,
@@ -309,7 +309,7 @@ pub(super) fn assert_has(told: &Told, notes: &[&str]) {
     }
 }
 
-/// Numbers that look random.
+/// Pseudorandom numbers.
 #[derive(Clone)]
 pub(crate) struct Dice(pub(crate) u64);
 
@@ -325,7 +325,7 @@ impl Dice {
     }
 }
 
-/// The embedded planner, whose plans take a while by the world's clock.
+/// Embedded planner with planning times by the world's clock.
 pub(super) struct Slow(pub(super) u64);
 
 impl Planner for Slow {

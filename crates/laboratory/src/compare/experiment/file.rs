@@ -1,4 +1,4 @@
-//! Experiment files as they stand.
+//! Deserialized experiment files.
 
 use elbowroom::envelope::{Method, Objective};
 use elbowroom::execute::{EMBEDDED, FirstPlan};
@@ -32,7 +32,7 @@ pub(super) struct File {
     pub(super) planning_time: Option<Spanned<toml::Value>>,
     pub(super) max_replans: Option<usize>,
     pub(super) precision: Option<Spanned<f64>>,
-    /// The algorithm for envelopes.
+    /// Algorithm for envelopes.
     pub(super) method: Option<Spanned<Method>>,
     pub(super) objective: Option<Objective>,
     pub(super) first_plan: Option<Spanned<FirstPlan>>,
@@ -69,7 +69,7 @@ pub(super) struct TogetherFile {
 }
 
 impl File {
-    /// That there is something to make and something to make it with: where not, and what to do.
+    /// Checks that there is at least one trial, executor and column. The error says what to do.
     pub(super) fn check_size(&self) -> Result<(), (Span, String)> {
         let wrong = |span: Span, message: &str| Err((span, message.to_owned()));
         if *self.trials.get_ref() == 0 {
@@ -92,7 +92,7 @@ impl File {
         Ok(())
     }
 
-    /// The blanks that are filled in together.
+    /// Returns the groups of blanks that are filled in together.
     pub(super) fn together(&self) -> Result<Vec<Together>, (Span, String)> {
         let mut together = Vec::new();
         for group in &self.together {
@@ -115,8 +115,8 @@ impl File {
         Ok(together)
     }
 
-    /// The rule that chooses first plans, by default their probability. If the experiment names a plan, or
-    /// another planner with a plan of its own, there is no choice.
+    /// Returns the rule that chooses first plans, by default their probability. If the experiment
+    /// names a plan, or another planner with a plan of its own, there is no choice.
     pub(super) fn first_plan(&self) -> Result<FirstPlan, (Span, String)> {
         let is_embedded = self
             .planner
@@ -141,7 +141,7 @@ impl File {
         Err((given.span(), message.to_owned()))
     }
 
-    /// That published figures belong to rows and columns of the table.
+    /// Checks that published figures belong to rows and columns of the table.
     pub(super) fn check_published(&self, rows: &[String]) -> Result<(), (Span, String)> {
         for published in &self.published {
             let wrong = |message: String| Err((published.span(), message));
@@ -204,7 +204,7 @@ impl File {
                 toml::Value::Float(number) => exact(*number),
                 _ => None,
             };
-            // Measured times would make a result depend on the machine.
+            // Measured times would make results depend on the machine.
             let number = number.filter(|number| !number.is_negative());
             settings.planning_time = PlanningTime::Seconds(number.ok_or_else(|| {
                 (
@@ -222,13 +222,13 @@ impl File {
     }
 }
 
-/// Whether there is such a planner; if not, which there are.
+/// Checks that there is a planner of that name. The error lists the known ones.
 fn known(name: &str) -> Result<(), String> {
     let found = elbowroom_external::Planner::named(name);
     found.map(|_| ()).map_err(|error| error.to_string())
 }
 
-/// The value of that name; or where the name stands, and what it may be.
+/// Returns the value of that name. The error holds the place of the name and the choices.
 fn one_of<T: Copy>(
     given: &Spanned<String>,
     names: &[(T, &'static str)],

@@ -1,4 +1,4 @@
-//! The command `elbowroom`, which plans and executes, as a process of its own.
+//! Child processes of the command `elbowroom`, which plans and executes.
 
 use std::fs::{self, File};
 use std::io::{self, BufRead as _, BufReader, Write as _};
@@ -20,26 +20,26 @@ use tempfile::TempDir;
 
 use super::Input;
 
-/// How often it is looked whether a planner has ended.
+/// Polling interval of a child process.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// A plan, and the text in which it is exact.
+/// Plan with rounded times, and its exact text.
 #[derive(Clone, Debug)]
 pub(super) struct Planned {
     pub(super) plan: Plan,
     pub(super) text: String,
 }
 
-/// For how long the command may work, and what ends that early.
+/// Time limit of a child process, and a flag that ends it early.
 pub(super) struct Patience {
     pub(super) within: Duration,
     pub(super) is_over: Arc<AtomicBool>,
 }
 
-/// Has the command plan.
+/// Computes a plan with the command.
 ///
 /// # Errors
-/// There is no plan, or none within that time; the text says why.
+/// There is no plan, or none was found within the time limit. The text says why.
 pub(super) fn plan(
     elbowroom: &str,
     request: &PlanRequest,
@@ -62,12 +62,12 @@ pub(super) fn plan(
     }
 }
 
-/// Has the command read a domain.
+/// Checks a domain with the command.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The domain is invalid. The text holds the messages of the command.
 pub(super) fn validate(elbowroom: &str, domain: String, patience: &Patience) -> Result<(), String> {
-    // Nothing is asked of it but that the domain can be read.
+    // The problem is empty, because only the domain is checked.
     let problem = format!(
         "(define (problem any) (:domain {}) (:init) (:goal (and)))",
         name_of(&domain)
@@ -86,10 +86,10 @@ pub(super) fn validate(elbowroom: &str, domain: String, patience: &Patience) -> 
     }
 }
 
-/// Has the command find the order in which a plan reaches the parts of its goal.
+/// Sorts the subgoals of a plan by the time at which it reaches them, with the command.
 ///
 /// # Errors
-/// It does not reach the goal, or that cannot be said; the text says why.
+/// The plan does not reach its goal, or the order could not be computed. The text says why.
 pub(super) fn sub_goals(
     elbowroom: &str,
     texts: &PlanRequest,
@@ -121,7 +121,7 @@ fn ordered(document: &str) -> Option<Vec<Tree>> {
     goals.map(|it| sub_goal(it["goal"].as_str()?)).collect()
 }
 
-/// The name of a domain, as far as it has one.
+/// Returns the name of a domain, or `any` if it has none.
 fn name_of(domain: &str) -> String {
     let code = domain
         .lines()
@@ -140,7 +140,7 @@ fn name_of(domain: &str) -> String {
     }
 }
 
-/// What the command has said.
+/// Output of the command.
 struct Said {
     status: ExitStatus,
     out: String,
@@ -157,7 +157,7 @@ fn ask(
     ask_in(&folder_with(texts)?, elbowroom, line, patience)
 }
 
-/// The same in a folder that is there.
+/// Runs the command in an existing folder.
 fn ask_in(
     folder: &TempDir,
     elbowroom: &str,
@@ -185,7 +185,7 @@ fn ask_in(
     })
 }
 
-/// `None` where it had to be ended.
+/// Waits for the process to end. Returns `None` if it was killed.
 fn wait(child: &mut Child, patience: &Patience) -> io::Result<Option<ExitStatus>> {
     let mut waited = Duration::ZERO;
     loop {
@@ -209,7 +209,7 @@ fn steps_of(document: &str) -> Option<Planned> {
         Some(PlanItem {
             time: narrowed(number(&step["start"])?),
             action: step["action"].as_str()?.to_owned(),
-            // What takes no time has none.
+            // An instantaneous action has no duration.
             duration: number(&step["duration"]).map_or(0.0, narrowed),
         })
     };
@@ -229,7 +229,7 @@ fn narrowed(number: f64) -> f32 {
     number as f32
 }
 
-/// A run of the command, in which this program is the world.
+/// Running `elbowroom run`, for which this program is the world.
 pub(super) struct Running {
     pid: Option<Pid>,
     socket: PathBuf,
@@ -237,10 +237,10 @@ pub(super) struct Running {
 }
 
 impl Running {
-    /// Starts it; what it says, and that it is over, goes to `inputs`.
+    /// Starts the command. Its output and its exit code are sent to `inputs`.
     ///
     /// # Errors
-    /// It cannot be started; the text says why.
+    /// The command cannot be started. The text says why.
     pub(super) fn start(
         elbowroom: &str,
         executor: &str,
@@ -255,7 +255,8 @@ impl Running {
         let listener = UnixListener::bind(&socket).map_err(|e| unusable(&socket, &e))?;
         let own = std::env::current_exe()
             .map_err(|e| format!("this program does not know where it is: {e}"))?;
-        // The world is started in that folder, so that only this program's own path could have blanks in it.
+        // The world is started in that folder, so that only this program's own path could contain
+        // blanks.
         let relay = folder.path().join("relay");
         std::os::unix::fs::symlink(&own, &relay).map_err(|e| unusable(&relay, &e))?;
         let mut child = Command::new(elbowroom)
@@ -287,10 +288,10 @@ impl Running {
         })
     }
 
-    /// Asks it to end in order.
+    /// Asks the command to shut down.
     pub(super) fn interrupt(&self) {
         if let Some(pid) = self.pid {
-            // Whoever has ended already cannot be told.
+            // Fails if the process has already ended.
             let _ = kill_process(pid, Signal::INT);
         }
     }
@@ -298,7 +299,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // Nobody may have called; then somebody still waits for the call.
+        // Unblocks the listener if the relay never connected.
         let _ = UnixStream::connect(&self.socket);
     }
 }
@@ -320,10 +321,10 @@ fn listen(listener: &UnixListener, inputs: &Sender<Input>) {
     let _ = inputs.send(Input::Closed);
 }
 
-/// Passes on what Elbowroom says to the program that started it, and back.
+/// Relays lines between Elbowroom and the program that started it.
 ///
 /// # Errors
-/// That program is gone.
+/// That program has ended.
 pub(super) fn relay(socket: &Path) -> Result<(), String> {
     let failed = |e: io::Error| format!("the program that executes is gone: {e}");
     let mut stream = UnixStream::connect(socket).map_err(failed)?;

@@ -1,4 +1,5 @@
-//! `PlanSys2`'s problem expert: what a run changes is told there, and what others change there is seen by the run.
+//! Client of `PlanSys2`'s problem expert. It writes the changes of a run there, and reports the
+//! changes of others to the run.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -10,20 +11,20 @@ use elbowroom_plansys2::{Answer, Call, CallId, Mirror, Seen};
 use super::network::{Asker, Network, Requests, reliable};
 use super::{Input, remark};
 
-/// So many answers are waited for; of what was asked before that, none will come.
+/// Maximum number of pending requests. Older ones are assumed to be lost.
 const MOST_OPEN: usize = 64;
 
-/// What the problem expert has said.
+/// Message of the problem expert.
 pub(super) enum Heard {
-    /// Something has changed there.
+    /// Its state has changed.
     Changed,
-    /// An answer to that request, which may be somebody else's.
+    /// Answer to that request, which may be from another client.
     States(Asker, StatesResponse),
-    /// Likewise.
+    /// Answer to that request, which may be from another client.
     Done(Asker, AffectResponse),
 }
 
-/// A client of it.
+/// Client of the problem expert.
 pub(super) struct Expert {
     mirror: Mirror,
     predicates: Requests<Empty>,
@@ -37,7 +38,7 @@ pub(super) struct Expert {
 }
 
 impl Expert {
-    /// Joins the conversation.
+    /// Joins the topics and services of the problem expert.
     ///
     /// # Errors
     /// DDS refuses; the text says what.
@@ -75,22 +76,22 @@ impl Expert {
         })
     }
 
-    /// A run begins; `problem` is its text, as far as that is known.
+    /// Starts a run. `problem` is its text, or empty if unknown.
     pub(super) fn begin(&mut self, problem: &str) {
         self.mirror.begin(problem);
     }
 
-    /// The run is over; what it has changed is still told.
+    /// Ends the run. Its pending changes are still written.
     pub(super) fn end(&mut self) {
         self.mirror.end();
     }
 
-    /// The run believes that.
+    /// Takes the beliefs of the run.
     pub(super) fn believe(&mut self, facts: &[(String, bool)], values: &[(String, Option<f64>)]) {
         self.mirror.believe(facts, values);
     }
 
-    /// Whether all is told that is to be told.
+    /// Returns `true` if no change is pending.
     pub(super) fn is_idle(&self) -> bool {
         self.mirror.is_idle()
     }
@@ -114,7 +115,8 @@ impl Expert {
         }
     }
 
-    /// Asks and tells what is due; what others have changed comes back. To be called a few times a second.
+    /// Sends the requests that are due, and returns the changes of others. To be called a few times
+    /// a second.
     pub(super) fn settle(&mut self, now: Duration) -> Vec<Seen> {
         let is_there = self.predicates.is_served()
             & self.functions.is_served()
@@ -139,7 +141,7 @@ impl Expert {
             };
             match asked {
                 Ok(asked) => self.open.push_back((asked, id)),
-                // It is asked again when no answer has come.
+                // The request is repeated after its time-out.
                 Err(why) => remark(&why),
             }
         }

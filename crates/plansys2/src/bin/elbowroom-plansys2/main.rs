@@ -1,4 +1,5 @@
-//! Elbowroom on standard input and output, the action performers of `PlanSys2` over DDS.
+//! Bridge between Elbowroom on standard input and output and the action performers of `PlanSys2` on
+//! DDS.
 
 mod command;
 mod expert;
@@ -27,31 +28,31 @@ use options::{Mode, Options, ProblemExpert, ServeOptions};
 use services::{Asked, Services};
 use topics::Topics;
 
-/// What comes in, from any side.
+/// Event of the main loop.
 pub(crate) enum Input {
     /// A line of Elbowroom.
     Line(String),
-    /// Elbowroom is gone.
+    /// Elbowroom has closed the connection.
     Closed,
     /// A message on `actions_hub`.
     Hub(ActionExecution),
     /// A message on `performers_status`.
     Status(ActionPerformerStatus),
-    /// Something for people to know.
+    /// A warning for the user.
     Trouble(String),
-    /// Somebody asks for something.
+    /// A client calls a service.
     Asked(Box<Asked>),
-    /// A planner has ended: for whom, for what, and with what.
+    /// A planner has ended: the client, its request and the result.
     Planned(Asker, PlanRequest, Result<Planned, String>),
-    /// A domain was read: for whom, and what is wrong with it.
+    /// A domain was checked: the client, and the messages if the domain is invalid.
     Validated(Asker, Result<(), String>),
-    /// The order was found in which the plan of that run reaches the parts of its goal; or why not.
+    /// The order of the subgoals in the plan of that run, or why it could not be computed.
     Ordered(u64, Result<Vec<Tree>, String>),
-    /// The problem expert has said something.
+    /// A message of the problem expert.
     Expert(Heard),
-    /// A run has begun to talk; it is answered there.
+    /// A run has connected. Answers to it are written to this stream.
     Talks(UnixStream),
-    /// A run is over, with that exit code.
+    /// A run has ended, with that exit code.
     Over(Option<i32>),
     /// The user asks the program to end.
     End,
@@ -119,8 +120,8 @@ fn read(inputs: &Sender<Input>) {
     let _ = inputs.send(Input::Closed);
 }
 
-/// Says something to people: what goes to standard error is shown as it is.
+/// Writes a message for the user to standard error.
 pub(crate) fn remark(text: &str) {
-    // Where nobody reads there is nobody to tell.
+    // A failure is ignored, because there is nowhere left to report it.
     let _ = writeln!(io::stderr(), "elbowroom-plansys2: {text}");
 }

@@ -1,8 +1,9 @@
-//! DDS, as ROS 2 uses it: names and types of topics and services, and a thread that listens.
+//! DDS as ROS 2 uses it: names and types of topics and services, and a thread that receives
+//! messages.
 //!
-//! The program takes part in DDS, and is no node of ROS: it does not publish `ros_discovery_info`. Its layout
-//! changed between Humble and Iron, and nodes of one side abort when they read that of the other. Who does not
-//! speak of nodes can do no harm to either; topics, services and actions need no nodes.
+//! The program is a DDS participant, but no node of ROS: it does not publish `ros_discovery_info`.
+//! The layout of that message changed between Humble and Iron, and nodes of one side abort when
+//! they read that of the other. Topics, services and actions work without nodes.
 
 mod answers;
 mod raw;
@@ -31,19 +32,19 @@ use super::options::Settings;
 pub(super) use answers::Answers;
 use raw::{Raw, RawAdapter};
 
-/// Which request an answer belongs to.
+/// Identity of a request, for matching it with its answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asker {
     pub(super) identity: SampleIdentity,
-    /// Where ROS runs on Cyclone DDS: what stands before each request and each answer.
+    /// Prefix of each request and each answer, if ROS runs on Cyclone DDS.
     header: Option<Header>,
 }
 
-/// Who has asked, and the number of the question, as `rmw_cyclonedds` has them.
+/// Client and sequence number, as in `rmw_cyclonedds`.
 type Header = (u64, i64);
 
 impl Asker {
-    /// Whether an answer to `other` is one to this request.
+    /// Returns `true` if an answer to `other` is an answer to this request.
     pub(super) fn is_meant_by(&self, other: &Self) -> bool {
         match (self.header, other.header) {
             (None, None) => self.identity == other.identity,
@@ -52,7 +53,7 @@ impl Asker {
     }
 }
 
-/// A connection to a domain of DDS.
+/// Connection to a DDS domain.
 pub(super) struct Network {
     participant: DomainParticipant,
     publisher: Publisher,
@@ -65,7 +66,7 @@ impl Network {
     /// Joins the domain.
     ///
     /// # Errors
-    /// The network does not let it; the text says what.
+    /// The network is not available; the text says why.
     pub(super) fn join(settings: &Settings) -> Result<Self, String> {
         let mut builder = DomainParticipantBuilder::new(settings.domain_id);
         if !settings.interfaces.is_empty() {
@@ -91,7 +92,8 @@ impl Network {
         })
     }
 
-    /// A topic of that name, in the namespace; `kind` is its type, as in `plansys2_msgs::msg::dds_::Plan_`.
+    /// Creates the topic of that name in the namespace. `kind` is its type, as in
+    /// `plansys2_msgs::msg::dds_::Plan_`.
     fn topic(
         &self,
         prefix: &str,
@@ -126,7 +128,7 @@ impl Network {
         Ok(())
     }
 
-    /// Publishes on a topic.
+    /// Creates a publisher of a topic.
     ///
     /// # Errors
     /// DDS refuses; the text says what.
@@ -146,7 +148,7 @@ impl Network {
         ))
     }
 
-    /// Listens to a topic, once [`Self::listen`] is called.
+    /// Subscribes to a topic. Messages arrive once [`Self::listen`] is called.
     ///
     /// # Errors
     /// DDS refuses; the text says what.
@@ -164,7 +166,7 @@ impl Network {
         self.hear(&topic, false, move |_, message| input(message))
     }
 
-    /// Serves a service; `kind` is its type, as in `plansys2_msgs::srv::dds_::GetPlan`.
+    /// Offers a service. `kind` is its type, as in `plansys2_msgs::srv::dds_::GetPlan`.
     ///
     /// # Errors
     /// DDS refuses; the text says what.
@@ -197,7 +199,8 @@ impl Network {
         Ok(Answers::new(writer))
     }
 
-    /// Asks a service; `kind` is its type, and its answers are inputs, those to others too.
+    /// Creates a client of a service. `kind` is its type. All answers become inputs, those to other
+    /// clients included.
     ///
     /// # Errors
     /// DDS refuses; the text says what.
@@ -222,14 +225,14 @@ impl Network {
         let own = u128::from_le_bytes(writer.guid().to_bytes());
         let half = |it: u128| u64::try_from(it & u128::from(u64::MAX)).unwrap_or_default();
         Ok(Requests {
-            // Half as long as the name, and as good as its own.
+            // Client identifier of 64 bits, derived from the GUID of the writer.
             last: (half(own) ^ half(own >> 64), 0),
             writer,
             found: BTreeSet::new(),
         })
     }
 
-    /// Begins to listen, in a thread of its own; what is heard goes to `inputs`.
+    /// Starts a thread that sends all received messages to `inputs`.
     ///
     /// # Errors
     /// The system refuses; the text says what.
@@ -243,7 +246,7 @@ impl Network {
         }
         thread::spawn(move || {
             let mut events = Events::with_capacity(16);
-            // Whoever receives is gone when the program ends.
+            // The receiver is dropped when the program ends.
             while ears.iter().all(|ear| ear.forward(&inputs)) {
                 if let Err(error) = poll.poll(&mut events, None)
                     && error.kind() != io::ErrorKind::Interrupted
@@ -257,7 +260,8 @@ impl Network {
     }
 }
 
-/// Reliable and volatile, with the last ones kept: as the hub of `PlanSys2` has it with 100, and services with 10.
+/// Returns a reliable and volatile quality of service that keeps the last `depth` messages: 100 for
+/// the hub of `PlanSys2`, 10 for services.
 pub(super) fn reliable(depth: i32) -> QosPolicies {
     let max_blocking_time = Duration::from_millis(100);
     QosPolicyBuilder::new()
@@ -267,7 +271,7 @@ pub(super) fn reliable(depth: i32) -> QosPolicies {
         .build()
 }
 
-/// The last one is told to whoever comes later.
+/// Returns a quality of service that delivers the last message to late subscribers.
 pub(super) fn latched() -> QosPolicies {
     let max_blocking_time = Duration::from_millis(100);
     QosPolicyBuilder::new()
@@ -277,7 +281,7 @@ pub(super) fn latched() -> QosPolicies {
         .build()
 }
 
-/// Something to publish on, or to answer by.
+/// Publisher of a topic.
 pub(super) struct Mouth<T: Serialize>(DataWriterCdr<T>);
 
 impl<T: Serialize> Mouth<T> {
@@ -292,23 +296,24 @@ impl<T: Serialize> Mouth<T> {
     }
 }
 
-/// By what a service is asked.
+/// Client of a service.
 pub(super) struct Requests<T: Serialize> {
     writer: DataWriterCdr<Framed<T>>,
-    /// Who serves it.
+    /// Discovered servers.
     found: BTreeSet<GUID>,
-    /// Of the last request to somebody on Cyclone DDS.
+    /// Header of the last request to a server on Cyclone DDS.
     last: Header,
 }
 
 impl<T: Serialize> Requests<T> {
-    /// Asks; the answer says to which request it belongs.
+    /// Sends a request, and returns its identity.
     ///
     /// # Errors
     /// It could not be sent.
     pub(super) fn say(&mut self, request: T) -> Result<Asker, String> {
         let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
-        // Nobody understands both: where both are there, those on Fast DDS are asked.
+        // The formats are incompatible. If servers of both kinds exist, the request is for those on
+        // Fast DDS.
         let (header, framed) = if self.found.iter().all(is_cyclone) {
             self.last.1 += 1;
             (Some(self.last), Framed::Headed(self.last, request))
@@ -321,14 +326,14 @@ impl<T: Serialize> Requests<T> {
             .map_err(|e| format!("a request was not sent: {e}"))
     }
 
-    /// Whether anybody serves it. To be called a few times a second.
+    /// Returns `true` if the service has a server. To be called a few times a second.
     pub(super) fn is_served(&mut self) -> bool {
         note_readers(&self.writer, &mut self.found);
         !self.found.is_empty()
     }
 }
 
-/// Notes who has begun or ceased to listen.
+/// Updates the set of discovered readers.
 fn note_readers<T: Serialize>(writer: &DataWriterCdr<T>, found: &mut BTreeSet<GUID>) {
     while let Some(status) = writer.try_recv_status() {
         if let DataWriterStatus::PublicationMatched {
@@ -344,14 +349,14 @@ fn note_readers<T: Serialize>(writer: &DataWriterCdr<T>, found: &mut BTreeSet<GU
     }
 }
 
-/// Whatever can be listened to.
+/// Source of messages.
 trait Ear: Send {
     fn register(&mut self, registry: &Registry, token: Token) -> io::Result<()>;
-    /// Passes on all that has come; `false` when nobody takes it any more.
+    /// Forwards all pending messages. Returns `false` if the receiver was dropped.
     fn forward(&self, inputs: &Sender<Input>) -> bool;
 }
 
-/// On the wire there is nothing but its parts.
+/// Message with or without a header. Its serialized form is that of its parts.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Framed<T> {
@@ -361,14 +366,14 @@ enum Framed<T> {
 
 struct Listening<T, F> {
     reader: SimpleDataReader<Raw, RawAdapter>,
-    /// Whether messages are requests or answers.
+    /// `true` if messages are requests or answers.
     is_service: bool,
     input: F,
     message: PhantomData<fn() -> T>,
 }
 
 impl<T: DeserializeOwned + 'static, F> Listening<T, F> {
-    /// From whom it is, and what it says.
+    /// Decodes the header, if any, and the message.
     fn read(&self, raw: &Raw, writer: GUID) -> Result<(Option<Header>, T), String> {
         let wrong = |e: rustdds::cdr_encoding::Error| e.to_string();
         if self.is_service && is_cyclone(&writer) {
@@ -380,7 +385,7 @@ impl<T: DeserializeOwned + 'static, F> Listening<T, F> {
     }
 }
 
-/// Whether somebody speaks by Cyclone DDS, which has these first bytes in all of its names.
+/// Returns `true` if the GUID is one of Cyclone DDS, whose GUIDs all start with these bytes.
 fn is_cyclone(guid: &GUID) -> bool {
     guid.to_bytes().starts_with(&[0x01, 0x10])
 }
@@ -399,7 +404,8 @@ where
         loop {
             let input = match self.reader.try_take_one() {
                 Ok(Some(sample)) => {
-                    // Fast DDS names the reader of the answer, and leaves the number out: it is that of the request.
+                    // Fast DDS names the reader of the answer and omits the sequence number, which
+                    // is that of the request.
                     let own = SampleIdentity {
                         writer_guid: sample.writer_guid(),
                         sequence_number: sample.sequence_number,

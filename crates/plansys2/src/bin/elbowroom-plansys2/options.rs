@@ -1,4 +1,4 @@
-//! What the program is asked for, on the command line and in the environment.
+//! Options of the command line and the environment.
 
 use std::env;
 use std::net::{IpAddr, Ipv4Addr};
@@ -13,7 +13,7 @@ A world for `elbowroom run … --world-process elbowroom-plansys2`: the action p
 
 PlanSys2's own executor must be off: two of them would both choose performers. docs/plansys2.md says what happens when.";
 
-/// What can be given.
+/// Command line of the program.
 #[derive(Debug, Parser)]
 #[command(version, about = ABOUT, args_conflicts_with_subcommands = true)]
 pub(super) struct Options {
@@ -21,17 +21,18 @@ pub(super) struct Options {
     pub(super) command: Option<Mode>,
     #[command(flatten)]
     pub(super) network: NetworkOptions,
-    /// Actions that must have a performer before time begins, separated by commas; without any of them the
-    /// program ends and names it. By default, time begins a second after the first performer was heard
+    /// Actions that must have a performer before time begins, separated by commas; the program ends
+    /// with an error if one is missing. By default, time begins a second after the first performer
+    /// was discovered
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub(super) needs: Vec<String>,
-    /// How many seconds to wait for performers
-    /// [default: the environment's `ELBOWROOM_PERFORMERS_WITHIN`, or 10]
+    /// Seconds to wait for performers [default: the environment's `ELBOWROOM_PERFORMERS_WITHIN`, or
+    /// 10]
     #[arg(long, value_name = "S")]
     within: Option<f64>,
 }
 
-/// What the program does instead of being a world.
+/// Subcommand.
 #[derive(Debug, Subcommand)]
 pub(super) enum Mode {
     /// Stand in for planner and executor
@@ -39,15 +40,15 @@ pub(super) enum Mode {
         about = "Stand in for PlanSys2's planner and executor: planner/get_plan, execute_plan, and the states of both nodes"
     )]
     Serve(ServeOptions),
-    /// Pass on what is said to a program that serves
+    /// Relay lines to the program that serves
     #[command(hide = true)]
     Relay {
-        /// Its socket.
+        /// Socket of that program.
         socket: PathBuf,
     },
 }
 
-/// For `serve`.
+/// Options of `serve`.
 #[derive(Debug, Args)]
 pub(super) struct ServeOptions {
     /// The command that plans and executes
@@ -56,12 +57,12 @@ pub(super) struct ServeOptions {
     /// The executor, see `elbowroom run --help`
     #[arg(long, value_name = "NAME", default_value = "live")]
     pub(super) executor: String,
-    /// How many seconds a plan may take to be found
+    /// Time limit for planning, in seconds
     #[arg(long, value_name = "S", default_value = "60")]
     plan_within: f64,
 }
 
-/// The same, checked.
+/// Checked options of `serve`.
 #[derive(Debug)]
 pub(super) struct ServeSettings {
     pub(super) elbowroom: String,
@@ -70,11 +71,14 @@ pub(super) struct ServeSettings {
 }
 
 impl ServeOptions {
+    /// Checks the options.
+    ///
     /// # Errors
-    /// Something cannot be used; the text says what to do.
+    /// An option is invalid; the text says what to do.
     pub(super) fn checked(self) -> Result<ServeSettings, String> {
         let plan_within = seconds(self.plan_within)?;
-        // Runs are started elsewhere; a name without a folder is looked for in PATH.
+        // Runs start in another folder, so the path is made absolute. A name without a folder is
+        // searched in PATH.
         let elbowroom = if self.elbowroom.contains('/') {
             let full = std::path::absolute(&self.elbowroom);
             full.map_err(|e| format!("{} cannot be used: {e}", self.elbowroom))?
@@ -96,11 +100,10 @@ fn seconds(number: f64) -> Result<Duration, String> {
         .map_err(|_| format!("{number} s is no time to wait; give a number from 0"))
 }
 
-/// For whatever speaks to robots.
+/// Options of the connection to the robots.
 #[derive(Debug, Args)]
 pub(super) struct NetworkOptions {
-    /// How many seconds of the plan pass in one real second
-    /// [default: the environment's `ELBOWROOM_SPEED`, or 1]
+    /// Seconds of the plan per real second [default: the environment's `ELBOWROOM_SPEED`, or 1]
     #[arg(long, global = true, value_name = "X")]
     speed: Option<f64>,
     /// The domain of DDS, from 0 to 232
@@ -110,8 +113,8 @@ pub(super) struct NetworkOptions {
     /// The namespace of the performers' topics, as in `/robot1`
     #[arg(long, global = true, value_name = "NAME", default_value = "/")]
     namespace: String,
-    /// Speak and listen on the network interface with this address alone; may be repeated
-    /// [default: all; with `ROS_LOCALHOST_ONLY=1` in the environment, 127.0.0.1]
+    /// Use only the network interface with this address; may be repeated [default: all; with
+    /// `ROS_LOCALHOST_ONLY=1` in the environment, 127.0.0.1]
     #[arg(long, global = true, value_name = "ADDRESS")]
     interface: Vec<IpAddr>,
     #[arg(
@@ -123,16 +126,16 @@ pub(super) struct NetworkOptions {
     problem_expert: Option<ProblemExpert>,
 }
 
-/// What the problem expert is to the program.
+/// Use of the problem expert.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum ProblemExpert {
-    /// It is told, and heard
+    /// Synchronize it with the run
     Follow,
-    /// Nothing
+    /// Ignore it
     Ignore,
 }
 
-/// The same, complete and checked.
+/// Checked options, with the environment's.
 #[derive(Debug)]
 pub(super) struct Settings {
     pub(super) needs: Vec<String>,
@@ -140,17 +143,17 @@ pub(super) struct Settings {
     pub(super) speed: f64,
     pub(super) domain_id: u16,
     pub(super) namespace: String,
-    /// Empty: all.
+    /// Addresses of network interfaces; empty for all.
     pub(super) interfaces: Vec<IpAddr>,
-    /// As it was asked for.
+    /// The option as given; its default depends on the subcommand.
     pub(super) problem_expert: Option<ProblemExpert>,
 }
 
 impl Options {
-    /// Adds what the environment says.
+    /// Adds the values of the environment and checks the options.
     ///
     /// # Errors
-    /// Something cannot be used; the text says what to do.
+    /// An option is invalid; the text says what to do.
     pub(super) fn settings(self) -> Result<Settings, String> {
         let within = or_variable(self.within, "ELBOWROOM_PERFORMERS_WITHIN", 10.0)?;
         let within = seconds(within)?;
@@ -179,7 +182,7 @@ impl Options {
     }
 }
 
-/// What was given, or what a variable of the environment says, or else the default.
+/// Returns the given value, that of the environment variable, or the default.
 fn or_variable<T: FromStr>(given: Option<T>, variable: &str, default: T) -> Result<T, String> {
     match (given, env::var(variable)) {
         (Some(given), _) => Ok(given),
@@ -191,7 +194,7 @@ fn or_variable<T: FromStr>(given: Option<T>, variable: &str, default: T) -> Resu
     }
 }
 
-/// With slashes around: `/` or `/robot1/`.
+/// Returns the namespace with slashes around it: `/` or `/robot1/`.
 fn namespace(text: &str) -> Result<String, String> {
     let inner = text.trim_matches('/');
     let is_name = |part: &str| {

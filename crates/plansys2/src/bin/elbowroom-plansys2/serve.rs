@@ -1,4 +1,5 @@
-//! In place of `PlanSys2`'s planner and executor: plans for who asks, and executes one plan at a time.
+//! Replacement of `PlanSys2`'s planner and executor. It answers planning requests, and executes one
+//! plan at a time.
 
 mod order;
 mod planning;
@@ -30,44 +31,44 @@ use super::topics::Topics;
 use super::{Input, remark};
 use order::Order;
 
-/// How often the hub looks whether somebody is lost.
+/// Interval at which the hub checks for lost performers.
 const TICK: Duration = Duration::from_millis(200);
-/// How often it is told how a plan stands, at least.
+/// Maximum interval between two reports of the progress of a plan.
 const TELL_EVERY: Duration = Duration::from_secs(1);
-/// How long a run may take to end when it was asked to.
+/// Time limit of a run for its shutdown.
 const FAREWELL: Duration = Duration::from_secs(8);
-/// How long the result of a run waits until the problem expert knows what the run has changed last.
+/// Maximum delay of the result of a run until the problem expert has its last changes.
 const TOLD_WITHIN: Duration = Duration::from_secs(2);
-/// Tickets of one run differ from those of another in these bits: the hub may still wait for what an earlier run has
-/// cancelled.
+/// Number of low bits of a ticket that count within a run; the bits above hold the number of the
+/// run. The hub may still wait for a cancelled action of an earlier run.
 const RUN_BITS: u32 = 32;
 
-/// A plan that is being executed.
+/// Plan that is being executed.
 struct Execution {
     goal: GoalId,
     run: Running,
     number: u64,
     world: World,
-    /// As the client has given it.
+    /// The plan as the client has sent it.
     plan: Plan,
     progress: Progress,
     answers: Option<UnixStream>,
     told: Option<Instant>,
     order: Order,
-    /// Whether it has said all that it will say.
+    /// `true` if the run has closed its connection.
     is_silent: bool,
-    /// Since when it is over, and with which exit code.
+    /// End time of the process, and its exit code.
     ended: Option<(Instant, Option<i32>)>,
 }
 
-/// With whom it speaks.
+/// Connections of the server.
 pub(super) struct Sides {
     pub(super) topics: Topics,
     pub(super) services: Services,
     pub(super) expert: Option<Expert>,
 }
 
-/// The server.
+/// Server of planning and execution requests.
 pub(super) struct Serving {
     settings: ServeSettings,
     speed: f64,
@@ -78,12 +79,12 @@ pub(super) struct Serving {
     hub: Hub,
     nodes: [Lifecycle; NODES.len()],
     goals: Goals<Asker>,
-    /// What was last planned for.
+    /// Domain and problem of the last plan.
     texts: Option<PlanRequest>,
     planned: Option<Planned>,
     execution: Option<Execution>,
     runs: u64,
-    /// How many plans are being made.
+    /// Number of running planners.
     planning: usize,
     is_over: Arc<AtomicBool>,
     zero: Instant,
@@ -121,7 +122,7 @@ impl Serving {
         }
     }
 
-    /// Until the user asks it to end.
+    /// Serves until the user asks the program to end.
     pub(super) fn run(mut self, received: &Receiver<Input>) {
         remark("serves planner/get_plan and execute_plan");
         let mut leaves: Option<Duration> = None;
@@ -130,7 +131,7 @@ impl Serving {
                 .execution
                 .as_ref()
                 .and_then(|it| it.world.due_in(self.now()));
-            // The sender is kept, so that only time can run out.
+            // The sender is kept, so the only possible error is a time-out.
             if let Ok(input) = received.recv_timeout(due.map_or(TICK, |it| it.min(TICK))) {
                 if matches!(input, Input::End) {
                     leaves.get_or_insert(self.now());
@@ -144,7 +145,7 @@ impl Serving {
             self.settle();
             let patience = leaves.map(|at| self.now().saturating_sub(at) >= FAREWELL);
             if patience.is_some_and(|is_over| is_over || self.execution.is_none()) {
-                // What was told to stop is to hear of it, planners too.
+                // Cancel messages are delivered and planners killed before the program ends.
                 self.is_over.store(true, Ordering::Relaxed);
                 thread::sleep(TICK);
                 return;
@@ -193,7 +194,7 @@ impl Serving {
         }
     }
 
-    /// A line of the run.
+    /// Takes a line of the run.
     fn hear(&mut self, line: &str, now: Duration) {
         let Some(execution) = &mut self.execution else {
             return;
@@ -274,7 +275,7 @@ impl Serving {
         told(sent);
     }
 
-    /// The plan that is being executed, or what is left of it.
+    /// Returns the plan that is being executed, or its remaining steps.
     fn executed(&self, part: Part) -> PlanResponse {
         let Some(execution) = &self.execution else {
             return PlanResponse {
@@ -293,7 +294,7 @@ impl Serving {
         }
     }
 
-    /// Begins to execute a plan.
+    /// Starts the execution of a plan.
     fn begin(&mut self, request: &GoalRequest, stamp: Stamp) -> Result<(), String> {
         if !self.nodes[EXECUTOR].serves() {
             return Err("the executor is not active".to_owned());
@@ -344,7 +345,7 @@ impl Serving {
         Ok(())
     }
 
-    /// The run is to end in order.
+    /// Asks the run to shut down.
     fn interrupt(&self) {
         let running = self.execution.as_ref().filter(|it| it.ended.is_none());
         if let Some(execution) = running {
@@ -357,13 +358,13 @@ impl Serving {
             return;
         };
         execution.ended = Some((super::session::now(), code));
-        // What a run that has died has left running is to stop.
+        // If the run has crashed, its actions are still running.
         for ticket in execution.world.running() {
             self.hub.cancel(ticket | (execution.number << RUN_BITS));
         }
     }
 
-    /// Tells the result of a run that is over, once the problem expert knows what it has changed.
+    /// Reports the result of a run that has ended, once the problem expert has all of its changes.
     fn conclude(&mut self) {
         let is_told = self.expert.as_ref().is_none_or(Expert::is_idle);
         let is_due = |it: &mut Execution| {
@@ -389,14 +390,14 @@ impl Serving {
         told(self.services.statuses.say(self.goals.statuses()));
     }
 
-    /// Does what the hub has decided, and answers the run if that is due.
+    /// Applies the effects of the hub, and answers the run if an answer is due.
     fn settle(&mut self) {
         let now = self.now();
         for effect in self.hub.effects() {
             match effect {
                 Effect::Send(message) => told(self.topics.send(message)),
                 Effect::Tell(ticket, what) => {
-                    // What comes of an earlier run counts no more.
+                    // Results for earlier runs are dropped.
                     let (number, ticket): (u64, Ticket) =
                         (ticket >> RUN_BITS, ticket & ((1 << RUN_BITS) - 1));
                     if let Some(execution) =
@@ -443,11 +444,11 @@ impl Serving {
     }
 }
 
-/// Says it to the run.
+/// Writes lines to the run.
 fn say(execution: &mut Execution, lines: &[String]) {
     if let Some(stream) = &mut execution.answers {
         for line in lines {
-            // That it is gone is said by its end.
+            // A closed connection is reported by its own event.
             let _ = writeln!(stream, "{line}");
         }
     }
@@ -459,7 +460,7 @@ fn told(sent: Result<(), String>) {
     }
 }
 
-/// What time it is, for people and other nodes.
+/// Returns the time of day, for messages of ROS.
 #[allow(
     clippy::disallowed_methods,
     reason = "messages of ROS carry the time of day"

@@ -1,4 +1,4 @@
-//! The services and the action by which `PlanSys2`'s planner and executor are known.
+//! Services, topics and the action of `PlanSys2`'s planner and executor.
 
 use elbowroom_plansys2::interface::{
     ActionExecutionInfo, CancelRequest, CancelResponse, ChangeRequest, Empty, Feedback,
@@ -10,36 +10,36 @@ use elbowroom_plansys2::knowledge::SubGoalsResponse;
 use super::Input;
 use super::network::{Answers, Asker, Mouth, Network, latched, reliable};
 
-/// Those that are stood in for.
+/// Nodes that this program replaces.
 pub(super) const NODES: [&str; 2] = ["planner", "executor"];
-/// Which of them has the plans, and which one executes them.
+/// Positions in [`NODES`].
 pub(super) const PLANNER: usize = 0;
 pub(super) const EXECUTOR: usize = 1;
 
-/// What somebody has asked for.
+/// Request of a client.
 pub(super) enum Asked {
     Plan(Asker, PlanRequest),
-    /// For the plan that is executed, or for what is left of it.
+    /// The executed plan, or its remaining steps.
     Executed(Part, Asker),
-    /// For the order in which the parts of the goal are reached.
+    /// The subgoals, in the order of their times.
     Order(Asker),
     Validate(Asker, ValidateRequest),
     Goal(Asker, GoalRequest),
     Cancel(Asker, CancelRequest),
     Result(Asker, ResultRequest),
-    /// In which state a node is, one of [`NODES`].
+    /// The state of a node, by its position in [`NODES`].
     State(usize, Asker),
     Change(usize, Asker, ChangeRequest),
 }
 
-/// How much of a plan somebody wants to know.
+/// Requested part of the executed plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     Whole,
     Rest,
 }
 
-/// By what it is answered.
+/// Senders of answers and messages.
 pub(super) struct Services {
     pub(super) plan: Answers<PlanResponse>,
     pub(super) executed: Answers<PlanResponse>,
@@ -51,7 +51,7 @@ pub(super) struct Services {
     pub(super) result: Answers<ResultResponse>,
     pub(super) feedback: Mouth<Feedback>,
     pub(super) statuses: Mouth<GoalStatuses>,
-    /// What other tools follow: how each action stands, and the plan that is executed.
+    /// For monitoring tools: the status of each action, and the executed plan.
     pub(super) infos: Mouth<ActionExecutionInfo>,
     pub(super) executing: Mouth<Plan>,
     pub(super) state: Vec<Answers<StateResponse>>,
@@ -59,7 +59,7 @@ pub(super) struct Services {
 }
 
 impl Services {
-    /// Offers all of them.
+    /// Offers all services and topics.
     ///
     /// # Errors
     /// DDS refuses; the text says what.

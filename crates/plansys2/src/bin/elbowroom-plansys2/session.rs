@@ -1,4 +1,4 @@
-//! One run: waits for the performers, then connects the two conversations until Elbowroom says stop.
+//! One run: waits for the performers, then connects Elbowroom with them until it says stop.
 
 use std::io::{self, Write as _};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -13,11 +13,11 @@ use super::options::Settings;
 use super::topics::Topics;
 use super::{Input, remark};
 
-/// How often the hub looks whether somebody is lost.
+/// Interval at which the hub checks for lost performers.
 const TICK: Duration = Duration::from_millis(200);
-/// What was told to stop is to hear of it before this program ends.
+/// Time for the delivery of cancel messages before the program ends.
 const FAREWELL: Duration = Duration::from_millis(300);
-/// The problem expert may take so long to take in what was changed last. Elbowroom waits no longer than a second.
+/// Time limit for writing the last changes to the problem expert. Elbowroom waits at most a second.
 const TOLD_WITHIN: Duration = Duration::from_millis(600);
 
 pub(super) struct Session {
@@ -39,7 +39,8 @@ impl Session {
     ) -> Self {
         let mut world = World::new("plansys2", settings.speed);
         if let Some(expert) = &mut expert {
-            // The text of the problem is not known here: words are spelled as the problem expert has them.
+            // The text of the problem is unknown here, so the spelling of the problem expert is
+            // used.
             expert.begin("");
             world = world.following();
         }
@@ -54,10 +55,10 @@ impl Session {
         }
     }
 
-    /// Until Elbowroom says stop or is gone.
+    /// Runs until Elbowroom says stop or closes the connection.
     ///
     /// # Errors
-    /// A performer is missing; it is named.
+    /// A performer is missing; the text names it.
     pub(super) fn run(mut self) -> Result<(), String> {
         let said = self.wait_for_performers()?;
         remark(&format!("performers: {}", self.hub.listed(self.now())));
@@ -88,8 +89,8 @@ impl Session {
         }
     }
 
-    /// What is asked for before nodes have found each other is lost, so that time begins when they are there.
-    /// What Elbowroom has said meanwhile comes back.
+    /// Waits for the performers before time begins, because requests sent before discovery are
+    /// lost. Returns the lines that Elbowroom has sent meanwhile.
     fn wait_for_performers(&mut self) -> Result<Vec<Input>, String> {
         let mut said = Vec::new();
         while !self.census.is_over(&self.hub, self.now())? {
@@ -108,7 +109,7 @@ impl Session {
                     }
                     said.push(Input::Line(line));
                 }
-                // Nobody serves here.
+                // The other inputs belong to `serve`.
                 Ok(_) | Err(_) => {}
             }
             self.settle();
@@ -123,7 +124,7 @@ impl Session {
         Ok(said)
     }
 
-    /// Takes what has come; `true` when the run is over.
+    /// Handles an input. Returns `true` if the run is over.
     fn take(&mut self, input: Input) -> bool {
         let now = self.now();
         match input {
@@ -149,7 +150,7 @@ impl Session {
             Input::Status(status) => self.hub.status(&status, now),
             Input::Expert(heard) => self.hear(heard),
             Input::Trouble(text) => remark(&text),
-            // Nobody serves here.
+            // The other inputs belong to `serve`.
             _ => {}
         }
         false
@@ -161,7 +162,7 @@ impl Session {
         }
     }
 
-    /// Does what the hub has decided, and answers if that is due.
+    /// Applies the effects of the hub, and answers if an answer is due.
     fn settle(&mut self) {
         let now = self.now();
         for effect in self.hub.effects() {
@@ -181,7 +182,7 @@ impl Session {
         say(&self.world.answer(now));
     }
 
-    /// The run is over, or Elbowroom is gone: what runs is to stop.
+    /// Cancels running actions, after the end of the run or the loss of Elbowroom.
     fn leave(mut self) {
         for ticket in self.world.running() {
             self.hub.cancel(ticket);
@@ -190,7 +191,7 @@ impl Session {
         if let Some(expert) = &mut self.expert {
             expert.end();
         }
-        // What the run has changed last is to be told.
+        // The last changes of the run are written to the problem expert.
         let left = self.now();
         while self.expert.as_ref().is_some_and(|it| !it.is_idle())
             && self.now().saturating_sub(left) < TOLD_WITHIN
@@ -216,7 +217,8 @@ pub(super) fn now() -> Instant {
     Instant::now()
 }
 
-/// Says it to Elbowroom. That nobody listens any more is said by the end of the input, too.
+/// Writes lines to Elbowroom. Errors are ignored, because the end of the input reports a closed
+/// connection.
 fn say(lines: &[String]) {
     let mut out = io::stdout().lock();
     for line in lines {
@@ -225,7 +227,7 @@ fn say(lines: &[String]) {
     let _ = out.flush();
 }
 
-/// The actions of the domain, if this is the greeting that has them.
+/// Returns the actions of the domain if the line is the greeting that lists them.
 fn actions_of(line: &str) -> Option<Vec<String>> {
     let message: Value = serde_json::from_str(line).ok()?;
     let actions = message

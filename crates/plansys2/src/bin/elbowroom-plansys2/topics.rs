@@ -5,13 +5,13 @@ use elbowroom_plansys2::message::ActionExecution;
 use super::Input;
 use super::network::{Mouth, Network, reliable};
 
-/// What is said to the performers; what they say comes as inputs.
+/// Publisher of messages to the performers. Their messages arrive as inputs.
 pub(super) struct Topics {
     hub: Mouth<ActionExecution>,
 }
 
 impl Topics {
-    /// Joins the conversation.
+    /// Joins both topics.
     ///
     /// # Errors
     /// DDS refuses; the text says what.

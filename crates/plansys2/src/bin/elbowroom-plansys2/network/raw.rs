@@ -1,17 +1,17 @@
-//! Messages as they come: how they are to be read depends on who has sent them.
+//! Undecoded messages. Their format depends on the DDS implementation of the sender.
 
 use std::convert::Infallible;
 
 use rustdds::RepresentationIdentifier;
 use rustdds::no_key::{Decode, DefaultDecoder, DeserializerAdapter};
 
-/// The bytes of a message, and how they are to be read.
+/// Bytes of a message, and their encoding.
 pub(super) struct Raw {
     pub(super) bytes: Vec<u8>,
     pub(super) encoding: RepresentationIdentifier,
 }
 
-/// Reads nothing.
+/// Deserializer that returns the bytes of a message.
 pub(super) struct RawAdapter;
 
 impl DeserializerAdapter<Raw> for RawAdapter {
@@ -30,7 +30,7 @@ impl DeserializerAdapter<Raw> for RawAdapter {
     }
 }
 
-/// Takes the bytes as they are.
+/// Decoder that copies the bytes.
 #[derive(Clone)]
 pub(super) struct AsItIs;
 

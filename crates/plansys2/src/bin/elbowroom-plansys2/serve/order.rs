@@ -1,4 +1,4 @@
-//! The order in which the plan that is executed reaches the parts of its goal.
+//! Subgoals of the executed plan, in the order of their times.
 
 use std::sync::Arc;
 use std::thread;
@@ -10,16 +10,16 @@ use super::super::command::{self, Patience};
 use super::super::network::Asker;
 use super::{Serving, told};
 
-/// What is known of it.
+/// Order of the subgoals, and the clients that wait for it.
 #[derive(Default)]
 pub(super) struct Order {
     known: Option<Result<Vec<Tree>, String>>,
-    /// Who has asked before it was.
+    /// Clients that have asked before the order was known.
     pub(super) asked: Vec<Asker>,
 }
 
 impl Serving {
-    /// Has a process of the command find it; what comes of it is an input.
+    /// Starts a process that computes the order. The result is an input.
     pub(super) fn find_order(&mut self, plan: String) {
         let Some(texts) = self.texts.clone() else {
             return;
@@ -32,12 +32,12 @@ impl Serving {
         };
         thread::spawn(move || {
             let order = command::sub_goals(&elbowroom, &texts, plan, &patience);
-            // Whoever receives is gone when the program ends.
+            // The receiver is dropped when the program ends.
             let _ = inputs.send(Input::Ordered(number, order));
         });
     }
 
-    /// It was found, or cannot be.
+    /// Takes the result, and answers the waiting clients.
     pub(super) fn ordered(&mut self, number: u64, order: Result<Vec<Tree>, String>) {
         let execution = self.execution.as_mut().filter(|it| it.number == number);
         let Some(execution) = execution else {
@@ -49,7 +49,7 @@ impl Serving {
         }
     }
 
-    /// Answers now, or when it is known.
+    /// Answers now if the order is known, and later otherwise.
     pub(super) fn tell_order(&mut self, who: Asker) {
         let Some(execution) = &mut self.execution else {
             return self.refuse_order(who, "no plan is being executed");

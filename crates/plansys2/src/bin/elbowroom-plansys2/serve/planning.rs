@@ -1,4 +1,4 @@
-//! Plans for who asks, each made by a process of the command.
+//! Planning requests, each answered by a process of the command.
 
 use std::sync::Arc;
 use std::thread;
@@ -11,11 +11,11 @@ use super::super::network::Asker;
 use super::super::services::PLANNER;
 use super::{Serving, told};
 
-/// How many plans are made at a time.
+/// Maximum number of concurrent planners.
 const MOST_PLANNERS: usize = 4;
 
 impl Serving {
-    /// Has a process of the command work on it, unless that is refused; what comes of it is an input.
+    /// Starts a planner, unless the request is rejected. The result is an input.
     pub(super) fn plan(&mut self, who: Asker, texts: PlanRequest) {
         self.work(move |elbowroom, refused, patience| {
             let planned = refused.and_then(|()| command::plan(elbowroom, &texts, patience));
@@ -47,7 +47,7 @@ impl Serving {
         let (inputs, elbowroom) = (self.inputs.clone(), self.settings.elbowroom.clone());
         let (within, is_over) = (self.settings.plan_within, Arc::clone(&self.is_over));
         thread::spawn(move || {
-            // Whoever receives is gone when the program ends.
+            // The receiver is dropped when the program ends.
             let _ = inputs.send(work(&elbowroom, refused, &Patience { within, is_over }));
         });
     }
