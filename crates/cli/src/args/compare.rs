@@ -15,7 +15,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     #[arg(allow_negative_numbers = true)]
     pub(crate) trials: Option<u64>,
-    /// Where the dice begin; by default the seed of the experiment
+    /// Random seed; by default the seed of the experiment
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
     /// Number of threads; 0 for one per processor. Trials are shared out among them; where there are fewer

@@ -32,7 +32,7 @@ pub(crate) struct EnvelopeArgs {
     /// problems with processes or events
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// What the largest box is the greatest of; by default the least slack
+    /// Objective that the largest box maximises; by default the least slack
     #[arg(long, value_enum)]
     objective: Option<Objective>,
     /// With --objective probability: the world file that says how long actions take
@@ -77,7 +77,7 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) epsilon: Rational,
-    /// Time limit in seconds; the best envelope so far is printed
+    /// Time limit in seconds; then the best envelope found is printed
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) time_limit: Option<Rational>,
     /// Time-out of each action, which the plan's promise names: `none`, a number of seconds, or `10x,600`,
@@ -108,11 +108,11 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long, num_args = 2, value_names = ["X", "Y"], requires = "picture")]
     #[arg(conflicts_with = "slice")]
     pub(crate) projection: Option<Vec<String>>,
-    /// Where to write the picture of --slice or --projection
+    /// File for the picture of --slice or --projection
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) picture: Option<PathBuf>,
-    /// For a plan that is invalid or has no room: the cheapest change of deadlines, durations and
-    /// bounds with which it works
+    /// For a plan that is invalid or has no slack: the cheapest change of deadlines, durations and
+    /// bounds that makes it work
     #[arg(long)]
     pub(crate) repair: bool,
     /// With --repair: a quantity that may change, named as in --vary, but nothing else; `weight W`

@@ -60,7 +60,7 @@ pub(crate) struct ExportArgs {
     pub(crate) output: Option<PathBuf>,
 }
 
-/// What a process of PRISM is about.
+/// Options of PRISM models.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Processes (prism)")]
 pub(crate) struct ProcessArgs {
@@ -70,20 +70,20 @@ pub(crate) struct ProcessArgs {
     /// On a clock: the world's durations, failures and events
     #[arg(long, value_name = "WORLD.toml")]
     pub(crate) world: Option<PathBuf>,
-    /// What becomes of a run where there is no plan: `lost`, `harmless`, or how many such steps it
-    /// takes until it is lost (without time; lost by default)
+    /// Meaning of states without a plan: `lost`, `harmless`, or the number of such steps until the
+    /// run is lost (without time; lost by default)
     #[arg(long, value_name = "RULE")]
     pub(crate) dead_ends: Option<DeadEndRule>,
-    /// How many actions can be under way at once (without time; no limit by default)
+    /// Largest number of actions that run at once (without time; no limit by default)
     #[arg(long, value_name = "N")]
     pub(crate) most_running: Option<usize>,
-    /// An action breaks off as soon as what it needs throughout does not hold (without time)
+    /// An action fails as soon as one of its conditions over all is violated (without time)
     #[arg(long)]
     pub(crate) keep_over_all: bool,
     /// Into how many cells time is cut (on a clock; 32 by default)
     #[arg(long, value_name = "N")]
     pub(crate) cells: Option<usize>,
-    /// Which bound of the optimum (on a clock; upper by default)
+    /// Bound of the optimum (on a clock; upper by default)
     #[arg(long, value_enum)]
     pub(crate) bound: Option<Bound>,
 }
@@ -91,9 +91,9 @@ pub(crate) struct ProcessArgs {
 /// The bounds of the timed optimum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Bound {
-    /// What happens in a cell happens in the worst order: a game, `smg`
+    /// The events of a cell happen in the worst order: a game, `smg`
     Lower,
-    /// What a cell brings is told, and its order chosen: `mdp`
+    /// The policy knows the events of a cell and chooses their order: `mdp`
     Upper,
 }
 
@@ -121,9 +121,9 @@ impl FromStr for DeadEndRule {
 pub(crate) enum ExportFormat {
     /// The plan's network, durations and deadlines in the box left to the world
     Stnu,
-    /// Whether the plan is guaranteed to work in the box; or the region
+    /// The guarantee of the plan in the box, or the region, as a formula
     Smt2,
-    /// What the best of all executors can reach, as a Markov decision process
+    /// The optimum over all executors, as a Markov decision process
     Prism,
     /// The problem with the timed initials of its calendar file, as PDDL
     Pddl,

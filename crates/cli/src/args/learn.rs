@@ -13,7 +13,7 @@ pub(crate) struct LearnArgs {
     /// Logs, oldest first: traces of `elbowroom run --trace`, or tables (docs/formats/log-csv.md)
     #[arg(value_name = "LOG", required = true)]
     pub(crate) logs: Vec<PathBuf>,
-    /// Write what was learnt as a world file, for `elbowroom run --world`
+    /// Write the learnt model as a world file, for `elbowroom run --world`
     #[arg(short, long, value_name = "WORLD.toml")]
     pub(crate) output: Option<PathBuf>,
     /// Compare how often facts changed by themselves with the rates of this world file
@@ -28,7 +28,7 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "N", default_value = "100", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) drift: Rational,
-    /// Seed for telling equal values apart in the search for drift
+    /// Seed for ordering equal values in the search for drift
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
     /// Compute intervals that hold all durations of the next execution of a plan with this
@@ -45,7 +45,7 @@ pub(crate) struct LearnArgs {
     /// That plan
     #[arg(long, value_name = "FILE", requires = "inside")]
     pub(crate) plan: Option<PathBuf>,
-    /// What it means that the plan survives the intervals
+    /// Guarantee that the plan must have in the intervals
     #[arg(long, value_enum, default_value_t = Guarantee::Dynamic, requires = "inside")]
     pub(crate) guarantee: Guarantee,
     /// Minimum time between interfering happenings (epsilon)

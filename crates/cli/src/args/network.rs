@@ -27,7 +27,7 @@ pub(crate) struct NetworkArgs {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole)]
     #[arg(allow_negative_numbers = true, requires = "simulate")]
     pub(crate) seed: u64,
-    /// How durations are drawn
+    /// Distribution of the durations
     #[arg(long, value_enum, default_value_t = DurationsChoice::Given, requires = "simulate")]
     pub(crate) durations: DurationsChoice,
     /// Number of branches after which weak controllability, which can be hard, is left undecided

@@ -29,19 +29,19 @@ pub(crate) struct OddsArgs {
     /// Let a ground action overlap itself in plans that the embedded planner makes
     #[arg(long)]
     pub(crate) self_overlap: bool,
-    /// What an effect that fails leaves behind
+    /// State of an effect that fails
     #[arg(long, value_enum, default_value_t = SemanticsChoice::Paper)]
     pub(crate) semantics: SemanticsChoice,
-    /// Also list what must hold before each happening for the rest to work
+    /// Also list the facts that each happening and the rest of the plan need
     #[arg(long)]
     pub(crate) layers: bool,
     /// A world on a clock (docs/formats/world.md): execute the plan in samples of it
     #[arg(long, value_name = "WORLD.toml")]
     pub(crate) world: Option<PathBuf>,
-    /// Who executes it, without and with new plans; `live` and `adaptable` by default
+    /// Executor of the samples, without and with new plans; `live` and `adaptable` by default
     #[arg(long, value_name = "NAME", requires = "world")]
     pub(crate) executor: Vec<String>,
-    /// How many samples
+    /// Number of samples
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = whole)]
     #[arg(allow_negative_numbers = true)]
     #[arg(requires = "world")]
@@ -54,7 +54,7 @@ pub(crate) struct OddsArgs {
     /// Write a picture of all orders of the plan's actions; of short plans only
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) lattice: Option<PathBuf>,
-    /// Number of beginnings of orders that the search for the best order may look at
+    /// Largest number of prefixes of orders in the search for the best order
     #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = count)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) most_sequences: usize,
@@ -70,7 +70,7 @@ pub(crate) struct OddsArgs {
 /// The state after an effect that fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SemanticsChoice {
-    /// The opposite of what it should, as in paper 2
+    /// The opposite of the intended value, as in paper 2
     Paper,
     /// The fact as it was
     World,

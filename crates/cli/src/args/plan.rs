@@ -74,7 +74,7 @@ pub(crate) enum PlanObjectiveChoice {
     /// The relative deviation that all its durations may have
     #[value(alias = "room")]
     Slack,
-    /// How often it works in a world
+    /// Share of successes in a world
     Probability,
 }
 

@@ -44,10 +44,11 @@ pub(crate) struct RunArgs {
     /// plan is taken, within a minute
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) planner_time: Option<Rational>,
-    /// By what the plan to begin with is chosen, where the embedded planner makes it: the shortest,
-    /// or, of several, the one with which the executor succeeds most often in samples of --world;
-    /// without a world file, the one whose actions are likeliest to succeed by --likelihoods. By
-    /// default the likeliest where one of the two is given, and the shortest elsewhere
+    /// Choice of the first plan, where the embedded planner makes it: the shortest, or the
+    /// likeliest of several. The likeliest is the one with which the executor succeeds most often
+    /// in samples of --world, or, without a world file, the one whose actions are likeliest to
+    /// succeed by --likelihoods. By default the likeliest if one of these two is given, and the
+    /// shortest otherwise
     #[arg(long = "first-plan", value_enum)]
     pub(crate) first_plan_by: Option<FirstPlanChoice>,
     /// Work limit for each choice of the first plan and each new plan, in seconds of one processor. The
@@ -148,15 +149,15 @@ pub(crate) struct RunArgs {
     /// The objective of the envelopes, see `elbowroom help envelope`; by default `least-slack`
     #[arg(long, value_enum)]
     pub(crate) objective: Option<Objective>,
-    /// What happens to running actions when a new plan is made
+    /// Treatment of running actions when a new plan is made
     #[arg(long, value_enum, default_value_t = RunningChoice::Keep)]
     pub(crate) running: RunningChoice,
     /// Time that planning takes in the world: `measured`, or a number of seconds; by default 0,
-    /// with --realtime and --world-process `measured`. Where it is measured, plans are made beside the
-    /// run, which goes on meanwhile (docs/serve.md)
+    /// with --realtime and --world-process `measured`. If it is measured, plans are made in the
+    /// background while the run continues (docs/serve.md)
     #[arg(long, value_name = "measured|S", allow_negative_numbers = true)]
     pub(crate) planning_time: Option<String>,
-    /// Memory in MB that a plan in the making may take while the run goes on
+    /// Memory limit in MB of a planner in the background
     #[arg(long, value_name = "MB", default_value = "1000", value_parser = clap::value_parser!(u64).range(1..1_000_000))]
     pub(crate) planner_memory: Option<u64>,
     /// Time-out of each action, from its start or its last progress: `none`, a number of seconds, or
@@ -202,7 +203,7 @@ pub(crate) struct RunArgs {
     /// and world.toml, the model learnt from all logs in it, for --believed
     #[arg(long, value_name = "FOLDER", requires = "journals")]
     pub(crate) learn: Option<PathBuf>,
-    /// Show the page of `elbowroom report` while the run goes on, at this port or HOST:PORT of this
+    /// Serve the page of `elbowroom report` during the run, at this port or HOST:PORT of this
     /// machine; without one, at a free port. Only for this machine unless HOST says otherwise
     #[arg(long, value_name = "ADDRESS", value_parser = Address::read, num_args = 0..=1)]
     #[arg(
@@ -212,11 +213,11 @@ pub(crate) struct RunArgs {
     )]
     #[arg(conflicts_with = "replay")]
     pub(crate) serve: Option<Address>,
-    /// Let those who know the token in this file pause, cancel and stop the run on that page
+    /// Clients with the token in this file may pause, cancel and stop the run on that page
     #[arg(long, value_name = "FILE", alias = "control", requires = "serve")]
     pub(crate) token: Option<PathBuf>,
-    /// Go on with the run of a journal, whose program has died: the world is asked what became of
-    /// what was under way; all other options are taken from the journal
+    /// Resume a crashed run from its journal: the world reports the state of the actions that were
+    /// running; all other options are taken from the journal
     #[arg(long, value_name = "FILE", conflicts_with_all = IN_THE_TRACE, conflicts_with = "replay")]
     pub(crate) resume: Option<PathBuf>,
     /// Replay a stored trace and say whether the decisions are the same; all other options are

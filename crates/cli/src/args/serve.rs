@@ -35,16 +35,15 @@ what comes of that: docs/serve.md.")]
 pub(crate) struct ServeArgs {
     #[command(flatten)]
     pub(crate) run: RunArgs,
-    /// Where to listen for HTTP: a port, or HOST:PORT; port 0 is a free one. Only for this machine
-    /// unless HOST says otherwise
+    /// Address for HTTP: a port, or HOST:PORT; port 0 is a free one. Only for this machine unless
+    /// HOST says otherwise
     #[arg(long, value_name = "ADDRESS", value_parser = Address::read, default_value = PORT)]
     pub(crate) http: Address,
-    /// Listen at this Unix socket, too, which is made; only its owner can reach it
+    /// Also listen at this Unix socket, which is created; only its owner can reach it
     #[arg(long, value_name = "PATH")]
     pub(crate) socket: Option<PathBuf>,
-    /// Begin the journal anew when it is as long and the executive takes up a plan, or rests with
-    /// nothing under way: in bytes, or with K, M or G; 10M unless it is given. `--resume` then goes on
-    /// from there
+    /// Rotate the journal once it has this size and the executive adopts a plan, or is idle: in
+    /// bytes, or with K, M or G; 10M by default. `--resume` then continues from the new segment
     #[arg(long, value_name = "SIZE", value_parser = size)]
     pub(crate) journal_size: Option<u64>,
     /// Keep as many earlier segments of the journal, as FILE.1 (the last one), FILE.2, …; 1 unless it
@@ -80,7 +79,7 @@ fn size(text: &str) -> Result<u64, String> {
 What there is to ask, and what the answers mean: docs/serve.md. Exit codes: 0 done; 2 refused, or \
 nobody answers.")]
 pub(crate) struct CtlArgs {
-    /// Where the executive is: a port, HOST:PORT, or the path of its socket
+    /// Address of the executive: a port, HOST:PORT, or the path of its socket
     #[arg(long, value_name = "ADDRESS", value_parser = Target::read, default_value = PORT)]
     #[arg(global = true)]
     pub(crate) to: Target,
@@ -94,18 +93,19 @@ pub(crate) struct CtlArgs {
     pub(crate) what: CtlCommand,
 }
 
-/// What is asked of an executive.
+/// Requests to an executive.
 #[derive(Debug, Subcommand)]
 pub(crate) enum CtlCommand {
-    /// Print how things stand: what it does and why, goals, what is under way, facts and numbers
+    /// Print the state: the current decision and its reason, goals, running actions, facts and
+    /// numbers
     State,
     /// Print the goals: those that are pursued or set aside, and the last ones that were closed
     Goals,
-    /// Print the plan, and what became of its actions
+    /// Print the plan with the states of its actions
     Plan,
-    /// Print what is still guaranteed, and how far each quantity may deviate
+    /// Print the remaining guarantee, and how far each quantity may deviate
     Guarantee,
-    /// Print what is next, and why
+    /// Print the next action and its reason
     Next,
     /// Print each line of the trace as it comes, until the executive ends
     Events {
@@ -161,7 +161,7 @@ pub(crate) enum CtlCommand {
         /// The fact, such as '(open door)'
         #[arg(value_name = "FACT")]
         fact: String,
-        /// Whether it is true
+        /// The new value of the fact
         #[arg(value_name = "true|false", default_value = "true", action = clap::ArgAction::Set)]
         becomes: bool,
     },
@@ -174,17 +174,17 @@ pub(crate) enum CtlCommand {
         #[arg(value_name = "VALUE", allow_negative_numbers = true)]
         value: Rational,
     },
-    /// Give the problem to an executive that has none, or that has nothing under way
+    /// Give the problem to an executive that has none, or that has no running action
     Problem {
         /// The problem file
         #[arg(value_name = "PROBLEM")]
         file: PathBuf,
     },
-    /// Have nothing more started; what is under way goes on
+    /// Stop dispatching; running actions continue
     Pause,
     /// Go on after a pause
     Resume,
-    /// End the executive; what is under way is cancelled
+    /// End the executive; running actions are cancelled
     Stop,
     /// Print a description of the interface, for programs that make clients
     Openapi,

@@ -24,11 +24,11 @@ pub(crate) struct WorldCheckArgs {
     /// The problem, in PDDL
     #[arg(value_name = "PROBLEM")]
     pub(crate) problem: Option<PathBuf>,
-    /// The plan whose actions the world is told to start
+    /// The plan whose actions the world has to start
     #[arg(value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
-    /// Time limit in seconds for each answer of the program; it is asked to wait for at most a
-    /// second of its own time, or a tenth of an action's
+    /// Time limit in seconds for each answer of the program; waits that are requested of it take at
+    /// most a second of its own time, or a tenth of an action's
     #[arg(long, value_name = "S", default_value = "10", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) answer_within: Rational,
