@@ -1,4 +1,4 @@
-//! How long the questions about a network take. `cargo bench -p elbowroom-network`
+//! Benchmark of the checks of a network. `cargo bench -p elbowroom-network`
 
 #![allow(
     clippy::print_stdout,
@@ -17,8 +17,8 @@ fn main() {
     divan::main();
 }
 
-/// So many jobs side by side, each a chain of tasks whose durations the world chooses, with
-/// deadlines and hand-overs between neighbours: 2 · jobs · tasks points and one.
+/// Returns a network of `jobs` parallel jobs, each a chain of `tasks` contingent links, with
+/// deadlines and hand-overs between neighbours. It has 2 · jobs · tasks + 1 points.
 fn network(jobs: usize, tasks: usize, slack: i64) -> NetworkFile {
     let mut points = vec!["\"start\"".to_owned()];
     let mut requirements = Vec::new();

@@ -21,7 +21,7 @@ pub(crate) struct Builder {
     requirements: Network<Rational>,
     links: Vec<ContingentLink<Rational>>,
     durations: Vec<Option<Duration>>,
-    /// Where the text says what each link is.
+    /// Positions of the links in the text.
     places: Vec<usize>,
     /// For each node, the link that ends there.
     ending: BTreeMap<NodeId, LinkId>,
@@ -29,7 +29,7 @@ pub(crate) struct Builder {
     pub(crate) waits: Vec<GivenWait>,
 }
 
-/// A contingent link as it stands in a file.
+/// Contingent link as given in a file.
 #[derive(Debug)]
 pub(crate) struct GivenLink {
     pub(crate) at: usize,
@@ -165,7 +165,7 @@ impl Builder {
             return None;
         }
         let id = LinkId(u32::try_from(self.links.len()).ok()?);
-        // The first one stays the one that ends there: what comes later asks for it by its end.
+        // The first link keeps the end node, because later lookups find a link by its end.
         if self.ending.contains_key(&end) {
             report.mistake(
                 at,
@@ -201,7 +201,7 @@ impl Builder {
         &self.links[id.index()]
     }
 
-    /// How the duration of a link is distributed.
+    /// Returns the distribution of the duration of a link, if it has one.
     pub(crate) fn duration_of(&self, id: LinkId) -> Option<&Duration> {
         self.durations[id.index()].as_ref()
     }

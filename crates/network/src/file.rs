@@ -59,7 +59,7 @@ pub enum Duration {
     Exponential {
         /// The least value.
         from: Rational,
-        /// The mean of what comes on top; not negative.
+        /// Mean of the exponential part; not negative.
         mean: Rational,
     },
     /// `from` and what a gamma distribution adds.
@@ -97,20 +97,19 @@ pub struct GivenWait {
 /// The contents of a network file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NetworkFile {
-    /// How it is written.
+    /// Format of the file.
     pub format: Format,
     /// The network's name; empty if it has none.
     pub name: String,
     /// The names of the time points, by [`NodeId`]; no two are the same.
     pub points: Vec<String>,
-    /// The time point from which times count, where the file has one.
+    /// Time point that serves as time zero, if the file has one.
     pub reference: Option<NodeId>,
     /// Requirements and contingent links.
     pub network: UncertainNetwork<Rational>,
-    /// How the durations of the links are distributed, by [`LinkId`]; `None` if the file does not
-    /// say.
+    /// Distributions of the durations of the links, by [`LinkId`]; `None` if the file gives none.
     pub durations: Vec<Option<Duration>>,
-    /// Which durations correlate.
+    /// Groups of correlated durations.
     pub correlations: Vec<Correlation>,
     /// The waits of a network in dispatchable form.
     pub waits: Vec<GivenWait>,
@@ -124,7 +123,7 @@ impl NetworkFile {
         &self.points[node.index()]
     }
 
-    /// Whether the world decides nothing: a simple temporal network.
+    /// Returns `true` if the network has no contingent links: a simple temporal network.
     pub fn is_certain(&self) -> bool {
         self.network.links().is_empty()
     }

@@ -200,7 +200,7 @@ impl<'a> Reader<'a> {
         Ok(Value::List(items))
     }
 
-    /// Whether the list or object ends here; otherwise steps over the comma.
+    /// Returns `true` if the list or object ends here; otherwise skips the comma.
     fn is_last(&mut self, end: u8) -> Result<bool, Wrong> {
         self.skip_space();
         match self.peek() {

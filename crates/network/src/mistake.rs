@@ -1,4 +1,4 @@
-//! What is wrong in a text, and where.
+//! Mistakes in a text, with their positions.
 
 use elbowroom_text::{Diagnostics, Source};
 
@@ -55,7 +55,7 @@ impl Report {
         self.found.is_failed()
     }
 
-    /// The value with what was remarked, or the mistakes, by position.
+    /// Returns the value with the remarks, or the mistakes sorted by position.
     pub(crate) fn finish<T>(self, value: Option<T>) -> Result<(T, Vec<String>), Diagnostics> {
         let (value, _) = self.found.finish(value)?;
         Ok((value, self.remarks))

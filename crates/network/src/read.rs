@@ -1,4 +1,4 @@
-//! Which format a file is in, and reading it.
+//! Detection of a file's format, and the readers.
 
 mod dimacs;
 mod distribution;
@@ -101,7 +101,7 @@ fn ending(name: &str) -> String {
     }
 }
 
-/// Whether a line looks like `Z=0, A=3, C(A)=7`.
+/// Returns `true` if a line looks like `Z=0, A=3, C(A)=7`.
 fn is_trace(line: &str) -> bool {
     let is_event = |event: &str| {
         let (name, time) = event.split_once('=')?;
@@ -216,7 +216,7 @@ fn point_name(json: &Json<'_>, report: &mut Report) -> Option<String> {
     }
 }
 
-/// A matrix of so many rows, symmetric, with 1 in its diagonal.
+/// Reads a symmetric matrix with `size` rows and 1 in its diagonal.
 fn correlation_matrix(
     parent: &Json<'_>,
     name: &str,

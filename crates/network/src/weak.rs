@@ -24,9 +24,9 @@ pub enum Weak {
     Controllable,
     /// For these durations there is none.
     Uncontrollable(WeakConflict),
-    /// It takes more than so many branches to find out.
+    /// The limit on branches was reached before the check was finished.
     Undecided {
-        /// How many were looked at.
+        /// Number of branches that were examined.
         branches: usize,
     },
 }
@@ -51,7 +51,7 @@ pub struct WeakStep {
     pub to: NodeId,
     /// The upper bound of the difference.
     pub bound: Rational,
-    /// Where it comes from.
+    /// Origin of the bound.
     pub given: Given,
 }
 
@@ -64,8 +64,8 @@ pub enum Given {
     Link(LinkId),
 }
 
-/// Whether there is a schedule for whatever the world does; after `most_branches` the question is
-/// given up.
+/// Decides weak controllability: for all durations within their bounds there is a schedule. Returns
+/// [`Weak::Undecided`] after `most_branches` branches.
 pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> Weak {
     if let Some(conflict) = endless(network).or_else(|| own_limit(network)) {
         return Weak::Uncontrollable(conflict);
@@ -89,8 +89,8 @@ pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> Weak 
     }
 }
 
-/// What contradicts itself if these links take so long, if something does. Links that are not
-/// mentioned limit nothing.
+/// Returns the contradiction that results from these durations, if any. Links that are not listed
+/// add no constraints.
 pub fn at(
     network: &UncertainNetwork<Rational>,
     durations: &BTreeMap<LinkId, Rational>,
@@ -172,7 +172,7 @@ fn endless(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
     None
 }
 
-/// Whether bounds lead from the beginning of a link to its end without the link itself.
+/// Returns `true` if bounds lead from the activation of a link to its end without the link itself.
 fn is_limited(network: &UncertainNetwork<Rational>, id: LinkId) -> bool {
     let link = network.link(id);
     let requirements = network.requirements();

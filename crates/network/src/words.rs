@@ -1,4 +1,4 @@
-//! What bounds mean, in the file's own names.
+//! Descriptions of bounds in words, with the file's own names.
 
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::LinkId;

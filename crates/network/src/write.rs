@@ -151,9 +151,9 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
-/// A network as sections of plain text (`# KIND OF NETWORK`). How durations are distributed and
-/// waits have no place there. `None` if a link has no upper bound, or a time point's name cannot
-/// stand there: it is empty, or has a space, a quote or `#` in it.
+/// Writes a network as sections of plain text (`# KIND OF NETWORK`). This format has no
+/// distributions and no waits. Returns `None` if a link has no upper bound, or if a time point's
+/// name is empty or contains a space, a quote or `#`.
 pub fn write_plain(file: &NetworkFile) -> Option<String> {
     let is_bad = |letter: char| letter.is_whitespace() || matches!(letter, '#' | '"' | '\'');
     let mut points = file.points.iter();

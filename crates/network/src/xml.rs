@@ -306,7 +306,7 @@ fn local(name: &str) -> String {
     name.rsplit(':').next().unwrap_or_default().to_owned()
 }
 
-/// The character that `&name;` stands for.
+/// Returns the character that `&name;` encodes.
 fn reference(name: &str) -> Option<char> {
     match name {
         "lt" => Some('<'),

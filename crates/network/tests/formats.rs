@@ -1,4 +1,4 @@
-//! What each format says, and what is refused.
+//! Contents and errors of each format.
 
 mod samples;
 

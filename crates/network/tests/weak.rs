@@ -9,7 +9,8 @@ use elbowroom_stn::uncertain::{ContingentLink, LinkId, UncertainNetwork};
 use elbowroom_stn::{Constraint, Network, NodeId};
 use proptest::prelude::*;
 
-/// Whether there is a schedule at each corner, an endless link ending far out.
+/// Returns `true` if there is a schedule at each corner; links without an upper bound end very late
+/// there.
 fn plainly_weak(network: &UncertainNetwork<Rational>) -> bool {
     let links: Vec<LinkId> = network.link_ids().collect();
     (0..1_u32 << links.len()).all(|corner| {
@@ -65,7 +66,7 @@ proptest! {
             Weak::Controllable => prop_assert!(plainly_weak(&network)),
             Weak::Uncontrollable(conflict) => {
                 prop_assert!(!plainly_weak(&network));
-                // The durations lie within the bounds, and what is shown is a cycle.
+                // The durations lie within the bounds, and the steps form a negative cycle.
                 for (&id, duration) in &conflict.durations {
                     let link = network.link(id);
                     prop_assert!(*duration >= link.lower);

@@ -1,15 +1,17 @@
-//! How likely a random number lies in an interval, between two fractions.
+//! Bounds on the probability that a random number lies in an interval, as fractions.
 //!
-//! A [`Chance`] is a distribution as somebody states it: a density whose logarithm is concave, cut at
-//! both sides (what would be beyond a cut is at the cut), or a list of values. A [`Reach`] is an interval
-//! around a point, by how far its ends lie from it. Of all intervals in a [`Cell`], a rectangle of
-//! reaches, [`Chance::height`] says how far the logarithm of the probability is at most above a linear
-//! function: that is what makes the best of many intervals provable.
+//! A [`Chance`] is a user-stated distribution: either a density whose logarithm is concave, cut at
+//! both sides (values beyond a cut are moved to the cut), or a list of values. A [`Reach`] is an
+//! interval around a point, given by the distances of its ends from the point. A [`Cell`] is a
+//! rectangle of reaches. [`Chance::height`] bounds how far the logarithm of the probability rises
+//! above a linear function for all intervals of a cell. Branch and bound uses that bound to prove
+//! an interval optimal.
 //!
-//! For a density with a concave logarithm, the logarithm of the probability of an interval is a jointly
-//! concave function of its ends (Prékopa 1973), and lies below each of its tangents. What is at a cut is
-//! there or not: a cell that leaves that open counts it by a share that grows with the reach. Of a list of
-//! values, a cell counts those that it may reach.
+//! For a density with a concave logarithm, the logarithm of the probability of an interval is a
+//! jointly concave function of its ends (Prékopa 1973), and lies below each of its tangents. The
+//! probability mass at a cut is either inside the interval or not. If the intervals of a cell
+//! differ in that, the mass counts with a share that grows with the reach. For a list of values, a
+//! cell counts the values that its intervals may contain.
 
 mod density;
 mod height;
@@ -22,7 +24,7 @@ pub use height::{Cut, Steps};
 /// The distribution of a number that is rounded to multiples of something.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Chance {
-    /// It has a density, but for what is at its cuts.
+    /// A density; only the mass at its cuts is discrete.
     Dense(Dense),
     /// One of these values, all alike; sorted, at least one.
     Values(Vec<Rational>),
@@ -37,15 +39,15 @@ pub struct Dense {
     pub minimum: Option<Rational>,
     /// Greater numbers become this.
     pub maximum: Option<Rational>,
-    /// An interval counts as so much longer at either end: half of what numbers are rounded to.
+    /// Length added to an interval at either end: half of the rounding resolution.
     pub margin: Rational,
 }
 
-/// How far an interval reaches below and above a point.
+/// Distances of the lower and the upper end of an interval from a point inside it.
 pub type Reach = [Rational; 2];
 
-/// The intervals around a point whose lower ends lie so far below it, between two numbers, and whose
-/// upper ends so far above it.
+/// Set of intervals around a point: the distances of the lower end and of the upper end each lie
+/// within a range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cell {
     /// The least and the greatest distance of the lower end.
@@ -56,12 +58,12 @@ pub struct Cell {
     pub is_open: [bool; 2],
 }
 
-/// Where a linear bound on a probability touches, or nearly so.
+/// Place where a linear bound on a probability is tight, or nearly tight.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Touch {
     /// At this interval.
     At(Reach),
-    /// Where the probability is this.
+    /// At intervals with this probability.
     Mass(Rational),
     /// Nowhere: no probability is more than 1.
     Nowhere,
@@ -123,8 +125,8 @@ impl Chance {
         }))
     }
 
-    /// How likely the number, rounded to a multiple of `resolution`, is not outside the closed interval
-    /// with these ends: at least so much.
+    /// Returns a lower bound on the probability that the number, rounded to a multiple of
+    /// `resolution`, lies in the closed interval with these ends.
     pub fn inside(&self, [lower, upper]: [&Rational; 2], resolution: &Rational) -> Rational {
         match self {
             Self::Values(values) => share(values, |own| lower <= own && own <= upper),
@@ -240,8 +242,9 @@ impl Chance {
 }
 
 impl Dense {
-    /// What bounds on the probability take for the cuts: beyond the upper one, where the logarithm of
-    /// the density is not concave, all that is left counts as if it were there.
+    /// Returns the cuts that the bounds on the probability use. The logarithm of the density is not
+    /// concave beyond the bend. If the bend comes before the upper cut, all mass beyond the bend
+    /// counts as if it were at the bend.
     pub(crate) fn cuts(&self) -> [Option<Rational>; 2] {
         let bend = self.density.bend().map(|bend| bend - &self.margin);
         let upper = match (self.maximum.clone(), bend) {

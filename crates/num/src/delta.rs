@@ -14,7 +14,7 @@ use crate::Rational;
 pub struct Delta {
     /// The rational part.
     pub real: Rational,
-    /// How many times δ is added.
+    /// Coefficient of δ.
     pub infinitesimal: Rational,
 }
 

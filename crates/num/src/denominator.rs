@@ -36,8 +36,8 @@ impl CommonDenominator {
         Some(common)
     }
 
-    /// Becomes a denominator of this number too; `None`, and stays what it is, if that does not fit
-    /// an `i64`.
+    /// Extends the denominator so that it is also one of this number. Returns `None` and leaves it
+    /// unchanged if the result does not fit an `i64`.
     pub fn include(&mut self, number: &Rational) -> Option<()> {
         let (_, own) = number.as_small()?;
         if self.0 % own != 0 {

@@ -16,12 +16,12 @@ const LN_2: i128 = 0x0B17_217F_7D1C_F79A;
 /// No logarithm's series adds up more roundings than this, in these units.
 const ROUNDED: i128 = 64;
 
-/// The natural logarithm, between two numbers less than 10^-15 apart unless the argument is
-/// astronomically large or small; `None` unless it is positive.
+/// Returns bounds on the natural logarithm that are less than 10^-15 apart, unless the argument is
+/// astronomically large or small; `None` unless the argument is positive.
 ///
-/// With `m·2^k` as the argument and `m` between 3/4 and 3/2, it is `k` times the logarithm of 2 plus
-/// twice the area tangent of `(m - 1) / (m + 1)`, a series in which each term is less than a 25th of
-/// the one before.
+/// With `m·2^k` as the argument and `m` between 3/4 and 3/2, it is `k` times the logarithm of 2
+/// plus twice the area tangent of `(m - 1) / (m + 1)`. In that series, each term is less than a
+/// 25th of the previous one.
 ///
 /// ```
 /// use elbowroom_num::{Rational, enclosed};
@@ -61,8 +61,8 @@ pub fn ln(argument: &Rational) -> Option<[Rational; 2]> {
     ])
 }
 
-/// The greatest multiple of a billionth that is not above this number: with what is known of
-/// functions only between bounds, no more digits are worth keeping.
+/// Returns the greatest multiple of a billionth that is not above this number. Functions are known
+/// only between bounds, so more digits are not worth keeping.
 pub fn billionths_below(number: &Rational) -> Rational {
     let billion = Rational::from(1_000_000_000);
     (number * &billion).floor() / billion
@@ -76,7 +76,7 @@ pub fn billionths_above(number: &Rational) -> Rational {
 
 /// A positive number as `m·2^k`, with `m` between 3/4 and 3/2.
 fn halved(number: &Rational) -> (Rational, i64) {
-    /// Powers of two by which a number is brought near to 1, the large ones first.
+    /// Exponents of the powers of two that scale a number to near 1, in descending order.
     const STEPS: [u32; 6] = [32, 16, 8, 4, 2, 1];
     let mut mantissa = number.clone();
     let mut power = 0;

@@ -24,7 +24,7 @@ impl End {
         }
     }
 
-    /// Whether there is no limit on this side.
+    /// Returns `true` if there is no limit on this side.
     pub fn is_infinite(&self) -> bool {
         matches!(self, End::Infinite)
     }
@@ -33,9 +33,9 @@ impl End {
 /// All rationals between a lower and an upper end.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Interval {
-    /// Where the interval begins.
+    /// Lower end of the interval.
     pub lower: End,
-    /// Where the interval stops.
+    /// Upper end of the interval.
     pub upper: End,
 }
 
@@ -75,7 +75,7 @@ impl Interval {
         }
     }
 
-    /// Whether `value` belongs to the interval.
+    /// Returns `true` if `value` belongs to the interval.
     pub fn contains(&self, value: &Rational) -> bool {
         let above = match &self.lower {
             End::Closed(lower) => value >= lower,
@@ -90,7 +90,7 @@ impl Interval {
         above && below
     }
 
-    /// Whether no rational belongs to the interval.
+    /// Returns `true` if no rational belongs to the interval.
     pub fn is_empty(&self) -> bool {
         match (&self.lower, &self.upper) {
             (End::Infinite, _) | (_, End::Infinite) => false,
@@ -192,8 +192,8 @@ impl Side {
         }
     }
 
-    /// How far out this end of an interval lies: the upper end itself, minus the lower end, `None`
-    /// if infinite. Widening the interval makes it greater.
+    /// Returns the reach of this end of an interval: the upper end itself, or the negated lower
+    /// end; `None` if infinite. Widening the interval makes it greater.
     pub fn reach(self, interval: &Interval) -> Option<Rational> {
         let value = self.of(interval).value()?;
         Some(match self {
@@ -202,7 +202,8 @@ impl Side {
         })
     }
 
-    /// The number at which this end of an interval lies when it reaches so far out.
+    /// Returns the number at which this end of an interval lies if its [`reach`](Self::reach) is
+    /// `reach`.
     pub fn at_reach(self, reach: &Rational) -> Rational {
         match self {
             Self::Lower => -reach,

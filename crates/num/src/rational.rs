@@ -109,22 +109,22 @@ impl Rational {
         }
     }
 
-    /// Whether this is 0.
+    /// Returns `true` if this is 0.
     pub fn is_zero(&self) -> bool {
         matches!(self.0, Small(0, _))
     }
 
-    /// Whether this is below 0.
+    /// Returns `true` if this is below 0.
     pub fn is_negative(&self) -> bool {
         self.signum() < 0
     }
 
-    /// Whether this is above 0.
+    /// Returns `true` if this is above 0.
     pub fn is_positive(&self) -> bool {
         self.signum() > 0
     }
 
-    /// Whether this is a whole number.
+    /// Returns `true` if this is a whole number.
     pub fn is_integer(&self) -> bool {
         match &self.0 {
             Small(_, denominator) => *denominator == 1,
@@ -212,7 +212,7 @@ impl Rational {
         (self.to_big() * unit).floor()
     }
 
-    /// So many times a power of two, `2^-bits`.
+    /// Returns `units` times `2^-bits`.
     pub(crate) fn from_units(units: IBig, bits: usize) -> Self {
         Self::from_big(RBig::from_parts(units, UBig::ONE << bits))
     }

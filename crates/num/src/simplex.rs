@@ -56,10 +56,10 @@ impl VariableId {
     }
 }
 
-/// Why no values satisfy all bounds: Farkas' lemma.
+/// Proof that no values satisfy all bounds, by Farkas' lemma.
 ///
-/// Written as `term <= 0`, the bounds with these tags, each times its multiplier, add up to
-/// `c <= 0` with a constant `c > 0`.
+/// With all bounds written as `term <= 0`, the bounds with these tags, each times its multiplier,
+/// add up to `c <= 0` with a constant `c > 0`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{} bounds contradict each other", .certificate.len())]
 pub struct Infeasible {
@@ -88,7 +88,7 @@ pub struct Simplex {
     variables: Vec<Variable>,
     /// The assertions replaced since the first [`Simplex::push`], oldest first.
     replaced: Vec<Replaced>,
-    /// How long `replaced` was at each push.
+    /// Length of `replaced` at each push.
     levels: Vec<usize>,
 }
 
@@ -177,7 +177,7 @@ impl Simplex {
         self.replace(variable, Side::Upper, Some(Bound { value: bound, tag }));
     }
 
-    /// Begins a level: what is asserted from now on can be taken back by [`Simplex::pop`].
+    /// Begins a level: [`Simplex::pop`] undoes all assertions made after this call.
     pub fn push(&mut self) {
         self.levels.push(self.replaced.len());
     }

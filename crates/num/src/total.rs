@@ -2,10 +2,10 @@
 
 use crate::Rational;
 
-/// A sum under way.
+/// Accumulator for a sum of fractions.
 ///
-/// Adding fractions one by one, each sum is brought to lowest terms; here that is done once, at
-/// the end, as long as the numbers are small.
+/// Repeated addition reduces each partial sum to lowest terms. This type reduces once, at the end,
+/// as long as the numbers are small.
 ///
 /// ```
 /// use elbowroom_num::{Rational, Total};
@@ -17,7 +17,7 @@ use crate::Rational;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Total {
-    /// What did not fit.
+    /// Sum of the terms that did not fit into `numerator / denominator`.
     large: Rational,
     numerator: i128,
     /// Positive.

@@ -1,7 +1,7 @@
 //! Counts the work of a thread, equally on every machine.
 //!
-//! If a computation has a budget, but its answer must not depend on the speed of the machine, it cannot read a
-//! clock. Slow operations count their work here, and computations with a budget read the sum:
+//! A computation with a budget cannot read a clock if its answer must not depend on the speed of
+//! the machine. Slow operations count their work here, and computations with a budget read the sum:
 //!
 //! ```
 //! use elbowroom_num::work;
@@ -15,8 +15,8 @@
 //!
 //! One unit is about a nanosecond of one core of a machine of 2024.
 //!
-//! Such computations can also be interrupted: they ask [`is_stopped`] now and then, and end early with what they have
-//! once the thread's [`Stop`] has been requested.
+//! Such computations can also be interrupted: they poll [`is_stopped`], and return their
+//! intermediate result once the thread's [`Stop`] has been requested.
 
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;

@@ -159,7 +159,7 @@ proptest! {
 
 #[test]
 fn masses_are_those_of_draws() {
-    // Some ten thousand evenly spread quantiles stand for draws.
+    // Some ten thousand evenly spread quantiles represent random draws.
     let quantile = |density: &Density, share: f64| -> f64 {
         let (mut low, mut high): (f64, f64) = (-100.0, 200.0);
         for _ in 0..60 {

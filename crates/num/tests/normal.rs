@@ -46,7 +46,7 @@ fn nothing_is_told_more_closely_than_it_is_known() {
     let [_, above] = normal(&Rational::from(9));
     let tiny = Rational::new(1, 1_000_000_000_000_000_000);
     assert!(Rational::ONE - &below < tiny && Rational::ONE - &above < tiny);
-    // Symmetric: what is below -z is what is above z.
+    // Symmetry: the probability below -z equals the probability above z.
     for tenths in 0..90_i64 {
         let at = Rational::new(tenths, 10) + Rational::new(1, 3_000_017);
         let ([a, b], [c, d]) = (normal(&at), normal(&-&at));

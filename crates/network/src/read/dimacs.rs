@@ -14,7 +14,7 @@ use crate::number::Bound;
 /// More nodes than any such file has.
 const MOST_NODES: usize = 1 << 20;
 
-/// Whether a line is one of this format.
+/// Returns `true` if a line belongs to this format.
 pub(super) fn is_line(line: &str) -> bool {
     let mut words = line.split_whitespace();
     matches!(words.next(), Some("c" | "p"))

@@ -8,13 +8,14 @@ use crate::number::Bound;
 /// The numbers in the names are seconds, the bounds beside them milliseconds.
 const MILLISECONDS: i64 = 1000;
 
-/// A distribution by its name, such as `N_12.5_0.25`, in the unit of the bounds beside it.
+/// Parses the name of a distribution, such as `N_12.5_0.25`. The result is in the unit of the
+/// bounds.
 ///
-/// The names count in seconds and the bounds in milliseconds. Where the bounds say otherwise (they
-/// do not contain what the name says, unless it is taken as it is), names count like bounds.
+/// Names are in seconds and bounds in milliseconds. If the bounds contain a typical value of the
+/// distribution only without conversion, the name is taken to be in the unit of the bounds.
 ///
 /// # Errors
-/// What is wrong with the name.
+/// A description of the mistake in the name.
 pub(super) fn by_name(name: &str, lower: &Bound, upper: &Bound) -> Result<Duration, String> {
     let seconds = Named::parse(name)?;
     let scaled = seconds.scaled(&Rational::from(MILLISECONDS));

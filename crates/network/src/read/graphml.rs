@@ -18,7 +18,7 @@ use crate::mistake::Report;
 use crate::number::Bound;
 use crate::xml::{self, Element};
 
-/// The node from which times count.
+/// Name of the node that serves as time zero.
 const REFERENCE: &str = "Z";
 /// The label that says "in every case".
 const EMPTY_LABEL: &str = "⊡";
@@ -59,7 +59,7 @@ fn graph<'e>(elements: &'e [Element], report: &mut Report) -> Option<&'e Element
     match graphs[..] {
         [graph] => Some(graph),
         [] => {
-            // Perhaps the head is missing, but what is there tells of a kind that is refused.
+            // The header may be missing, but the nodes can reveal an unsupported kind of network.
             let conditional = elements.iter().find(|element| is_conditional_node(element));
             match conditional {
                 Some(node) => report.mistake(
@@ -94,7 +94,7 @@ fn data<'e>(element: &'e Element, key: &str) -> Option<&'e Element> {
     found.filter(|data| !data.text.trim().is_empty())
 }
 
-/// Where and why a network is of a kind that is refused.
+/// Returns the position and the description of an unsupported kind of network.
 fn unsupported(graph: &Element, ending: &str) -> Option<(usize, String)> {
     if let Some(kind) = data(graph, "NetworkType") {
         let name = kind.text.trim().to_ascii_uppercase();
@@ -124,14 +124,14 @@ fn unsupported(graph: &Element, ending: &str) -> Option<(usize, String)> {
     None
 }
 
-/// Whether a node observes a proposition, or only happens in some cases.
+/// Returns `true` if a node observes a proposition, or only happens in some cases.
 fn is_conditional_node(node: &Element) -> bool {
     let label = data(node, "Label").map(|label| label.text.trim());
     node.name == "node"
         && (data(node, "Obs").is_some() || label.is_some_and(|label| label != EMPTY_LABEL))
 }
 
-/// An edge as it stands in the file.
+/// Edge as given in the file.
 struct Edge {
     at: usize,
     from: NodeId,
@@ -141,7 +141,7 @@ struct Edge {
     labelled: Option<(Case, NodeId, Rational)>,
 }
 
-/// Whether a labelled value is that of a link that ends early, or late.
+/// Case of a labelled value: the link ends at its lower bound, or at its upper bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Case {
     Lower,
@@ -264,7 +264,7 @@ fn contingent_links(builder: &mut Builder, edges: &[Edge], report: &mut Report) 
     }
 }
 
-/// Whether an edge leads from a link's beginning to its end, rather than its counterpart.
+/// Returns `true` if an edge leads from the activation of a link to its end, rather than back.
 fn leads_to_end(edge: &Edge, back: &Edge) -> bool {
     if let Some((_, end, _)) = &edge.labelled {
         return *end == edge.to;

@@ -14,7 +14,7 @@ use crate::json::Json;
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// The node from which times count.
+/// Name of the node that serves as time zero.
 const REFERENCE: &str = "0";
 
 pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFile> {

@@ -17,8 +17,8 @@
 //! A 1 3 C
 //! ```
 //!
-//! `X 12 C` says `C - X <= 12`, and `A 1 3 C` that C comes 1 to 3 after A. Names may stand in
-//! quotes.
+//! `X 12 C` means `C - X <= 12`, and `A 1 3 C` means that C happens 1 to 3 after A. Names may be
+//! quoted.
 
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Format, NetworkFile};
@@ -68,7 +68,8 @@ impl Section {
 /// The state of the reader.
 struct Reader {
     builder: Builder,
-    /// How many time points, edges and links the file says it has, and where it does.
+    /// Numbers of time points, edges and links that the file declares, with the positions of these
+    /// declarations.
     announced: Vec<(What, usize, usize)>,
     edges: usize,
     links: usize,

@@ -2,7 +2,7 @@
 //!
 //! `timepoints`: `id`, `label`; `constraints`: `source`, `sink`, `type`, and either a
 //! `duration_bound` (`lb`, `ub`) or a `distribution` (`mean`, `sd`); `correlations`: groups of
-//! probabilistic constraints with their correlation matrix. 1000000000 stands for infinity.
+//! probabilistic constraints with their correlation matrix. 1000000000 means infinity.
 
 use std::collections::BTreeMap;
 
@@ -51,7 +51,7 @@ fn points(
         let Some(number) = point_name(id, report) else {
             continue;
         };
-        // Labels repeat where an action does; then the number tells them apart.
+        // Labels of repeated actions are not unique, so the number is added.
         let label = point
             .member("label")
             .and_then(Json::text)

@@ -32,7 +32,7 @@ pub enum Density {
     Exponential {
         /// The least value.
         from: Rational,
-        /// The mean of what is added.
+        /// Mean of the exponential part.
         mean: Rational,
     },
     /// The logarithm is normal.
@@ -45,8 +45,8 @@ pub enum Density {
 }
 
 impl Density {
-    /// Whether its numbers are those of a density: what spreads is positive, and what has ends has them
-    /// in order.
+    /// Returns `true` if the parameters describe a density: spreads are positive, and ends are in
+    /// order.
     pub fn is_sound(&self) -> bool {
         match self {
             Self::Uniform { from, to } => from < to,
@@ -144,7 +144,8 @@ impl Density {
         }
     }
 
-    /// Between which two numbers lies the probability between two values, each of which may be missing.
+    /// Returns a lower and an upper bound on the probability between two values. A missing value
+    /// means that the interval is unbounded on that side.
     pub fn between(&self, [lower, upper]: [Option<&Rational>; 2]) -> [Rational; 2] {
         if let (Some(lower), Some(upper)) = (lower, upper)
             && lower >= upper
@@ -209,8 +210,8 @@ impl Density {
         }
     }
 
-    /// The same between two values with a bell-shaped distribution, of which the difference of two
-    /// probabilities of [`at_most`](Self::at_most) would say little where the interval is short.
+    /// Computes [`between`](Self::between) for normal and lognormal distributions. The difference
+    /// of two results of [`at_most`](Self::at_most) would be imprecise for short intervals.
     fn within(&self, ends: [&Rational; 2]) -> Option<[Rational; 2]> {
         match self {
             Self::Normal { mean, deviation } => {
@@ -231,8 +232,8 @@ impl Density {
                 let [below, above] = enclosed::ln(&upper.checked_div(lower)?)?;
                 let least = below.max(twice).checked_div(spread)?;
                 let greatest = above.min(at_most).checked_div(spread)?;
-                // As an interval of this width moves, what it holds rises until its middle is at the
-                // peak, and falls from there on.
+                // The probability of an interval of this width rises until the middle of the
+                // interval is at the peak, and falls after that.
                 let at = |place: &Rational, width: &Rational| {
                     enclosed::normal_between([place, &(place + width)])
                 };
@@ -250,8 +251,8 @@ impl Density {
         }
     }
 
-    /// By how many standard deviations the logarithm of a number differs from its mean, between two
-    /// numbers; `None` for what is not positive.
+    /// Returns a lower and an upper bound on the number of standard deviations by which the
+    /// logarithm of a number differs from the mean; `None` if the number is not positive.
     fn standardized(&self, at: &Rational) -> Option<[Rational; 2]> {
         let Self::Lognormal { location, spread } = self else {
             return None;

@@ -1,9 +1,9 @@
-//! How far the logarithm of a probability is at most above a linear function.
+//! Upper bounds on the difference of the logarithm of a probability and a linear function.
 
 use super::{Cell, Chance, Dense, Reach, Touch};
 use crate::{Rational, enclosed};
 
-/// How a cell sees what is at a cut.
+/// Position of a cut relative to the intervals of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Cut {
     /// There is none, or no interval of the cell reaches it: the interval ends inside.
@@ -12,7 +12,7 @@ pub enum Cut {
     Open {
         /// Its distance from the point.
         place: Rational,
-        /// What it adds.
+        /// Greatest increase of the logarithm from the mass at the cut.
         gain: Rational,
     },
     /// All do: everything on this side of the point is inside.
@@ -89,7 +89,8 @@ impl Chance {
 }
 
 impl Dense {
-    /// How the lower and the upper cut are seen; `None` if nothing can be told of it.
+    /// Returns the positions of the lower and the upper cut relative to the cell; `None` if the
+    /// gain at a cut cannot be computed.
     pub fn seen(&self, point: &Rational, cell: &Cell) -> Option<[Cut; 2]> {
         let [minimum, maximum] = self.cuts();
         let below = minimum.as_ref().map(|cut| point - cut);
@@ -129,8 +130,8 @@ impl Dense {
         Some(seen)
     }
 
-    /// Where an interval of a cell begins and ends for the density alone; `None` where a side counts as
-    /// a whole.
+    /// Returns the ends of an interval of a cell for the density alone; `None` for a side that
+    /// counts as a whole.
     fn ends(&self, point: &Rational, seen: &[Cut; 2], at: &Reach) -> [Option<Rational>; 2] {
         let [minimum, maximum] = self.cuts();
         let lower = (seen[0] != Cut::Inside).then(|| {
@@ -144,14 +145,15 @@ impl Dense {
         [lower, upper]
     }
 
-    /// What an interval has of the density alone.
+    /// Returns bounds on the probability of an interval by the density alone.
     fn part(&self, point: &Rational, seen: &[Cut; 2], at: &Reach) -> [Rational; 2] {
         let ends = self.ends(point, seen, at);
         self.density.between([ends[0].as_ref(), ends[1].as_ref()])
     }
 
-    /// What an interval has of the density alone, and how fast its logarithm rises as its lower and its
-    /// upper end move out, all between two numbers; `None` if that is not known.
+    /// Returns bounds on the probability of an interval by the density alone, and bounds on the
+    /// derivatives of its logarithm as the lower and the upper end move outwards; `None` if they
+    /// are unknown.
     pub fn tangent(
         &self,
         point: &Rational,
@@ -178,8 +180,8 @@ impl Dense {
     }
 }
 
-/// What intervals of a cell have of a list of values: those that all of them have, and, for each side,
-/// the distances at which they come to have more, each with the share of all values that it then has.
+/// Values of a list that the intervals of a cell contain: the share in all intervals, and for each
+/// side the distances at which further values are added, each with the share added so far.
 pub struct Steps {
     /// The share that all of them have.
     pub center: Rational,

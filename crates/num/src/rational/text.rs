@@ -88,7 +88,7 @@ impl FromStr for Rational {
     }
 }
 
-/// Whether the number can be read again when it is written.
+/// Returns `true` if the written number is short enough to be parsed again.
 fn has_few_digits(number: &Rational) -> bool {
     match &number.0 {
         Small(..) => true,

@@ -58,8 +58,8 @@ impl Simplex {
         })
     }
 
-    /// A variable by which the basic variable can be made to rise (or fall): the one that occurs
-    /// in the fewest rows, for the sake of short rows, or the first one.
+    /// Returns a variable that can make the basic variable rise (or fall): the one with the fewest
+    /// rows if `is_greedy`, to keep rows short, otherwise the first one.
     fn entering(&self, basic: VariableId, rises: bool, is_greedy: bool) -> Option<VariableId> {
         let row = self.tableau.row(basic).iter();
         let mut suitable = row
@@ -72,7 +72,7 @@ impl Simplex {
         }
     }
 
-    /// Whether `other` can move so that `coefficient · other` rises (or falls).
+    /// Returns `true` if `other` can move so that `coefficient · other` rises (or falls).
     pub(super) fn can_move(&self, other: VariableId, coefficient: &Rational, rises: bool) -> bool {
         let variable = &self.variables[other.index()];
         if coefficient.is_positive() == rises {

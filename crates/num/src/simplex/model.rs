@@ -20,8 +20,8 @@ impl Simplex {
             .collect()
     }
 
-    /// A positive rational that may stand for δ: whatever bound holds for the infinitesimal, holds
-    /// for this number (Dutertre & de Moura, section 5).
+    /// Returns a positive rational that can replace δ: every bound that holds for the infinitesimal
+    /// also holds for this number (Dutertre & de Moura, section 5).
     fn small_enough_delta(&self) -> Rational {
         let mut delta = Rational::ONE;
         for variable in &self.variables {

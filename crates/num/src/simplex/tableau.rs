@@ -64,7 +64,7 @@ impl Tableau {
             .expect("only basic variables are asked for their row")
     }
 
-    /// The basic variables that depend on `variable`, and by which coefficient.
+    /// Returns the basic variables that depend on `variable`, with their coefficients.
     pub(super) fn column(
         &self,
         variable: VariableId,

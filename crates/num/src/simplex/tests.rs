@@ -78,7 +78,7 @@ fn tightest(system: Vec<Inequality>) -> Vec<Inequality> {
     bounds.into_iter().map(unfold).collect()
 }
 
-/// Whether the inequalities have a solution.
+/// Returns `true` if the inequalities have a solution.
 fn is_feasible(system: &[Inequality], variable_count: usize) -> bool {
     let rest = (0..variable_count).fold(system.to_vec(), |rest, v| eliminated(&rest, v));
     rest.iter().all(|left| left.bound >= Delta::ZERO)
@@ -168,8 +168,9 @@ impl System {
     }
 }
 
-/// Whether the multipliers prove that the inequalities have no solution. A bound on a single
-/// variable was divided by the size of its coefficient, so its multiplier is too.
+/// Returns `true` if the multipliers prove that the inequalities have no solution. A bound on a
+/// single variable was divided by the size of its coefficient, so its multiplier is divided as
+/// well.
 fn proves(infeasible: &Infeasible, system: &[Inequality], variable_count: usize) -> bool {
     let mut sum = Inequality {
         coefficients: vec![Rational::ZERO; variable_count],
