@@ -39,8 +39,8 @@ pub struct Branching<'a, Q> {
     pub bounds: Vec<OpenBound<Q>>,
     /// The number of time points.
     pub node_count: usize,
-    /// Whether a quantity bounds one difference only, from above and from below: no simple cycle
-    /// takes both bounds.
+    /// Returns `true` if a quantity bounds only one difference, from above and from below. No
+    /// simple cycle contains both bounds.
     pub is_pair: &'a dyn Fn(Q) -> bool,
     /// The least and the greatest value of a quantity.
     pub value: &'a dyn Fn(Q, Side) -> Rational,
@@ -94,7 +94,7 @@ impl<Q: Copy + Ord> Branching<'_, Q> {
         Ok(None)
     }
 
-    /// Quantities of which there is one value only.
+    /// Returns the quantities with only one value.
     fn points(&self) -> Corner<Q> {
         let quantities = self.bounds.iter().filter_map(|bound| bound.quantity);
         quantities
@@ -174,8 +174,8 @@ struct Walks<'a, Q> {
     weights: &'a [Rational],
     leaving: Vec<Vec<usize>>,
     labels: Vec<Label>,
-    /// For each node, the shortest way to it, and, if that one may not go on everywhere, the
-    /// shortest with another last quantity.
+    /// For each node, the shortest walk to it. If that walk excludes some continuation, also the
+    /// shortest walk with another last quantity.
     best: Vec<[Option<usize>; 2]>,
 }
 
@@ -204,8 +204,8 @@ impl<'a, Q: Copy + Ord> Walks<'a, Q> {
 
     /// A closed walk of negative length, as edges.
     fn negative(mut self) -> Option<Vec<usize>> {
-        // A way over so many edges is at some node three times. Two labels are kept for a node,
-        // so it was shorter the third time than one time before.
+        // A walk with `enough` edges visits some node three times. At most two labels are kept for
+        // a node, so the walk was shorter at the third visit than at an earlier one.
         let enough = 2 * self.network.node_count + 2;
         let mut look_at = 8.min(enough);
         let mut waiting: VecDeque<usize> = (0..self.network.node_count).collect();
@@ -241,7 +241,8 @@ impl<'a, Q: Copy + Ord> Walks<'a, Q> {
         (self.network.is_pair)(quantity).then_some(quantity)
     }
 
-    /// Whether the edge may follow, and no better label goes over it.
+    /// Returns `true` if the edge may follow this label, and no better label extends along the
+    /// edge.
     fn may_take(&self, label: usize, edge: usize) -> bool {
         let Label { node, last, .. } = self.labels[label];
         let own = self.pair(edge);

@@ -7,18 +7,18 @@ use elbowroom_num::Rational;
 
 use crate::{ConstraintId, Network, NodeId, Schedule, Weight, spend_step};
 
-/// Why a network is inconsistent: constraints that follow each other in a circle and sum up to
-/// `0 <= total < 0`.
+/// Proof that a network is inconsistent: a cycle of constraints that sum up to `0 <= total < 0`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NegativeCycle<W = Rational> {
-    /// The cycle's edges in the order in which one walks along them.
+    /// Edges of the cycle, in order.
     pub constraints: Vec<ConstraintId>,
     /// The sum of their bounds. At least one of them must be relaxed, by `-total` in all.
     pub total: W,
 }
 
 impl<W: Weight> NegativeCycle<W> {
-    /// Whether these constraints of `network` form a cycle whose bounds sum up to `total < 0`.
+    /// Returns `true` if these constraints of `network` form a cycle whose bounds sum up to `total
+    /// < 0`.
     pub fn holds_in(&self, network: &Network<W>) -> bool {
         let edges = || self.constraints.iter().map(|&id| network.constraint(id));
         let nexts = edges().skip(1).chain(edges().take(1));
@@ -42,10 +42,10 @@ impl<W: fmt::Debug> fmt::Display for NegativeCycle<W> {
 impl<W: fmt::Debug> std::error::Error for NegativeCycle<W> {}
 
 impl<W: Weight> Network<W> {
-    /// A schedule, or a proof that there is none. Worst case nodes · constraints; near linear on
-    /// networks as plans have them.
+    /// Returns a schedule, or a proof that there is none. Worst case nodes · constraints; near
+    /// linear on networks of plans.
     ///
-    /// The schedule is the latest one in which no node comes after time zero.
+    /// The schedule is the latest one with no node after time zero.
     ///
     /// # Errors
     /// A cycle of negative length.
@@ -97,14 +97,14 @@ impl<W: Weight> Network<W> {
 /// a node whose time falls loses its subtree (Tarjan 1981): the nodes in it are about to be
 /// improved anyway, and if the cause of the fall is among them, there is a negative cycle.
 struct Tree {
-    /// The edge by which a node hangs on its parent; `None` below the root.
+    /// Edge from the parent of a node; `None` for children of the root.
     via: Vec<Option<ConstraintId>>,
     /// The distance from the root; `None` for nodes that are cut off.
     depth: Vec<Option<u32>>,
     /// The nodes of the tree in depth-first order, as a ring through the root.
     next: Vec<usize>,
     previous: Vec<usize>,
-    /// Whether a node waits to be looked at; those that are cut off need not be.
+    /// `true` if a node is waiting to be processed; detached nodes need not be processed.
     is_queued: Vec<bool>,
 }
 

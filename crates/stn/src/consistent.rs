@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 
 use crate::{Constraint, ConstraintId, NegativeCycle, Network, NodeId, Schedule, Weight};
 
-/// A network and a schedule in which all its constraints hold.
+/// Network with a schedule that satisfies all its constraints.
 #[derive(Clone, Debug)]
 pub struct ConsistentNetwork<W = Rational> {
     network: Network<W>,
@@ -24,7 +24,7 @@ pub struct ConsistentNetwork<W = Rational> {
 pub struct Checkpoint {
     node_count: usize,
     constraint_count: usize,
-    /// How many moves are remembered.
+    /// Number of recorded moves.
     moves: usize,
 }
 
@@ -86,7 +86,7 @@ impl<W: Weight> ConsistentNetwork<W> {
         self.network
     }
 
-    /// Some schedule in which every constraint holds. It depends on the order of additions.
+    /// Returns a schedule that satisfies every constraint. It depends on the order of additions.
     pub fn schedule(&self) -> &Schedule<W> {
         &self.schedule
     }
@@ -155,12 +155,13 @@ impl<W: Weight> ConsistentNetwork<W> {
         self.former.iter().flatten().map(|(node, _)| *node)
     }
 
-    /// Like [`undo_to`](Self::undo_to), and goes back to the times that nodes had at `checkpoint` as well, if they
-    /// were [remembered](Self::remember_times). Takes time in proportion to what has moved since.
+    /// Like [`undo_to`](Self::undo_to), but also restores the times that nodes had at `checkpoint`,
+    /// if they were [remembered](Self::remember_times). Takes time in proportion to the moves since
+    /// then.
     ///
-    /// Without that, times only ever move back, a little with each constraint that is tried; with
-    /// it they stay within what the constraints that are left and those tried since can add up to,
-    /// so that machine integers as weights can be chosen not to overflow.
+    /// Without this call, times only ever decrease, a little with each constraint that is tried.
+    /// With this call, their range is limited by the remaining constraints and those tried since.
+    /// Machine integers can then be used as weights without overflow.
     pub fn go_back_to(&mut self, checkpoint: Checkpoint) {
         for (node, time) in self
             .former
@@ -199,11 +200,11 @@ impl<W: Weight> ConsistentNetwork<W> {
 struct Repair<W> {
     /// An earlier time for a node, and the constraint that demands it.
     proposed: Vec<Option<(W, ConstraintId)>>,
-    /// Whether the proposed time is final.
+    /// `true` if the proposed time is final.
     is_final: Vec<bool>,
     /// The nodes with a proposal.
     moved: Vec<NodeId>,
-    /// Nodes to look at, by how much they move: the largest step back first.
+    /// Nodes to process, ordered by how much they move: the largest step back first.
     queue: BinaryHeap<Reverse<(W, NodeId)>>,
 }
 

@@ -1,4 +1,4 @@
-//! What stands for time points and constraints.
+//! Identifiers of time points and constraints.
 
 use std::fmt;
 
@@ -23,7 +23,7 @@ impl fmt::Display for NodeId {
     }
 }
 
-/// A constraint's place in the order in which the constraints were added.
+/// Identifier of a constraint: its position in the order of addition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ConstraintId(pub u32);
 

@@ -22,10 +22,11 @@ impl<W: Weight> ConsistentNetwork<W> {
         self.implied_seen_from(self.schedule(), keep)
     }
 
-    /// The same, by slacks in this schedule of the network.
+    /// Computes [`implied`](Self::implied) with slacks in this schedule of the network.
     ///
-    /// Any schedule leads to the same constraints, but not in the same time: a search goes as far as
-    /// the slack of what it is about. Where little happens at once in the schedule, that is near.
+    /// Every schedule gives the same constraints, but not in the same time: the search for a
+    /// constraint explores nodes at distances up to its slack. That is a smaller region if few
+    /// nodes coincide in the schedule.
     pub fn implied_seen_from(
         &self,
         schedule: &Schedule<W>,
@@ -91,7 +92,7 @@ struct Search<'a, W> {
     network: &'a ConsistentNetwork<W>,
     schedule: &'a Schedule<W>,
     slack: Vec<W>,
-    /// Whether the caller allows to leave a constraint out.
+    /// `true` if the caller allows that a constraint is left out.
     can_go: Vec<bool>,
     /// The constraints left out so far. Those that are not imply all of these.
     is_gone: Vec<bool>,
@@ -134,9 +135,10 @@ impl<W: Weight> Search<'_, W> {
         }
     }
 
-    /// Whether edges without slack lead from the constraint's `from` to its `to` without it.
+    /// Returns `true` if edges without slack lead from the constraint's `from` to its `to` without
+    /// it.
     ///
-    /// `mark` holds for each node the last search that saw it.
+    /// `mark` holds for each node the last search that visited it.
     fn has_tight_detour(&self, avoided: ConstraintId, mark: &mut [Option<ConstraintId>]) -> bool {
         let network = self.network.network();
         let edge = network.constraint(avoided);
@@ -259,11 +261,12 @@ impl<W> Outgoing<W> {
     }
 }
 
-/// A group with so many edges is a hub.
+/// Number of edges from which a group can be a hub.
 const MANY_EDGES: usize = 8;
 
-/// The group from which most edges lead, and how far it is from everywhere: mostly that of the beginning, to which windows
-/// and deadlines bind all else. A search that went on from there would go everywhere.
+/// Group with the most outgoing edges, and its distances to and from all groups. It usually
+/// contains the beginning of the plan, because windows and deadlines are constraints to the
+/// beginning. A search that continued from the hub would visit the whole network.
 struct Hub<W> {
     group: usize,
     /// The lengths of the shortest paths from each group to the hub, and from the hub to each, but for the hub's own time:
@@ -308,7 +311,7 @@ impl<W: Weight> Hub<W> {
 struct Reach<W> {
     /// The length of the shortest path found.
     length: Vec<Option<W>>,
-    /// Whether a path of two or more edges is at least as short as the shortest single edge.
+    /// `true` if a path of two or more edges is at least as short as the shortest single edge.
     has_detour: Vec<bool>,
     is_final: Vec<bool>,
     touched: Vec<usize>,

@@ -51,13 +51,13 @@ enum Source {
 /// One end of a time window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WindowEnd {
-    /// How early the node may be.
+    /// Earliest time of the node.
     Earliest,
-    /// How late the node may be.
+    /// Latest time of the node.
     Latest,
 }
 
-/// Why one end of a window is where it is.
+/// Explanation of one end of a window: the path of constraints that implies it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grounds {
     /// The node where it begins: one with a limit of its own, or the origin.
@@ -173,7 +173,7 @@ impl<W: Weight> MovingWindows<W> {
         Ok(())
     }
 
-    /// Why one end of a node's window is where it is; `None` if it is infinite.
+    /// Returns the explanation of one end of a node's window; `None` if that end is infinite.
     pub fn grounds(&self, node: NodeId, end: WindowEnd) -> Option<Grounds> {
         let window = self.window(node);
         match end {

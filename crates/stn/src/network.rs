@@ -11,9 +11,9 @@ use crate::{ConstraintId, Direction, NodeId, Schedule, Weight};
 /// "`to` at least `-bound` before `from`".
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Constraint<W = Rational> {
-    /// Where the edge begins: the time that is subtracted.
+    /// Source of the edge: the time point that is subtracted.
     pub from: NodeId,
-    /// Where the edge ends.
+    /// Target of the edge.
     pub to: NodeId,
     /// The upper bound of the difference.
     pub bound: W,
@@ -38,7 +38,7 @@ impl<W: Weight> Constraint<W> {
         }
     }
 
-    /// Whether `schedule[to] - schedule[from] <= bound`.
+    /// Returns `true` if `schedule[to] - schedule[from] <= bound`.
     pub fn holds_in(&self, schedule: &Schedule<W>) -> bool {
         schedule[self.to] <= schedule[self.from].plus(&self.bound)
     }
@@ -178,15 +178,15 @@ impl<W: Weight> Network<W> {
         rest
     }
 
-    /// All nodes in the order in which a depth-first search along the edges for which
-    /// `is_followed` holds leaves them: if no cycle is followed, `to` before `from`.
+    /// Returns all nodes in postorder of a depth-first search along the edges for which
+    /// `is_followed` holds: without cycles of such edges, `to` comes before `from`.
     pub(crate) fn depth_first_postorder(
         &self,
         is_followed: impl Fn(ConstraintId) -> bool,
     ) -> Vec<NodeId> {
         let mut finished = Vec::with_capacity(self.node_count());
         let mut is_seen = vec![false; self.node_count()];
-        // Nodes, each with the next constraint to look at.
+        // Nodes, each with the next constraint to visit.
         let mut path: Vec<(NodeId, Option<ConstraintId>)> = Vec::new();
         for root in self.nodes() {
             if !std::mem::replace(&mut is_seen[root.index()], true) {
@@ -208,8 +208,8 @@ impl<W: Weight> Network<W> {
         finished
     }
 
-    /// For each node, a number that it shares with just those nodes to and from which edges lead,
-    /// whatever their bounds. No edges lead to nodes with smaller numbers.
+    /// Returns the strongly connected component of each node, whatever the bounds. No edges lead to
+    /// components with smaller numbers.
     pub fn components(&self) -> Vec<usize> {
         // Kosaraju's algorithm: the last one left first, and against the edges.
         let order = self.depth_first_postorder(|_| true);
@@ -226,9 +226,9 @@ impl<W: Weight> Network<W> {
         component
     }
 
-    /// Takes back the last constraints and nodes, until so many are left.
+    /// Removes the last constraints and nodes until these numbers remain.
     ///
-    /// No constraint that stays may mention a node that goes.
+    /// No remaining constraint may mention a removed node.
     pub(crate) fn truncate(&mut self, node_count: usize, constraint_count: usize) {
         while self.constraints.len() > constraint_count {
             if let Some(constraint) = self.constraints.pop() {
@@ -242,7 +242,7 @@ impl<W: Weight> Network<W> {
 }
 
 impl<W: Weight> Schedule<W> {
-    /// Whether every constraint of `network` holds.
+    /// Returns `true` if every constraint of `network` holds.
     pub fn holds_in(&self, network: &Network<W>) -> bool {
         self.times().len() == network.node_count()
             && network

@@ -1,4 +1,4 @@
-//! Shortest paths: the tightest bounds that follow, and from which constraints they follow.
+//! Shortest paths: the tightest implied bounds, with the constraints that imply them.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
@@ -25,7 +25,7 @@ impl<W: Weight> ShortestPaths<W> {
         self.root
     }
 
-    /// Whether the paths begin or end at the root.
+    /// Returns whether the paths begin or end at the root.
     pub fn direction(&self) -> Direction {
         self.direction
     }

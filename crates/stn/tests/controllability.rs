@@ -89,7 +89,8 @@ fn strong_implies_dynamic_and_its_times_satisfy_everything_at_the_corners() {
         assert!(network.is_dynamically_controllable(), "seed {seed}");
         for corner in 0..1 << board.links.len() {
             let mut times = schedule.times().to_vec();
-            // Links are in no order: what others begin with is settled after so many rounds.
+            // Links are in no order, so it takes up to one round per link until all activations are
+            // known.
             for _ in 0..board.links.len() {
                 for (index, &(activation, end, lower, upper)) in board.links.iter().enumerate() {
                     let duration = if corner >> index & 1 == 0 {
@@ -109,7 +110,7 @@ fn strong_implies_dynamic_and_its_times_satisfy_everything_at_the_corners() {
     assert!(both.iter().all(|&count| count > 100), "{both:?}");
 }
 
-/// How the world chooses durations.
+/// Policy of the world for choosing durations.
 #[derive(Clone, Copy, Debug)]
 enum World {
     Early,

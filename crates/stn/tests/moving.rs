@@ -8,7 +8,7 @@ use elbowroom_stn::{
 use proptest::prelude::*;
 use proptest::sample::Index;
 
-/// What a test asks of one node.
+/// Kind of limit that a test sets on a node.
 #[derive(Clone, Copy, Debug)]
 enum Limit {
     Fix,

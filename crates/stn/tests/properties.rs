@@ -240,7 +240,8 @@ fn leads(
     Ok(())
 }
 
-/// What `implied` names may go, and of the rest only what `keep` holds in may go too.
+/// Checks that the constraints of `implied` can be removed, and that of the others only those of
+/// `keep` could be removed as well.
 fn thins_out_to_the_least<W: Weight>(
     network: &Network<W>,
     keep: impl Fn(ConstraintId) -> bool,
@@ -248,7 +249,7 @@ fn thins_out_to_the_least<W: Weight>(
     let consistent = ConsistentNetwork::try_from(network.clone()).expect("consistent");
     let implied = consistent.implied(&keep);
     prop_assert!(implied.is_sorted());
-    // Whatever schedule it is looked at from.
+    // The result does not depend on the schedule.
     for root in network.nodes() {
         for schedule in [
             consistent.earliest_schedule(root),

@@ -107,8 +107,8 @@ fn a_network_that_a_refutation_still_fits_is_not_controllable() {
     );
 }
 
-/// Each link may take a little longer than the time until the next one's earliest start, so that the last one ends too late: what
-/// follows from what lies as deep as there are links.
+/// Each link may take a little longer than the time until the next one's earliest start, so that
+/// the last one ends too late. The derivation is nested as deeply as there are links.
 #[test]
 fn a_conflict_along_many_windows_is_told_flat() {
     let (period, more, room) = (10_000, 1, 2_000);

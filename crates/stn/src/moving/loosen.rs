@@ -5,12 +5,12 @@ use crate::direction::Direction;
 use crate::{ConstraintId, NodeId, Weight};
 
 impl<W: Weight> MovingWindows<W> {
-    /// From now on a constraint only demands `to - from <= bound`, or nothing if that is `None`.
-    /// A bound that demands more than it does so far changes nothing.
+    /// Loosens a constraint to `to - from <= bound`, or lifts it if `bound` is `None`. A bound that
+    /// is tighter than the current one changes nothing.
     ///
-    /// Costs time in proportion to the window ends that came from the constraint, and the
-    /// constraints at these: their paths are looked for again, beginning where those end that did
-    /// not come from it (cf. Ramalingam & Reps, *J. Algorithms* 21, 1996, on deletions).
+    /// Costs time in proportion to the window ends that depend on the constraint, and to the
+    /// constraints at these nodes. Their paths are searched again, from nodes whose window ends do
+    /// not depend on it (cf. Ramalingam & Reps, *J. Algorithms* 21, 1996, on deletions).
     pub fn loosen(&mut self, id: ConstraintId, bound: Option<W>) {
         match bound {
             None if self.is_lifted(id) => return,
@@ -40,7 +40,7 @@ impl<W: Weight> MovingWindows<W> {
             while let Some(id) = next {
                 next = self.network.after(id, direction);
                 let far = direction.far_end(self.network.constraint(id));
-                // Paths make a tree: nobody is met twice.
+                // The paths form a tree, so no node is visited twice.
                 if self.source(direction, far) == Source::Constraint(id) {
                     lost.push(far);
                 }
@@ -61,7 +61,7 @@ impl<W: Weight> MovingWindows<W> {
                     continue;
                 }
                 let constraint = self.network.constraint(id);
-                // What is lost as well is queued when it is found again.
+                // A neighbour whose window end is also lost is queued when it is found again.
                 let Some(near) = self.distance(direction, back.far_end(constraint)) else {
                     continue;
                 };

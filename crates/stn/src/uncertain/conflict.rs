@@ -1,4 +1,4 @@
-//! Why a network is not dynamically controllable.
+//! Proofs that a network is not dynamically controllable.
 
 use elbowroom_num::Rational;
 
@@ -16,17 +16,16 @@ pub enum Ground {
     Late(LinkId),
 }
 
-/// `to - from <= bound` in the case that the conflict tells of.
+/// Constraint `to - from <= bound` that holds in the case described by the conflict.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Step<W = Rational> {
     /// The time point that is subtracted.
     pub from: NodeId,
     /// The time point it is subtracted from.
     pub to: NodeId,
-    /// What the difference does not exceed; infinite where a link without an upper bound lasts
-    /// for ever.
+    /// Upper bound of the difference; infinite if a link without an upper bound never ends.
     pub bound: Extended<W>,
-    /// Where it comes from.
+    /// Origin of the bound.
     pub ground: Ground,
 }
 
@@ -37,7 +36,7 @@ pub struct Conflict<W = Rational> {
     /// The cycle, step by step; each begins where the one before ends, the first where the last
     /// ends. A very long cycle is cut short ([`Conflict::is_whole`]).
     pub steps: Vec<Step<W>>,
-    /// Whether `steps` has all of the cycle.
+    /// `true` if `steps` contains the whole cycle.
     pub is_whole: bool,
     /// The length of the whole cycle; negative.
     pub total: Extended<W>,

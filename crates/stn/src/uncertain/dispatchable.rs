@@ -1,4 +1,4 @@
-//! A network in a form by which it can be executed event by event.
+//! Dispatchable form of a network, for event-by-event execution.
 
 use super::graph::{EdgeId, Graph, Kind, Origin};
 use super::{Extended, Ground, LinkId, Step, UncertainNetwork};
@@ -22,7 +22,8 @@ pub struct Dispatchable<W> {
     entering: Vec<Vec<EdgeId>>,
     /// For each node, the waits that begin when it happens.
     waits_at: Vec<Vec<Wait<W>>>,
-    /// For each node, those that have to have happened before. Where the world decides, nobody sees to it.
+    /// For each node, the nodes that must have happened before it. The dispatcher does not enforce
+    /// the entries of nodes that the world decides on.
     before: Vec<Vec<NodeId>>,
     /// For each node, those that may not be later although they may fall together with it, and
     /// that no other edge holds to that; and the edge that says so.
@@ -100,9 +101,9 @@ impl<W: Weight> Dispatchable<W> {
         form
     }
 
-    /// What comes at the same time or later waits for what comes first: that the two may fall
-    /// together says nothing of their order. Nodes that have to fall together wait for none of
-    /// each other, but all for the world.
+    /// Makes nodes wait for nodes that are required to be earlier or simultaneous. A requirement
+    /// with bound 0 does not fix the order of simultaneous events. Nodes that must be simultaneous
+    /// do not wait for each other, but each of them waits for nodes that the world decides on.
     fn follow_at_once(&mut self) {
         let together = self.together();
         let requirements = &self.network.requirements;
@@ -129,7 +130,7 @@ impl<W: Weight> Dispatchable<W> {
         &self.not_after[node.index()]
     }
 
-    /// Whether the world has a choice when a node happens.
+    /// Returns `true` if the world can choose when a node happens.
     fn is_up_to_the_world(&self, node: NodeId) -> bool {
         let mut at = node;
         while let Some(link) = self.network.ending_at(at) {
@@ -230,7 +231,7 @@ impl<W: Weight> Dispatchable<W> {
         })
     }
 
-    /// The path that an edge stands for, from its beginning to its end.
+    /// Returns the path that implies an edge, from its beginning to its end.
     pub(super) fn behind(&self, edge: EdgeId) -> Vec<Step<W>> {
         let mut edges = Vec::new();
         self.graph.spelt_out(edge, MOST_STEPS, &mut edges);

@@ -13,13 +13,13 @@ use crate::{NodeId, Weight, WindowEnd, spend_step};
 
 /// Executes a [`Dispatchable`] network by the rules of RTE* (Hunsberger & Posenato, ICAART 2024):
 ///
-/// - a point may happen when all that must come before it have happened, its window has opened, and
-///   none of its waits is on any more;
-/// - a wait is over when the end that it waits for has happened, or when its time is up;
+/// - a point may happen when all its predecessors have happened, its window has opened, and none of
+///   its waits is active any more;
+/// - a wait is over when the link's end has happened, or when its time is up;
 /// - an event updates the windows of its neighbours only.
 ///
-/// It has no clock: it is told what happens, and asked what may. An event costs time in proportion
-/// to the edges at its node.
+/// It has no clock: the caller reports events with their times, and queries the points that may
+/// happen. An event costs time in proportion to the edges at its node.
 #[derive(Clone, Debug)]
 pub struct Dispatcher<W = Rational> {
     form: Arc<Dispatchable<W>>,
@@ -31,14 +31,15 @@ pub struct Dispatcher<W = Rational> {
     /// For each node that has not happened, its window, as far as events have shown it, and the
     /// edge that each end comes by.
     windows: Vec<[Option<(W, EdgeId)>; 2]>,
-    /// For each node, its waits that are on. Those of nodes that the world decides on say when it has to be, and nobody
-    /// sees to them.
+    /// For each node, its active waits. The waits of nodes that the world decides on are not
+    /// enforced; they restrict the times that the remaining network allows.
     waits: Vec<Vec<ActiveWait<W>>>,
     /// For each link, the nodes with a wait for its end.
     waiting_for: Vec<Vec<NodeId>>,
     /// Nodes that the executor chooses and that have all behind them that must come before.
     ready: BTreeSet<NodeId>,
-    /// Links under way that may end later than their upper bound says: by when, `None` if there is no such time.
+    /// Running links that may end later than their upper bound, each with its latest end; `None` if
+    /// it has none.
     prolonged: Vec<(LinkId, Option<W>)>,
 }
 
@@ -57,14 +58,14 @@ pub struct Missed<W = Rational> {
     pub node: NodeId,
     /// The end of the window that was missed.
     pub end: WindowEnd,
-    /// Where that end was.
+    /// Limit that this end of the window set.
     pub limit: W,
     /// By how much it was missed; positive.
     pub by: W,
     /// The path behind that end, from the event that it counts from.
     pub behind: Vec<Step<W>>,
-    /// Whether the time is outside nothing but the bounds of the link that ends there: whatever else is known of the
-    /// node permits it. What comes after may then still work: see [`Dispatcher::bears`].
+    /// `true` if the time violates only the bounds of the link that ends at the node, and no other
+    /// constraint. The remaining network may then still be executable: see [`Dispatcher::bears`].
     pub is_only_link: bool,
 }
 
@@ -115,7 +116,7 @@ impl<W: Weight> Dispatcher<W> {
         self.ready.iter().copied()
     }
 
-    /// Whether all that must come before a node has happened.
+    /// Returns `true` if all predecessors of a node have happened.
     pub fn is_ready(&self, node: NodeId) -> bool {
         self.ready.contains(&node)
     }

@@ -10,7 +10,7 @@ use crate::Weight;
 /// it for one unnamed number above all others keeps sums and comparisons exact.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Extended<W> {
-    /// How many infinities.
+    /// Number of infinities.
     pub infinite: i64,
     /// The rest.
     pub finite: W,

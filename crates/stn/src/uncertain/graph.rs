@@ -21,7 +21,7 @@ pub(super) struct Edge<W> {
     pub(super) origin: Origin,
 }
 
-/// The label of an edge: the case in which it holds.
+/// Label of an edge: the condition for it to hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Always.
@@ -37,12 +37,12 @@ pub(super) enum Kind {
 pub(super) enum Origin {
     Requirement(ConstraintId),
     Link(LinkId),
-    /// It stands for a way.
+    /// Derived from a way.
     Way(WayId),
 }
 
-/// Where searches find more edges than this multiple of the network's, or where there are no more than
-/// that, it is asked whether an edge says anything.
+/// Redundant edges are detected if the search has found more than `FEW` times the network's own
+/// edges, or if the network has at most `SMALL` edges.
 const FEW: usize = 2;
 const SMALL: usize = 100;
 
@@ -58,7 +58,8 @@ pub(super) struct Way {
 }
 
 impl Way {
-    /// An edge, and what is left of a way after it. A network may have millions of them: numbers are kept short.
+    /// Creates a way from an edge and the way that follows it. Numbers are stored in 32 bits,
+    /// because a network may have millions of ways.
     pub(super) fn new(edge: EdgeId, rest: Option<WayId>) -> Self {
         let short = |number: usize| u32::try_from(number).expect("fewer than 2^32 ways");
         Self {
@@ -91,9 +92,9 @@ pub(super) struct Graph<W> {
     /// For each node, those that it comes after in every execution, because a negative edge of the
     /// network leads to them, plain or of a link. (That of a link without any duration is not negative.)
     earlier: Vec<Vec<NodeId>>,
-    /// What follows from that, once it was asked.
+    /// Order that follows from `earlier`, computed on first use.
     order: Option<Order>,
-    /// Whether every edge that is found is kept.
+    /// `true` if redundant edges are kept as well.
     pub(super) is_full: bool,
     /// The number of edges that are the network's own: two for each link, after those of the
     /// requirements.
@@ -202,8 +203,8 @@ impl<W: Weight> Graph<W> {
         id
     }
 
-    /// Whether a node comes after another in every execution, as far as that is asked: it takes a while to
-    /// find out, and is worth it only where much is found.
+    /// Returns `true` if a node comes after another in every execution. Always `false` while the
+    /// search has found few edges in a large network, because the computation would not pay off.
     pub(super) fn is_after(&mut self, later: NodeId, first: NodeId) -> bool {
         let is_little = self.given > SMALL && self.edges.len() <= FEW * self.given;
         if self.is_full || is_little {

@@ -9,20 +9,20 @@ use crate::{NodeId, Weight};
 /// Leftovers of earlier searches may grow to this multiple of one search's results.
 const MOST_LEFTOVERS: usize = 4;
 
-/// A dynamically controllable network whose links can be given other bounds, one at a time.
+/// Dynamically controllable network that supports changes of link bounds, one link at a time.
 ///
-/// What was found for one negative node depends on the nodes by which negative ways lead to it, and
-/// on the edges that end at these. Only what depends on the link is searched again, directly or by
-/// way of other nodes that do; in the networks of plans that is a few nodes of many.
+/// The edges found for a negative node depend on the nodes through which negative ways lead to it,
+/// and on the edges that end at these. Only nodes that depend on the link, directly or indirectly,
+/// are searched again. In the networks of plans these are few.
 #[derive(Clone, Debug)]
 pub struct Recheck<W> {
     network: UncertainNetwork<W>,
     graph: Graph<W>,
-    /// For each node, those by which negative ways lead to it.
+    /// For each node, the nodes through which negative ways lead to it.
     regions: Vec<Vec<NodeId>>,
     /// For each node, how many of the edges that end there and are not negative are the network's.
     given: Vec<usize>,
-    /// How many edges and ways the last search of the whole network found.
+    /// Number of edges and ways that the last search of the whole network found.
     fresh: usize,
 }
 
@@ -82,7 +82,7 @@ impl<W: Weight> Recheck<W> {
         }
         let mut first = vec![link.activation];
         if lower != link.lower {
-            // Whoever comes by the link's end may go on along its lower-case edge.
+            // Ways through the link's end may continue along its lower-case edge.
             first.extend(self.nodes_by_way_of(link.end));
         }
         let dirty = self.depending_on(first);
@@ -133,7 +133,7 @@ impl<W: Weight> Recheck<W> {
         (link.lower, link.upper) = (lower, upper);
     }
 
-    /// Takes away what was found for these nodes.
+    /// Removes the edges found for these nodes, and returns them.
     fn forget(&mut self, nodes: &[NodeId]) -> Vec<Before> {
         let before = nodes.iter().map(|&node| Before {
             node,
@@ -143,7 +143,7 @@ impl<W: Weight> Recheck<W> {
         before.collect()
     }
 
-    /// The nodes to which negative ways lead by way of that one.
+    /// Returns the nodes to which negative ways lead through `node`.
     fn nodes_by_way_of(&self, node: NodeId) -> impl Iterator<Item = NodeId> + '_ {
         let nodes = self.network.requirements.nodes();
         nodes.filter(move |other| self.regions[other.index()].contains(&node))

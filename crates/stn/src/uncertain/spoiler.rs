@@ -7,15 +7,15 @@ use elbowroom_num::{Delta, Rational};
 use super::{ContingentLink, LinkId, UncertainNetwork};
 use crate::{Constraint, Network, NodeId, Weight};
 
-/// How many parts make up a unit of the whole numbers in which times are compared.
+/// Number of parts per unit in the integer representation of times.
 const PARTS: i128 = 1 << 40;
 
-/// Chooses when links end, so that the executor loses if it can be made to lose.
+/// Adversary that chooses when links end, so that the executor fails whenever that can be forced.
 ///
-/// Where a network is not dynamically controllable, no executor can be sure to win. So whatever an
-/// executor has done, it loses either if a link ends now, or if it goes on: the spoiler asks which,
-/// each time that something has happened or could happen, and sees to it. It knows nothing of what
-/// the executor is going to do.
+/// If a network is not dynamically controllable, no executor can guarantee success. After any
+/// prefix of an execution, the executor can be made to fail either by ending a link now or by
+/// continuing it. The spoiler decides between the two each time that something has happened or
+/// could happen. It does not know the executor's next decisions.
 #[derive(Clone, Debug)]
 pub struct Spoiler {
     network: UncertainNetwork,
@@ -33,7 +33,7 @@ impl Spoiler {
         &self.network
     }
 
-    /// The links that end now, in order. `happened` has the times of what has happened, by node,
+    /// Returns the links that end now, in order. `happened` has the times of past events, by node,
     /// counted from the origin.
     pub fn ends_now(&self, now: &Rational, happened: &[Option<Rational>]) -> Vec<LinkId> {
         let mut happened = happened.to_vec();
@@ -58,7 +58,7 @@ impl Spoiler {
         ending
     }
 
-    /// A link that may end now, and of which it has not been decided that it ends later.
+    /// Returns a link that may end now, unless it is in `later`.
     fn next_candidate(
         &self,
         now: &Rational,
@@ -85,7 +85,8 @@ impl Spoiler {
         looks.flatten().filter(|look| look > now).min()
     }
 
-    /// Whether no executor can be sure to win any more, if these links do not end now.
+    /// Returns `true` if no executor can guarantee success any more, provided that these links do
+    /// not end now.
     fn is_lost(
         &self,
         now: &Rational,
@@ -123,8 +124,8 @@ impl Spoiler {
         }
     }
 
-    /// The network with what has happened fixed and everything else not before now, or after now.
-    /// `None` if some number cannot be had.
+    /// Returns the network with past events fixed and all others not before now, or after now.
+    /// `None` if some number cannot be represented.
     fn rest<W: Weight>(
         &self,
         now: &Rational,

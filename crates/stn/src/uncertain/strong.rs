@@ -15,7 +15,7 @@ pub struct StrongConflict<W = Rational> {
     pub total: Option<W>,
 }
 
-/// A requirement between two points that the executor chooses, and what it comes from.
+/// Requirement between two points that the executor chooses, with the grounds that imply it.
 struct Reduced<W> {
     from: NodeId,
     to: NodeId,
@@ -25,8 +25,8 @@ struct Reduced<W> {
 }
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// Times for the points that the executor chooses with which every requirement holds, whatever
-    /// the links do. The ends of links are given the times that they have at their lower bounds.
+    /// Returns times for the points that the executor chooses that satisfy every requirement
+    /// whatever the links do. The ends of links get the times that they have at their lower bounds.
     ///
     /// A requirement on the end of a link has to hold at the link's worst bound, which leaves a
     /// simple network (Vidal & Fargier 1999).
@@ -81,8 +81,8 @@ impl<W: Weight> UncertainNetwork<W> {
         }
     }
 
-    /// The point that the executor chooses from which a node's time counts, and the links between,
-    /// in order.
+    /// Returns the executor's point that a node's time counts from, and the links between, in
+    /// order.
     fn chain(&self, node: NodeId) -> (NodeId, Vec<LinkId>) {
         let mut links = Vec::new();
         let mut root = node;

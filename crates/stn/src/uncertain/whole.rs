@@ -25,8 +25,8 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// How many units a number is; `None` if that is no whole number, or one so large that sums
-    /// might overflow.
+    /// Converts a number to units; `None` if the result is not a whole number, or is so large that
+    /// sums might overflow.
     pub fn whole(self, number: &Rational) -> Option<i64> {
         let whole = self.denominator.whole(number)?;
         (-self.largest..=self.largest)
@@ -76,7 +76,7 @@ impl UncertainNetwork<Rational> {
         self.unit_with([])
     }
 
-    /// A unit in which these times can be added to the bounds.
+    /// Returns a unit for sums of these times and the bounds.
     pub(super) fn unit_with<'a>(
         &'a self,
         times: impl IntoIterator<Item = &'a Rational>,

@@ -9,8 +9,7 @@ use std::collections::BTreeMap;
 use elbowroom_stn::uncertain::{ContingentLink, UncertainNetwork};
 use elbowroom_stn::{Constraint, Network, NodeId};
 
-/// A network with whole bounds, of which node 0 happens at 0, and no node before it or after the
-/// horizon.
+/// Network with whole bounds. Node 0 happens at 0, and all other nodes between 0 and the horizon.
 pub(crate) struct Board {
     pub(crate) count: usize,
     pub(crate) horizon: i64,
@@ -44,7 +43,7 @@ impl Board {
         UncertainNetwork::new(network, links.collect()).unwrap()
     }
 
-    /// Whether the executor has a strategy that wins whatever the world does.
+    /// Returns `true` if the executor has a strategy that wins whatever the world does.
     pub(crate) fn executor_wins(&self) -> bool {
         let mut times = vec![None; self.count];
         times[0] = Some(0);
