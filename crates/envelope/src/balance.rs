@@ -12,10 +12,10 @@ use crate::ray::Ray;
 /// Deviations are looked for up to ten times the nominal value.
 const MOST: i64 = 10;
 
-/// A share of the nominal values by which all of them may deviate at once.
+/// Share of the nominal values by which all parameters may deviate at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Share {
-    /// By so much they may.
+    /// Deviation that is guaranteed to work.
     pub inside: Rational,
     /// By more than this they may not; the same as `inside` where that is known exactly. `None` if
     /// they may by as much as was asked.
@@ -34,11 +34,11 @@ pub struct Balance {
     pub either: Share,
 }
 
-/// By how much everything may deviate at once; `None` if the plan does not even work at its nominal
-/// values, if nothing is left open, or if `flow` ended it.
+/// Computes the deviation that all parameters tolerate at once. Returns `None` if the plan does not
+/// work at its nominal values, if no parameter is left open, or if `flow` ended the search.
 ///
 /// # Errors
-/// When there are too many cases to tell apart.
+/// If there are too many cases to decide.
 pub fn balance(
     oracle: &mut Oracle,
     flow: &mut dyn FnMut() -> ControlFlow<()>,

@@ -79,7 +79,7 @@ struct Kept {
 }
 
 impl DynamicControl {
-    /// Why the plan cannot be executed by one who learns each value only as it comes about.
+    /// Returns the reason why the plan is not dynamically controllable in the box; `None` if it is.
     pub(crate) fn conflict(
         &mut self,
         plan: &ParametrizedPlan,

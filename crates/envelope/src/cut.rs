@@ -1,4 +1,4 @@
-//! What a refused box says about other boxes: [`Cut`].
+//! Linear inequalities on all boxes, learnt from a refused box: [`Cut`].
 
 use std::collections::BTreeMap;
 
@@ -14,11 +14,11 @@ use crate::soundness::Broken;
 pub struct Cut {
     /// The alternatives; mostly one.
     pub rows: Vec<Row>,
-    /// Why every box inside the envelope satisfies one of them.
+    /// Proof that every box inside the envelope satisfies one of them.
     pub ground: Ground,
 }
 
-/// Why one of the rows of a [`Cut`] holds in every box inside the envelope.
+/// Proof that one of the rows of a [`Cut`] holds in every box inside the envelope.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ground {
     /// The bounds of these constraints, which follow each other in a circle, add up to less than
@@ -59,7 +59,7 @@ pub enum ProofPart {
 }
 
 impl Cut {
-    /// Whether one of the rows holds in a box.
+    /// Returns `true` if one of the rows holds in a box.
     pub fn holds_in(&self, envelope: &DecoupledEnvelope) -> bool {
         self.rows.iter().any(|row| row.holds_in(envelope))
     }
@@ -73,12 +73,12 @@ pub(crate) struct Ends {
     factors: BTreeMap<BoxEnd, Rational>,
 }
 
-/// What one step of a cycle is as long as.
+/// Length of one step of a cycle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Length {
-    /// Whatever the box.
+    /// The same length in every box.
     Fixed(Rational),
-    /// So often an end.
+    /// A factor times an end.
     End(BoxEnd, Rational),
 }
 
@@ -157,7 +157,7 @@ impl Ends {
         Some(sum)
     }
 
-    /// Whether a parameter occurs at both of its ends.
+    /// Returns `true` if a parameter occurs with both of its ends.
     pub(crate) fn tears(&self) -> bool {
         let ends: Vec<&BoxEnd> = self.factors.keys().collect();
         ends.windows(2)

@@ -1,11 +1,11 @@
 //! The whole region of values for which a plan works, as a union of polyhedra.
 //!
-//! Values have a schedule exactly if they satisfy what is left of the network's bounds when the
-//! times are eliminated (Fourier and Motzkin). They have one that breaks a requirement exactly if
-//! they satisfy what is left of these bounds together with one of the requirement's bad cases. The
-//! region is the first polyhedron without the others. What is strict stays so.
+//! Eliminating the times from the network's bounds (Fourier and Motzkin) gives the polyhedron of
+//! the values that have a schedule. Eliminating them from these bounds and one of a requirement's
+//! bad cases gives the values that have a schedule with this violation. The region is the first
+//! polyhedron minus the others. Strict inequalities stay strict.
 //!
-//! The polyhedra of the union have no point in common.
+//! The polyhedra of the union are disjoint.
 
 mod polyhedron;
 mod shadow;
@@ -32,14 +32,14 @@ const MOST_PIECES: usize = 256;
 pub struct Region {
     /// No two of them have a point in common. None if there are no such values.
     pub pieces: Vec<Piece>,
-    /// Why there may be more such values than those in the pieces; `None` if there are not.
+    /// Reason why the pieces may not cover the whole region; `None` if they do.
     pub missing: Option<ExactError>,
 }
 
 /// A polyhedron of values, without rows that follow from others.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Piece {
-    /// What the values satisfy.
+    /// Inequalities that the values satisfy.
     pub rows: Vec<RegionRow>,
 }
 
@@ -51,9 +51,9 @@ pub struct RegionRow {
     pub factors: BTreeMap<ParameterId, Rational>,
     /// The upper bound of the sum.
     pub bound: Rational,
-    /// Whether the bound itself is excluded.
+    /// `true` if the bound itself is excluded.
     pub is_strict: bool,
-    /// Where it comes from.
+    /// Origins of the row.
     pub sources: BTreeSet<RegionSource>,
 }
 
@@ -83,13 +83,13 @@ pub enum ExactError {
     /// Too many inequalities on the way.
     #[error("the region takes more than {limit} inequalities at once; leave less open")]
     TooManyRows {
-        /// How many are kept.
+        /// Limit on the number kept.
         limit: usize,
     },
     /// Too many polyhedra.
     #[error("the region falls into more than {limit} pieces; leave less open")]
     TooManyPieces {
-        /// How many are kept.
+        /// Limit on the number kept.
         limit: usize,
     },
     /// The caller wanted no more.
@@ -98,7 +98,7 @@ pub enum ExactError {
 }
 
 impl RegionRow {
-    /// Whether it holds for these values, by parameter.
+    /// Returns `true` if the row holds for these values, by parameter.
     pub fn holds(&self, value: &dyn Fn(ParameterId) -> Rational) -> bool {
         let terms = self.factors.iter();
         let sum: Rational = terms.map(|(id, factor)| factor * &value(*id)).sum();
@@ -107,22 +107,23 @@ impl RegionRow {
 }
 
 impl Region {
-    /// Whether a plan works with these values, by parameter.
+    /// Returns `true` if the plan works with these values, by parameter.
     pub fn contains(&self, value: &dyn Fn(ParameterId) -> Rational) -> bool {
         let has = |piece: &Piece| piece.rows.iter().all(|row| row.holds(value));
         self.pieces.iter().any(has)
     }
 }
 
-/// The region of a plan, as far as happenings keep the order that the requirements assume: all
-/// values for which `network` has a schedule, and no bad case of `obligations` holds in any. Bad
-/// cases may use the node after the plan's last, a moment inside an action.
+/// Computes the region of a plan, provided that happenings keep the order that the requirements
+/// assume: all values for which `network` has a schedule, and no bad case of `obligations` holds in
+/// any schedule. Bad cases may use the node after the plan's last, which is a moment inside an
+/// action.
 ///
-/// `flow` is asked often whether to go on. If it says no, or a limit is reached, the pieces found
-/// until then are the answer, with what is [missing](Region::missing): they are a part of the region.
+/// `flow` is polled often. If it breaks, or a limit is reached, the pieces found so far are
+/// returned with the [missing](Region::missing) part's reason. They are a part of the region.
 ///
 /// # Errors
-/// When something is not linear, or nothing was found before a limit or the end.
+/// If something is not linear, or if no piece was found before a limit or the end.
 pub fn exact(
     plan: &ParametrizedPlan,
     network: &[Inequality],
@@ -186,8 +187,8 @@ pub fn exact(
     }
 }
 
-/// What is left of a polyhedron without others, in parts without a common point: one part after
-/// the other to its end, so that those that are done when a limit is reached are right.
+/// Subtracts polyhedra from another one, and returns disjoint parts. Each part is completed before
+/// the next one, so that the completed parts are correct when a limit is reached.
 fn without_all(
     whole: Polyhedron,
     bad: &[Polyhedron],
@@ -229,7 +230,7 @@ fn difference(difference: &crate::obligations::Difference) -> Inequality {
     }
 }
 
-/// How times and parameters are numbered: the times first, by node.
+/// Numbering of times and parameters: the times first, by node.
 struct Coordinates {
     times: usize,
 }

@@ -13,39 +13,40 @@ use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
 use crate::cycles::{Cycles, Role, own_limits};
 
-/// How many corners are kept from one box to the next; if there are more, [`Branching`] looks for
-/// those that matter.
+/// Limit on corners that are kept from one box to the next. If there are more, [`Branching`]
+/// searches for the relevant ones.
 const MOST_CORNERS: usize = 1 << 8;
 
-/// How many branches [`Branching`] looks at before the question is given up.
+/// Limit on branches that [`Branching`] examines before the check is undecided.
 pub(crate) const MOST_BRANCHES: usize = 1 << 14;
 
-/// The feasibility check: a plan's network has a schedule for every value in a box (weak
+/// Feasibility check: a plan's network has a schedule for every value in a box (weak
 /// controllability).
 ///
-/// The values for which it has one form a convex set, so the corners of the box decide. Few of
-/// them need looking at: a parameter matters only through cycles of constraints. If all cycles
-/// through it walk its constraint one way, only one of its ends counts, and that end is known
-/// beforehand. In deordered plans almost every parameter is like that. Where an end is infinite,
-/// it is asked whether the values with a schedule go on for ever on that side.
+/// The values that have a schedule form a convex set, so it is enough to check the corners of the
+/// box. Few corners are needed: a parameter matters only through cycles of constraints. If all
+/// cycles through it traverse its constraint in one direction, only one of its ends matters, and
+/// that end is known beforehand. In deordered plans almost every parameter is of this kind. For an
+/// infinite end, the check is whether the set of values with a schedule is unbounded on that side.
 ///
-/// A parameter that *is* a difference of times may have bounds on that very difference beside it
-/// (an action whose start and end interfere takes at least ε). These bound the parameter, whatever
-/// the others do, and say nothing else: they are looked at by themselves ([`own_limits`]).
+/// A parameter that *is* a difference of times may have further bounds on the same difference (an
+/// action whose start and end interfere takes at least ε). These bounds limit the parameter,
+/// independently of the others, and have no other effect. They are checked separately
+/// ([`own_limits`]).
 #[derive(Clone, Debug)]
 pub(crate) struct Feasibility {
     /// The reduced network's edges.
     all_edges: Arc<Vec<Edge>>,
     /// The positions of those that are not limits of a parameter.
     left: Vec<u32>,
-    /// How far out single ends may lie ([`BoxEnd::reach`]).
+    /// Limits on the reach of single ends ([`BoxEnd::reach`]).
     own_limits: BTreeMap<BoxEnd, Rational>,
     class_count: usize,
     /// Each parameter's role in the cycles of the edges that are left.
     roles: Vec<Role>,
     /// Parameters that bound several differences.
     coupled: Vec<ParameterId>,
-    /// Whether there are too many corners to keep.
+    /// `true` if there are too many corners to keep.
     branches: bool,
     corners: Vec<Corner>,
 }
@@ -138,8 +139,8 @@ impl Feasibility {
         })
     }
 
-    /// Whether some values have no schedule in every box with this end so far out, wherever its other
-    /// ends are. `None` is infinitely far.
+    /// Returns `true` if every box with this end at that reach contains values without a schedule,
+    /// whatever its other ends. `None` is infinitely far.
     pub(crate) fn is_too_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
         match reach {
             None => !self.goes_on_for_ever(end),
@@ -169,8 +170,8 @@ impl Feasibility {
         network.corner_without_schedule()
     }
 
-    /// Whether an edge lies on a cycle. One that says "at most the parameter" lies on cycles that
-    /// small values break.
+    /// Returns `true` if an edge lies on a cycle. An edge "at most the parameter" lies on cycles
+    /// that small values violate.
     fn matters(&self, edge: &Edge) -> bool {
         edge.end.is_none_or(|end| {
             matches!(
@@ -180,11 +181,11 @@ impl Feasibility {
         })
     }
 
-    /// Whether the parameter can move out on that side without limit, from any values that have a
-    /// schedule.
+    /// Returns `true` if the parameter can move out on that side without limit, from any values
+    /// that have a schedule.
     ///
-    /// The values that have one form a polyhedron; it goes on for ever in a direction exactly if
-    /// the network has a schedule when only what the direction adds to each bound is kept.
+    /// The values that have a schedule form a polyhedron. It is unbounded in a direction exactly if
+    /// the network has a schedule when each bound is replaced by the change in that direction.
     fn goes_on_for_ever(&self, end: BoxEnd) -> bool {
         if self.own_limits.contains_key(&end) {
             return false;
@@ -222,7 +223,7 @@ impl Feasibility {
         }
     }
 
-    /// Values without a schedule, with the parameter so far out on that side as it takes.
+    /// Returns values without a schedule, with the parameter as far out on that side as necessary.
     fn far_out(&self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Valuation {
         let mut values: Valuation = envelope
             .intervals()
@@ -374,7 +375,7 @@ impl Feasibility {
         None
     }
 
-    /// The networks of the corners that use the end, made anew; all of them or none.
+    /// Rebuilds the networks of the corners that use the end; all of them or none.
     fn rebuild_corners(&mut self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Option<Infeasible> {
         let mut rebuilt = Vec::new();
         for (index, corner) in self.corners.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Which end moves next, and how far.
+//! Selection of the next end to move, and of the step size.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, Parameter, ParameterId, ParametrizedPlan, Side};
@@ -16,17 +16,17 @@ pub enum Growth {
     Constant,
 }
 
-/// The open directions and step sizes (Θ and Δ of Algorithm 1).
+/// Open directions and step sizes (Θ and Δ of Algorithm 1).
 ///
-/// One function both decides to go on and picks the end, so lines 6 and 7 of the algorithm, which
-/// test different bounds, cannot disagree.
+/// One function both decides whether to continue and picks the end, so lines 6 and 7 of the
+/// algorithm, which test different bounds, cannot disagree.
 #[derive(Clone, Debug)]
 pub(crate) struct Frontier {
     growth: Growth,
     parameters: Vec<Progress>,
-    /// How many parameters have a step worth taking: those for whose sake the search goes on.
+    /// Number of parameters with a step worth taking; the search continues while there are any.
     going: usize,
-    /// Where the round robin stands.
+    /// Position of the round robin.
     next: usize,
 }
 
@@ -38,9 +38,9 @@ struct Progress {
     precision: Rational,
     /// Open directions with the present step: lower, upper.
     is_open: [bool; 2],
-    /// Directions in which nothing is left to gain: lower, upper.
+    /// Directions without further gain: lower, upper.
     is_done: [bool; 2],
-    /// Whether both directions have been refused at least once.
+    /// `true` if both directions have been refused at least once.
     has_halved: bool,
 }
 
@@ -145,7 +145,7 @@ impl Frontier {
 }
 
 impl Progress {
-    /// Whether the search goes on for this parameter's sake.
+    /// Returns `true` if this parameter has a step worth taking.
     fn goes_on(&self) -> bool {
         self.is_done != [true; 2] && self.step >= self.precision
     }

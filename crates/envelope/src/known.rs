@@ -1,4 +1,4 @@
-//! What is known to stand against wider boxes: [`Known`].
+//! Known reasons that refuse wider boxes: [`Known`].
 
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
@@ -34,11 +34,11 @@ pub(crate) struct Known {
     has_changed: Vec<bool>,
 }
 
-/// Rows of which one has to hold.
+/// Rows, at least one of which has to hold.
 #[derive(Clone, Debug)]
 struct KnownCut {
     rows: Range<usize>,
-    /// Why; `None` if boxes are only wanted to be so.
+    /// Proof of the cut; `None` if the condition is only wanted.
     ground: Option<Ground>,
 }
 
@@ -120,8 +120,8 @@ impl Known {
         }
     }
 
-    /// Whether the present box with an end moved out from `from` to `to` is known not to be inside
-    /// the envelope, or not wanted. `None` is infinitely far.
+    /// Returns `true` if the present box with an end moved out from `from` to `to` is known to be
+    /// outside the envelope, or is not wanted. `None` is infinitely far.
     pub(crate) fn refuses(&self, end: BoxEnd, from: &Rational, to: Option<&Rational>) -> bool {
         to.is_none() && self.finite.contains(&end) || self.against(end, from, to).is_some()
     }

@@ -1,11 +1,11 @@
-//! From a box without a schedule, or without a strategy, to a [`Cut`].
+//! Derivation of a [`Cut`] from a box without a schedule, or without a strategy.
 //!
 //! A conflict is a cycle of bounds whose length depends linearly on the ends of the box. Every box
-//! in which it is negative is refused for the same reason, so that all boxes inside the envelope
-//! satisfy "it is not negative". A semi-reducible cycle depends on more: what follows a duration
-//! taken at its lower end must be negative, and a wait counts for no less than the duration takes
-//! at least. So it is a disjunction: the cycle is not negative, or what follows one of these is
-//! not.
+//! with a negative length of this cycle is refused for the same reason. So all boxes inside the
+//! envelope satisfy "the length is not negative". A semi-reducible cycle has further conditions:
+//! the part after a duration at its lower end must be negative, and a wait is at least as long as
+//! the minimum duration. So it gives a disjunction: the cycle is not negative, or one of these
+//! parts is not negative.
 
 mod shorter;
 
@@ -85,8 +85,8 @@ pub(crate) fn without_schedule(
     learnt(vec![ends], Ground::Cycle(cycle), envelope)
 }
 
-/// The conflicts that prevent dynamic controllability in the box: so many at most, of those that come up
-/// when its network is gone through once.
+/// Returns the conflicts that prevent dynamic controllability in the box: at most `most`, found in
+/// one pass over its network.
 pub(crate) fn without_strategy(
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,
@@ -206,7 +206,8 @@ fn sums(mut some: Vec<Ends>, others: &[Ends]) -> Vec<Ends> {
     sums.collect()
 }
 
-/// What a cycle of such steps says, if at its ends, one for each parameter, there is no schedule.
+/// Returns the cut of a cycle of such steps, provided that it uses one end of each parameter and
+/// excludes every schedule.
 fn whole<'a>(
     reader: &Reader<'_>,
     parts: impl Iterator<Item = &'a Part>,
@@ -245,7 +246,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// What a conflict in the box says about others.
+    /// Returns the cut that follows from a conflict in the box.
     fn cut(&self, refutation: &Refutation, envelope: &DecoupledEnvelope) -> Option<Cut> {
         let whole = whole(self, steps(&refutation.cycle), envelope);
         if whole.is_some() || refutation.is_flat {
@@ -265,7 +266,7 @@ impl Reader<'_> {
         cut(rows, ground, envelope)
     }
 
-    /// What a step is as long as, and the bound that it is; `None` for a way.
+    /// Returns the length of a step, and the bound that it represents; `None` for a way.
     fn plain(&self, part: &Part) -> Option<(Length, Origin)> {
         let constraint = |link: &LinkId| self.network.links[link.index()];
         Some(match part {
@@ -341,8 +342,8 @@ impl Reader<'_> {
         Some((Length::End(end, Rational::from(sign)), origin))
     }
 
-    /// What a way can be as long as: the greatest of these. Adds to `legal` what has to be negative
-    /// for the way to be one.
+    /// Returns the possible lengths of a way; the greatest of them applies. Adds to `legal` the
+    /// lengths that have to be negative for the way to exist.
     fn lengths(&self, way: &Way, legal: &mut Vec<Ends>) -> Option<Vec<Ends>> {
         let mut lengths = vec![Ends::default()];
         for part in way.parts.iter().rev() {

@@ -10,7 +10,7 @@ pub use terms::Terms;
 
 mod terms;
 
-/// A factor by which a parameter can be multiplied in a [`Linear`] expression.
+/// Factor that multiplies a parameter in a [`Linear`] expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Factor {
     /// The time of a node.
@@ -206,7 +206,7 @@ impl Linear {
         square.map(|((id, _), _)| *id)
     }
 
-    /// The parameters that stand in products.
+    /// Returns the parameters that occur in products.
     pub fn multiplied_parameters(&self) -> impl Iterator<Item = ParameterId> + '_ {
         self.products.keys().flat_map(|(first, factor)| {
             let second = match factor {

@@ -1,10 +1,10 @@
-//! How an envelope is searched for.
+//! Methods of searching for an envelope.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// How an envelope is searched for.
+/// Method of searching for an envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]

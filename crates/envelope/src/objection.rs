@@ -1,11 +1,11 @@
-//! Why a box is not inside an envelope: [`Objection`].
+//! Reasons why a box is not inside an envelope: [`Objection`].
 
 use elbowroom_plan::Valuation;
 
 use crate::control::ControlConflict;
 use crate::soundness::Broken;
 
-/// Why a box is not inside the envelope.
+/// Reason why a box is not inside the envelope.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Objection {

@@ -1,12 +1,12 @@
-//! What every schedule of a plan must satisfy, as linear inequalities.
+//! Requirements on every schedule of a plan, as linear inequalities.
 //!
-//! `Obligations::compile` runs the plan symbolically, once, in the order of a nominal
-//! schedule. That order is enough: the schedules of a network with boxed parameters form a convex
-//! set, so if two interfering happenings are at least ε apart in all of them, one always comes
-//! first. The separation itself is an obligation; where it holds, every value that a happening
-//! reads is one fixed expression in times and parameters (paper 1's `enc_eff` without its
-//! disjunctions). What remains undecided is only which commuting happenings come before a moment
-//! *inside* an action, where its over-all condition is read ([`OverAll`]).
+//! `Obligations::compile` runs the plan symbolically, once, in the order of a nominal schedule.
+//! That order is enough: the schedules of a network with boxed parameters form a convex set, so if
+//! two interfering happenings are at least ε apart in all of them, one always comes first. The
+//! separation itself is an obligation. If it holds, every value that a happening reads is one fixed
+//! expression in times and parameters (paper 1's `enc_eff` without its disjunctions). The only
+//! undecided question is which commuting happenings come before a moment *inside* an action, where
+//! its over-all condition is read ([`OverAll`]).
 //!
 //! An obligation is violated in exactly the schedules of its [`BadCase`]s.
 
@@ -37,7 +37,7 @@ pub struct Difference {
     pub to: NodeId,
     /// Greatest difference.
     pub bound: Rational,
-    /// Whether the bound itself is excluded.
+    /// `true` if the bound itself is excluded.
     pub is_strict: bool,
 }
 
@@ -68,19 +68,19 @@ impl Difference {
 pub struct Inequality {
     /// The left-hand side.
     pub expression: Linear,
-    /// Whether zero itself is excluded.
+    /// `true` if zero itself is excluded.
     pub is_strict: bool,
 }
 
 impl Inequality {
-    /// Whether it holds for these times (by node) and parameters.
+    /// Returns `true` if the inequality holds for these times (by node) and parameters.
     pub fn holds(&self, times: &Schedule, parameters: &Valuation) -> bool {
         let value = self.expression.value(times, parameters);
         value.is_negative() || (value.is_zero() && !self.is_strict)
     }
 }
 
-/// One way in which an obligation can be violated: all of these at once.
+/// One way to violate an obligation: all of these constraints hold at once.
 ///
 /// Nodes are those of the plan and, in over-all conditions, [`StnPlan::nodes`]`.len()` for the
 /// moment at which the condition is read.
@@ -120,12 +120,12 @@ pub enum Requirement {
     Duration {
         /// The action.
         instance: InstanceId,
-        /// Which of its duration constraints; `None` for `>= 0`.
+        /// Index of the duration constraint; `None` for `>= 0`.
         constraint: Option<usize>,
     },
     /// A number that an effect needs is defined.
     Defined {
-        /// Where it is needed.
+        /// Happening that needs the number.
         node: NodeId,
     },
     /// A happening changes a fluent in one way only, unless all it does is to increase and
@@ -150,7 +150,7 @@ pub enum Requirement {
     },
 }
 
-/// A requirement with all the ways in which it can be violated.
+/// Requirement with all the ways to violate it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obligation {
     /// The requirement.
@@ -177,7 +177,7 @@ pub enum Refusal {
         "{place}: the value of {expression} is not linear in times and parameters; fix one of its factors"
     )]
     NotLinear {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
         /// The expression.
         expression: String,
@@ -185,7 +185,7 @@ pub enum Refusal {
     /// A rate changes while it acts.
     #[error("{place}: the rate of change of {fluent} depends on something that changes later on")]
     ChangingRate {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
         /// The fluent it changes.
         fluent: String,
@@ -193,27 +193,27 @@ pub enum Refusal {
     /// A conditional effect hangs on what holds throughout its action.
     #[error("{place}: a conditional effect with an over-all condition cannot be analysed")]
     GuardOverAll {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
     },
     /// Too many combinations of conditional effects or alternatives.
     #[error("{place}: more than {limit} combinations of cases")]
     TooManyCases {
-        /// Where they arise.
+        /// Location that the combinations arise from.
         place: String,
-        /// How many are considered.
+        /// Limit on combinations.
         limit: usize,
     },
     /// A derived fact depends on its own negation.
     #[error("{place}: a derived fact depends on its own negation; rewrite the rules without that")]
     Unstratified {
-        /// Where it is read.
+        /// Location that reads the derived fact.
         place: String,
     },
     /// A number is left open that is not among the plan's parameters.
     #[error("{place}: a number is left open that is no parameter; vary it or give it a value")]
     OpenNumber {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
     },
     /// The ends of a parameter's interval do not decide what happens between them.
@@ -225,12 +225,13 @@ pub enum Refusal {
         /// The parameter.
         name: String,
     },
-    /// What processes and events do is not known, or cannot be told by linear inequalities.
+    /// The behaviour of processes and events is unknown, or cannot be described by linear
+    /// inequalities.
     #[error("{place}: {obstacle}")]
     Nature {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
-        /// What stands in the way.
+        /// Description of the obstacle.
         obstacle: String,
     },
     /// The plan's network has no schedule at the nominal values.

@@ -19,7 +19,8 @@ pub(super) struct InCase<'a> {
     pub(super) known: &'a [Rational],
 }
 
-/// About the best values in a case, rounded; `None` if they are not found, or if nobody wants to wait.
+/// Returns approximately the best values in a case, rounded; `None` if they are not found, or if
+/// `flow` ends the search.
 pub(super) fn guess(
     function: &dyn Concave,
     master: &mut Master,
@@ -126,7 +127,7 @@ pub(super) fn tidied(
     }
 }
 
-/// The greatest power of ten that is at most this number; 1 for what is not positive.
+/// Returns the greatest power of ten that is at most this number; 1 if the number is not positive.
 pub(super) fn power_of_ten(number: &Rational) -> Rational {
     let ten = Rational::from(10);
     let mut power = Rational::ONE;

@@ -1,8 +1,7 @@
-//! The greatest value of a concave function of the ends of a box, approximately: Newton's method
-//! with a logarithmic barrier (Boyd & Vandenberghe 2004, chapter 11), in floating-point numbers.
+//! Approximate maximum of a concave function of the ends of a box: Newton's method with a
+//! logarithmic barrier (Boyd & Vandenberghe 2004, chapter 11), in floating-point numbers.
 //!
-//! What is found here is nothing but a proposal: whoever uses it works out with exact numbers what
-//! it is good for.
+//! The result is only a proposal: the caller computes its exact value.
 
 use std::ops::ControlFlow;
 
@@ -12,14 +11,14 @@ const LOOSE: f64 = 1e-10;
 const GAP: f64 = 2e-8;
 /// By how much the barriers count less in each round.
 const SHARPER: f64 = 20.0;
-/// Full steps are taken without measuring what they gain once they promise so little.
+/// Expected gain of a Newton step below which full steps are taken without a line search.
 const NEAR: f64 = 0.05;
 /// The limit on Newton steps in one round.
 const MOST_IN_ROUND: usize = 60;
 /// The limit on Newton steps in all rounds together.
 const MOST_STEPS: usize = 600;
 
-/// After about so many multiplications somebody is asked whether to go on: some ten milliseconds.
+/// Number of multiplications, about ten milliseconds, after which `flow` is polled.
 const ASKED_AFTER: usize = 10_000_000;
 
 /// A concave function that is a sum over few variables each.
@@ -56,8 +55,8 @@ impl Polytope {
         self.slacks(at).into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// About the point where the function is greatest; from the best one of these points to begin
-    /// with. `None` if none of them is inside, or if nobody wants to wait.
+    /// Returns approximately the maximum of the function, searched from the best of these starting
+    /// points. `None` if none of them is inside, or if `flow` ends the search.
     pub(super) fn maximize(
         &self,
         function: &dyn Concave,
@@ -95,7 +94,7 @@ impl Polytope {
         }
     }
 
-    /// What is made as large as possible: the function, and the barriers.
+    /// Returns the maximised value: the function plus the barriers.
     fn merit(&self, function: &dyn Concave, sharpness: f64, at: &[f64]) -> f64 {
         let slacks = self.slacks(at);
         if slacks.iter().any(|slack| *slack <= 0.0) {

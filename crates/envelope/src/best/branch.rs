@@ -18,9 +18,9 @@ use crate::oracle::Oracle;
 use crate::ray::{Ray, place};
 use crate::row::Row;
 
-/// How closely a refused box is shrunk where nothing linear is known: halvings of each end.
+/// Number of halvings of each end when a refused box is shrunk because no linear cut is known.
 const HALVINGS: usize = 16;
-/// How many boxes are shrunk so before the search settles for what it has.
+/// Limit on boxes that are shrunk before the search stops with its current result.
 const MOST_SHRUNK: usize = 24;
 
 /// A case that has not been split.
@@ -33,7 +33,7 @@ struct Leaf {
     spans: Vec<Span>,
     /// An upper bound on the objective.
     bound: Rational,
-    /// Whether the bound was worked out from all cuts that are known.
+    /// `true` if the bound was computed from all known cuts.
     is_fresh: bool,
     values: Vec<Rational>,
     /// For a probability, where its bound touches.
@@ -86,7 +86,7 @@ pub(super) fn branch(
     let spans = search.goal.spans(variables);
     search.open((Vec::new(), spans), search.goal.most(variables));
     let mut steps = 0_u64;
-    // What is left of cases in which nothing more could be told.
+    // Greatest bound of the cases that were closed undecided.
     let mut left: Option<Rational> = None;
     while let (false, Some(at)) = (search.is_cancelled, search.most_promising()) {
         if search.leaves[at].bound <= &search.best.0 + &tolerance {
@@ -154,7 +154,7 @@ pub(super) fn branch(
 }
 
 impl Search<'_> {
-    /// Tells the best box so far, and asks whether to go on.
+    /// Reports the best box so far, and returns the caller's answer.
     fn goes_on(&mut self) -> ControlFlow<()> {
         let step = BestStep {
             envelope: &self.variables.envelope(self.plan, &self.best.1),
@@ -173,7 +173,7 @@ impl Search<'_> {
         }
     }
 
-    /// The values of the variables with which the box lies in another one.
+    /// Returns values of the variables whose box lies inside another one.
     fn values_in(&self, envelope: &DecoupledEnvelope) -> Vec<Rational> {
         let point = DecoupledEnvelope::point(&self.plan.nominal());
         let variables = self.variables.ends.iter().zip(&self.variables.most);
@@ -299,8 +299,8 @@ impl Search<'_> {
         true
     }
 
-    /// Splits a case in two parts in which the objective can be bounded more closely; whether there
-    /// are any.
+    /// Splits a case into two parts with tighter bounds on the objective. Returns `false` if that
+    /// is not possible.
     fn divide(&mut self, at: usize) -> bool {
         let leaf = &self.leaves[at];
         let Some((variable, place)) = self.goal.divide(&leaf.spans, &leaf.touches) else {
@@ -332,7 +332,8 @@ impl Search<'_> {
         }
     }
 
-    /// Whether the master has taken the cut into account: it holds but for being strict.
+    /// Returns `true` if the master already contains the cut: the cut holds, except for being
+    /// strict.
     fn is_known(&self, cut: &Cut, values: &[Rational]) -> bool {
         let candidate = self.variables.envelope(self.plan, values);
         let holds = |row: &Row| {

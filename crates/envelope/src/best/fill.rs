@@ -1,10 +1,10 @@
-//! The fairest box: all variables grow together, in relation to their nominal values, until some
-//! are stopped; then the others go on.
+//! The fairest box: all variables grow together, relative to their nominal values, until some are
+//! stopped; the others continue.
 //!
-//! Boxes inside an envelope have all their sub-boxes there, too. So where all that still grow have
-//! the same slack, and those that were stopped keep theirs, a variable that cannot grow alone can
-//! have no more slack unless one with no more gets less: it is stopped for good. That is the box
-//! whose least slack is greatest, then the second least, and so on.
+//! If a box is inside an envelope, so are all its sub-boxes. All growing variables have the same
+//! slack, and the stopped ones keep theirs. So a variable that cannot grow alone can only gain
+//! slack if a variable with no more slack loses some: it is stopped for good. The resulting box has
+//! the greatest least slack, then the greatest second least slack, and so on.
 
 use std::ops::ControlFlow;
 
@@ -24,7 +24,7 @@ struct Fill<'a> {
     variables: &'a Variables,
     on_step: &'a mut dyn FnMut(&BestStep<'_>) -> ControlFlow<()>,
     cuts: Vec<Cut>,
-    /// The slack of each variable that was stopped, and by which cut.
+    /// Slack of each stopped variable, with the cut that stopped it.
     stopped: Vec<Option<(Rational, Option<usize>)>>,
     order: Vec<usize>,
     is_cancelled: bool,
@@ -104,8 +104,8 @@ pub(super) fn fill(
 }
 
 impl Fill<'_> {
-    /// How much slack all that still grow can have, or one alone while the others stay where they
-    /// are.
+    /// Computes the greatest slack of all growing variables, or of one of them while the others
+    /// stay.
     fn grow(&mut self, alone: Option<usize>, level: &Rational) -> Result<Reached, Refusal> {
         let mut ray = Ray::new(self.plan);
         let mut most = level.clone();

@@ -1,4 +1,4 @@
-//! What a box is to be the greatest of, for the search by cases ([`branch`](super::branch)).
+//! Objectives of the search by cases ([`branch`](super::branch)).
 
 use std::ops::ControlFlow;
 
@@ -13,7 +13,7 @@ use super::{Source, Touch, Variables};
 
 /// An objective over the ends of a box.
 pub(super) enum Goal {
-    /// The sum of the variables, each so many times.
+    /// The sum of the variables, each with its weight.
     Sum(Vec<Rational>),
     /// The product of the widths.
     Volume(Volume),
@@ -28,7 +28,7 @@ pub(super) enum Outcome {
         values: Vec<Rational>,
         /// Nothing in this case is worth more than this.
         bound: Rational,
-        /// Why.
+        /// Proof of the bound.
         proof: Vec<(Source, Rational)>,
         /// Of each parameter the slope of the tangent that the proof is about; none if the
         /// objective is linear itself.
@@ -52,7 +52,8 @@ impl Goal {
         Self::Sum(worths.collect())
     }
 
-    /// A box is as good as the best one if it is worth at most so much less.
+    /// Returns the tolerance: a box counts as best if its value is at most this much below the best
+    /// one.
     pub(super) fn tolerance(&self) -> Rational {
         match self {
             Self::Sum(_) => Rational::ZERO,
@@ -60,7 +61,7 @@ impl Goal {
         }
     }
 
-    /// What a box is worth, at least.
+    /// Returns a lower bound on the value of a box.
     pub(super) fn worth(&self, values: &[Rational]) -> Rational {
         match self {
             Self::Sum(worths) => worths.iter().zip(values).map(|(w, v)| w * v).sum(),
@@ -69,7 +70,7 @@ impl Goal {
         }
     }
 
-    /// What no box can be worth more than, whatever the cuts.
+    /// Returns an upper bound on the value of any box, without cuts.
     pub(super) fn most(&self, variables: &Variables) -> Rational {
         match self {
             Self::Sum(_) => self.worth(&variables.most),
@@ -79,8 +80,8 @@ impl Goal {
         }
     }
 
-    /// Between which numbers the variables lie where the objective can be told, or gains anything;
-    /// none if that is everywhere.
+    /// Returns the ranges of the variables in which the objective is defined, or still increases;
+    /// empty if there are no limits.
     pub(super) fn spans(&self, variables: &Variables) -> Vec<Span> {
         match self {
             Self::Sum(_) | Self::Volume(_) => Vec::new(),
@@ -88,8 +89,8 @@ impl Goal {
         }
     }
 
-    /// The variable, and at which of its values, by which a case is split, in two parts in which the
-    /// objective can be bounded more closely; `None` if there is none.
+    /// Returns a variable and a value that split a case into two parts with tighter bounds on the
+    /// objective; `None` if there is none.
     pub(super) fn divide(&self, spans: &[Span], touches: &[Touch]) -> Option<(usize, Rational)> {
         match self {
             Self::Sum(_) | Self::Volume(_) => None,

@@ -1,4 +1,4 @@
-//! The best box that satisfies what is known so far: a linear program.
+//! Master problem: a linear program for the best box that satisfies all known cuts.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ pub(super) struct Span {
     pub(super) most: Rational,
     /// The same for what the objective has there, whatever the range of the parameter.
     pub(super) far: Rational,
-    /// Whether it is less than `far`; linear programs let it be `most`.
+    /// `true` if the variable is strictly less than `far`; linear programs allow it to be `most`.
     pub(super) is_open: bool,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Known {
 }
 
 impl Known {
-    /// Whether the row holds, strictly where it has to.
+    /// Returns `true` if the row holds, strictly if it is strict.
     pub(super) fn holds(&self, values: &[Rational]) -> bool {
         let terms = self
             .factors
@@ -156,8 +156,8 @@ impl Master {
         true
     }
 
-    /// The best values in the case in which these rows hold, too, and the variables lie between
-    /// these numbers, if there are any.
+    /// Computes the best values in the case where these rows hold as well, and the variables lie
+    /// within these spans.
     pub(super) fn solve(
         &mut self,
         chosen: &[(usize, usize)],

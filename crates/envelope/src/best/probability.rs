@@ -1,10 +1,11 @@
-//! The box in which independent durations most likely stay.
+//! The box that independent durations most likely stay in.
 //!
 //! The logarithm of the probability is a sum over the parameters. Each term is a jointly concave
-//! function of the ends of an interval if the logarithm of the density is concave (Prékopa 1973), so it
-//! lies below its tangents, as that of a volume does. What has a probability of its own (where values
-//! are cut, and values that were measured) is inside or not: a case counts it as a share of the way
-//! there, and is split where that is too much. The numbers are those of [`elbowroom_num::chance`].
+//! function of the ends of an interval if the logarithm of the density is concave (Prékopa 1973),
+//! so it lies below its tangents, like the logarithm of a volume. Values with a probability of
+//! their own (at cuts, and measured values) are either inside or outside. A case counts such a
+//! probability proportionally to the distance, and is split if that is too imprecise. The numbers
+//! are those of [`elbowroom_num::chance`].
 
 use std::ops::ControlFlow;
 
@@ -27,10 +28,10 @@ struct Term {
     chance: Option<Chance>,
 }
 
-/// What follows from tangents that touch at one place.
+/// Bound that follows from tangents at one point.
 struct Bounded {
     bound: Rational,
-    /// Where their sum is greatest.
+    /// Point with the greatest sum of the tangents.
     corner: Vec<Rational>,
     proof: Vec<(Source, Rational)>,
     slopes: Vec<Rational>,
@@ -40,9 +41,9 @@ struct Bounded {
 /// `Σ ln P(the duration is inside its interval)`.
 pub(super) struct Probability {
     terms: Vec<Term>,
-    /// What gains nothing is moved out by this measure.
+    /// Weights of the variables when ends are moved out that do not change the probability.
     even: Vec<Rational>,
-    /// How far each variable counts at most, whatever its parameter's range.
+    /// Greatest value of each variable that counts, whatever its parameter's range.
     counted: Vec<Rational>,
 }
 
@@ -117,7 +118,7 @@ impl Probability {
         term.ends.map(|variable| values[variable].clone())
     }
 
-    /// What a box is worth, rounded down to a billionth.
+    /// Returns the value of a box, rounded down to a billionth.
     pub(super) fn worth(&self, values: &[Rational]) -> Rational {
         let mut sum = Rational::ZERO;
         for term in &self.terms {
@@ -206,7 +207,7 @@ impl Probability {
             return Outcome::Unknown;
         };
         let values = near.unwrap_or(best.corner);
-        // What gains nothing moves out all the same, beyond this case if it can.
+        // Ends that do not change the probability also move out, beyond this case if possible.
         let free = InCase { spans: &[], ..case };
         let filled = master.beside(free, (Side::Lower, &values), &self.even);
         Outcome::Best {
@@ -218,7 +219,8 @@ impl Probability {
         }
     }
 
-    /// Where tangents touch, nearly at these values, and their slopes, two for each parameter.
+    /// Returns tangents at these values (approximately): the points where they touch, and their
+    /// slopes, two for each parameter.
     fn tangents(&self, spans: &[Span], values: &[Rational]) -> (Vec<Touch>, Vec<Rational>) {
         let mut touches = Vec::new();
         let mut slopes = Vec::new();
@@ -263,7 +265,7 @@ impl Probability {
         (touches, slopes)
     }
 
-    /// What each variable counts in the tangents.
+    /// Returns the coefficient of each variable in the tangents.
     fn worths(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
         let mut worths = vec![Rational::ZERO; variables.count()];
         for (term, slopes) in self.terms.iter().zip(slopes.chunks(2)) {
@@ -274,7 +276,8 @@ impl Probability {
         worths
     }
 
-    /// How far the logarithm of the probability of each interval is at most above its slopes.
+    /// Returns, for each parameter, an upper bound on the difference of the logarithm of its
+    /// interval's probability and the linear function with these slopes.
     fn heights(&self, spans: &[Span], (slopes, touches): (&[Rational], &[Touch])) -> Vec<Rational> {
         let terms = self.terms.iter().zip(slopes.chunks(2)).zip(touches);
         terms
@@ -293,7 +296,8 @@ impl Probability {
             .collect()
     }
 
-    /// Which variable to split a case at, and where: where a jump is counted in part that is worth most.
+    /// Returns the variable and the value to split a case at: the jump with the largest gap between
+    /// its partial count and its probability.
     pub(super) fn divide(&self, spans: &[Span], touches: &[Touch]) -> Option<(usize, Rational)> {
         let mut widest: Option<(f64, usize, Rational)> = None;
         for (term, touch) in self.terms.iter().zip(touches) {
@@ -339,8 +343,9 @@ fn open_cut(
     cuts.max_by(|one, other| one.0.total_cmp(&other.0))
 }
 
-/// Of the values that some intervals of a case have and others do not, the one in the middle of the
-/// longer side: how far the logarithms of what they have differ, which side, and its distance.
+/// Returns the middle one of the values that only some intervals of a case contain, on the side
+/// with more of them: the range of the logarithm of the probability in the case, the side, and the
+/// distance.
 fn middle_jump(
     term: &Term,
     chance: &Chance,

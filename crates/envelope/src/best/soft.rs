@@ -20,19 +20,19 @@ enum Kind {
         shape: Density,
         nominal: f64,
         margin: f64,
-        /// Where the lower and the upper end stop to move, and whether that side counts as a whole.
+        /// Limits of the lower and the upper end, and flags for sides that count as a whole.
         stops: [f64; 2],
         is_whole: [bool; 2],
-        /// What a unit of length gains beside the density.
+        /// Gain per unit of length, in addition to the density.
         gains: [f64; 2],
     },
-    /// What all intervals have of some values, and for each side the corners of the least concave
-    /// function that is not below what they may have.
+    /// Share of the values that all intervals contain, and for each side the corners of the concave
+    /// hull of the share that they may contain in addition.
     Values {
         center: f64,
         hulls: [Vec<(f64, f64)>; 2],
     },
-    /// Nothing can be told of it.
+    /// No approximation is available.
     Untold,
 }
 

@@ -33,12 +33,12 @@ type Proof = Vec<(Source, Rational)>;
 /// `Σ weight · ln(width / scale + foot)`.
 pub(super) struct Volume {
     widths: Vec<Width>,
-    /// The power of ten of which slopes are multiples, for each parameter.
+    /// For each parameter, the power of ten that slopes are rounded to.
     grids: Vec<Rational>,
 }
 
-/// What is added to each width, in relation to its scale, before the product is taken: a millionth.
-/// So a box in which one interval has no width can still be compared with others.
+/// Returns the constant added to each width, relative to its scale, before the product is computed:
+/// a millionth. It makes boxes with an interval of width 0 comparable.
 pub fn foot() -> Rational {
     Rational::new(1, 1_000_000)
 }
@@ -94,7 +94,7 @@ impl Volume {
         sums
     }
 
-    /// What a box is worth, rounded down to a billionth.
+    /// Returns the value of a box, rounded down to a billionth.
     pub(super) fn worth(&self, values: &[Rational]) -> Rational {
         enclosed::billionths_below(&self.enclosed(values)[0])
     }
@@ -128,7 +128,8 @@ impl Volume {
         let values = master.beside(case, (Side::Upper, &guess), &worths);
         let values = values.map(|values| {
             let values = tidied(values, master, variables, case, &|own| self.worth(own));
-            // What is left by rounding, and where the objective is flat.
+            // Fills the room that rounding has left, and moves variables that do not change the
+            // objective.
             let filled = master.beside(case, (Side::Lower, &values), &worths);
             filled.unwrap_or(values)
         });
@@ -162,8 +163,8 @@ impl Volume {
         }
     }
 
-    /// What the objective is at most if that is what the tangents with these slopes add up to
-    /// without what they are at 0.
+    /// Returns an upper bound on the objective. `sum` is the greatest value of the tangents with
+    /// these slopes, without their constants.
     fn bound(&self, slopes: &[Rational], sum: Rational) -> Rational {
         let heights = self.widths.iter().zip(slopes).filter_map(|(width, slope)| {
             let touches = width.weight.checked_div(&(slope * &width.scale))?;
@@ -185,7 +186,7 @@ impl Volume {
         .collect()
     }
 
-    /// What each variable counts in the tangents.
+    /// Returns the coefficient of each variable in the tangents.
     fn worths(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
         let mut worths = vec![Rational::ZERO; variables.count()];
         for (width, slope) in self.widths.iter().zip(slopes) {

@@ -9,7 +9,7 @@ use elbowroom_num::{Delta, Rational};
 
 use super::{ExactError, RegionSource};
 
-/// From so many half-spaces on, those that follow from others are looked for on the way.
+/// Number of half-spaces above which redundant ones are removed during elimination.
 const MANY_ROWS: usize = 64;
 /// The limit on half-spaces.
 const MOST_ROWS: usize = 512;
@@ -82,7 +82,7 @@ impl Halfspace {
         self
     }
 
-    /// Whether it lies inside another one with the same factors.
+    /// Returns `true` if the half-space lies inside another one with the same factors.
     fn is_tighter(&self, other: &Self) -> bool {
         self.bound < other.bound || (self.bound == other.bound && self.is_strict)
     }
@@ -94,7 +94,7 @@ pub(super) struct Polyhedron {
     rows: Vec<Halfspace>,
     /// For each row, whether it is known not to follow from the others.
     is_needed: Vec<bool>,
-    /// Whether a row without coordinates cannot hold.
+    /// `true` if some row without coordinates cannot hold.
     is_absurd: bool,
 }
 
@@ -109,7 +109,7 @@ impl Polyhedron {
         self.add(row);
     }
 
-    /// Adds a row from which none that is known to be needed follows, together with the others.
+    /// Adds a row. The caller guarantees that the rows marked as needed stay needed.
     fn add(&mut self, row: Halfspace) {
         if row.factors.is_empty() {
             self.is_absurd |= row.bound.is_negative() || (row.bound.is_zero() && row.is_strict);
@@ -148,7 +148,7 @@ impl Polyhedron {
         self.is_needed.retain(|_| kept.next() == Some(&true));
     }
 
-    /// Whether there is a point in it.
+    /// Returns `true` if the polyhedron is not empty.
     pub(super) fn is_feasible(&self) -> bool {
         !self.is_absurd && Program::new(&self.rows).is_feasible(|_| Some(false))
     }
@@ -257,7 +257,8 @@ impl Polyhedron {
         }
         let mut program = Program::new(&self.rows);
         let mut is_kept = vec![true; self.rows.len()];
-        // Those from most sources first: what is left is told by what it comes from.
+        // Rows with the most sources first, because the remaining rows are explained by their
+        // sources.
         let is_open = |index: &usize| !self.is_needed[*index];
         let mut order: Vec<usize> = (0..self.rows.len()).filter(is_open).collect();
         order.sort_by_key(|&index| std::cmp::Reverse(self.rows[index].sources.len()));
@@ -279,7 +280,7 @@ impl Polyhedron {
         Ok(())
     }
 
-    /// What is left of it without another one, in parts without a common point.
+    /// Returns the difference of this polyhedron and another one, in disjoint parts.
     pub(super) fn minus(self, other: &Self) -> Vec<Self> {
         let mut common = self.clone();
         for row in &other.rows {
@@ -330,8 +331,8 @@ impl<'a> Program<'a> {
         }
     }
 
-    /// Whether there is a point for which these rows hold: each that `negated` knows, negated if it
-    /// says so.
+    /// Returns `true` if there is a point that satisfies the selected rows. `negated` returns
+    /// `None` for rows to ignore, and `Some(true)` for rows to negate.
     fn is_feasible(&mut self, negated: impl Fn(usize) -> Option<bool>) -> bool {
         self.simplex.push();
         for (index, (row, sum)) in self.rows.iter().zip(&self.sums).enumerate() {

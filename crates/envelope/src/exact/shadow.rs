@@ -121,7 +121,7 @@ impl Piece {
 }
 
 impl Flat {
-    /// Whether a point belongs to it.
+    /// Returns `true` if a point belongs to it.
     pub fn contains(&self, point: &[Rational; 2]) -> bool {
         self.rows.iter().all(|(factors, bound, is_strict)| {
             let sum = &factors[0] * &point[0] + &factors[1] * &point[1];
@@ -129,8 +129,8 @@ impl Flat {
         })
     }
 
-    /// The corners of what lies inside a window `[lower, upper]`, around it in one direction; none
-    /// if there is nothing. Sides that do not belong to it are drawn as if they did.
+    /// Returns the corners of the part inside a window `[lower, upper]`, in circular order; empty
+    /// if there is none. Sides that do not belong to the part are drawn as if they did.
     pub fn polygon(&self, lower: &[Rational; 2], upper: &[Rational; 2]) -> Vec<[Rational; 2]> {
         let corner = |x: &Rational, y: &Rational| [x.clone(), y.clone()];
         let mut corners = vec![

@@ -13,7 +13,7 @@ use elbowroom_plan::ParameterId;
 
 use super::{Piece, Region, RegionRow};
 
-/// What a region has inside a box, as products of parts of few parameters.
+/// Part of a region inside a box, as products of components with few parameters each.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Body {
     /// For each piece, its components: its volume is the product of theirs.
@@ -47,8 +47,8 @@ impl Region {
         extent.into_iter().map(found).collect()
     }
 
-    /// What the region has inside a frame, `[lower, upper]` of each parameter. Where a side belongs
-    /// to it does not matter for volumes, and is forgotten.
+    /// Returns the part of the region inside a frame, `[lower, upper]` of each parameter. The
+    /// distinction of open and closed sides does not matter for volumes, and is dropped.
     pub fn body(&self, frame: &[(Rational, Rational)]) -> Body {
         let pieces = self.pieces.iter().map(|piece| components(piece, frame));
         Body {
@@ -70,7 +70,7 @@ fn around(one: &Interval, two: &Interval) -> Interval {
     Interval { lower, upper }
 }
 
-/// How far each parameter reaches in a piece.
+/// Linear program for the range of each parameter in a piece.
 struct Extremes {
     simplex: Simplex,
     variables: Vec<VariableId>,

@@ -1,11 +1,12 @@
-//! Schedules for all values in a box, as rules by which times follow from values.
+//! Schedules for all values in a box, as rules that compute times from values.
 //!
-//! A parameter that is the difference of two times, and by which constraints are only broken if it
-//! is too small, can grow: its later time, and all that bounds the latest time of this one, move by as
-//! much. Nothing is broken by that, because what does not move is only later than something else
-//! by less. The other way round, the later time and what has to come soon after it can move back. So from a
-//! schedule at the worst ends of these parameters follows one for all of their values. Of the other
-//! parameters both ends are looked at: between two schedules lie those for the values between.
+//! Let a parameter be the difference of two times, and let constraints only be violated if it is
+//! too small. It can grow: its later time, and all times that bound the latest value of this time,
+//! move by the same amount. That violates nothing, because times that do not move are only exceeded
+//! by less. In the other direction, the later time and the times that have to follow it soon can
+//! move back. So a schedule at the worst ends of these parameters yields one for all of their
+//! values. For the other parameters, both ends are examined: schedules for the values between them
+//! are interpolated.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +19,7 @@ use crate::cycles::Role;
 use crate::proved::{ScheduleCase, TimeRule};
 use crate::reduction::{Edge, Reduction};
 
-/// The limit on parameters of which both ends are looked at.
+/// Limit on parameters with both ends examined.
 const MOST_SPLITS: usize = 6;
 
 impl Feasibility {

@@ -3,10 +3,10 @@
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, BoxEnd, Constraint, NodeId, ParameterId, ParametrizedPlan, Side};
 
-/// How far out the ends of parameters may lie at most because of single constraints of the plan.
+/// Limits on the reach of ends from single constraints of the plan.
 ///
-/// A parameter that is the difference of two times cannot be where another bound on this difference forbids it. This
-/// is read off the plan in no time, and where nothing else is in the way, it is all that has to be known.
+/// If a parameter is the difference of two times, other bounds on this difference limit it. These
+/// limits are quick to compute, and often they are the only ones.
 pub(super) struct OwnBounds {
     /// By parameter: how far its lower and its upper end can reach.
     most: Vec<[Option<Rational>; 2]>,
@@ -47,7 +47,7 @@ impl OwnBounds {
         }
     }
 
-    /// Whether no value so far out has a schedule; `None` is infinitely far.
+    /// Returns `true` if no value at that reach has a schedule; `None` is infinitely far.
     pub(super) fn exclude(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
         let most = &self.most[end.parameter.index()][end.side.index()];
         most.as_ref()

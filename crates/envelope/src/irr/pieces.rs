@@ -16,16 +16,17 @@ use crate::row::Row;
 /// A conflict of more ends than these is long.
 const LONG: usize = 10;
 
-/// The points of a plan at which conflicts are divided, and what has come of that so far.
+/// State of the division of conflicts: the points where they are divided, and the known pieces.
 pub(super) struct Pieces {
     bounds: Option<Bounds>,
-    /// How many parameters looks that come across long conflicts are still to go through before these are divided.
+    /// Work limit that is left, in parameters, for checks with long conflicts before these are
+    /// divided.
     left: usize,
     /// By their ends: the pieces that are known.
     known: BTreeSet<Vec<Vec<BoxEnd>>>,
 }
 
-/// How early and how late points are, as single constraints say.
+/// Earliest and latest times of points by single constraints.
 struct Bounds {
     least: Times,
     most: Times,
@@ -35,7 +36,7 @@ struct Bounds {
 type Times = Vec<Option<Rational>>;
 
 impl Pieces {
-    /// Conflicts are divided after looks have gone through so many parameters.
+    /// Divides conflicts after checks with long conflicts have processed `left` parameters.
     pub(super) fn after(left: usize) -> Self {
         Self {
             bounds: None,
@@ -44,8 +45,9 @@ impl Pieces {
         }
     }
 
-    /// Conditions that hold in the box, which is inside the envelope; where they go on to hold, the long ones among these
-    /// conflicts do not come up. None as long as it does not seem that more and more of them will.
+    /// Returns conditions that hold in `envelope`, which is inside the robustness envelope. Boxes
+    /// that satisfy them do not have the long ones among these conflicts. Returns none until the
+    /// work limit is used up.
     pub(super) fn of(
         &mut self,
         plan: &ParametrizedPlan,
@@ -162,8 +164,8 @@ impl Bounds {
         if is_least {
             pieces.reverse();
         }
-        // Where a piece is longer, the next one begins so much too late (or the one before has to end so much too early): in
-        // the box, and so it may remain.
+        // If a piece is too long, the next one begins too late by the same amount (or the previous
+        // one has to end too early). That is so in the current box, and may remain so.
         let mut late = Rational::ZERO;
         let mut rows = Vec::with_capacity(pieces.len());
         for mut piece in pieces {
@@ -176,7 +178,7 @@ impl Bounds {
     }
 }
 
-/// How long a step of a cycle is, and where it leads.
+/// Returns the length of a step of a cycle, and its target.
 fn step(plan: &ParametrizedPlan, origin: Origin) -> Option<(Length, NodeId)> {
     let (index, side) = match origin {
         Origin::Beginning => return Some((Length::Fixed(Rational::ZERO), NodeId::ZERO)),

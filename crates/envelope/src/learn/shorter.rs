@@ -1,9 +1,9 @@
 //! From a long conflict to shorter ones: [`Shortcuts`].
 //!
-//! Windows and deadlines bind time points to the beginning. A cycle along many of them is one conflict, the most
-//! violated one, and says little about narrower boxes: when these are looked at, a slightly shorter cycle is in
-//! the way, and so on. Cut at the points that are bound to the beginning, it falls into short ones, which have fewer ends
-//! and often imply it.
+//! Windows and deadlines bind time points to the beginning. A cycle along many of them is one
+//! conflict, the most violated one, and says little about narrower boxes: these are refused by
+//! slightly shorter cycles, one after the other. Divided at the points that are bound to the
+//! beginning, the cycle yields short ones, which have fewer ends and often imply it.
 
 use std::ops::RangeInclusive;
 
@@ -15,10 +15,10 @@ use elbowroom_stn::{ConstraintId, NodeId};
 use super::{Reader, steps, whole};
 use crate::cut::Cut;
 
-/// How many steps a cycle may go back from the point at which it is cut.
+/// Limit on the steps from the point where a cycle is divided back to its beginning.
 const FARTHEST: usize = 64;
 
-/// A bound on the difference of a node and the beginning, and what it comes from.
+/// Bound on the difference of a node and the beginning, with the parts that imply it.
 #[derive(Clone)]
 struct Chord {
     length: Rational,
@@ -27,13 +27,13 @@ struct Chord {
 
 /// The bounds between nodes and the beginning, by way of no other node that the network leaves open.
 pub(super) struct Shortcuts {
-    /// By node: at most so long after the beginning.
+    /// By node: the greatest distance after the beginning.
     after: Vec<Option<Chord>>,
-    /// At most minus so long before it.
+    /// By node: the negated least distance after the beginning.
     before: Vec<Option<Chord>>,
 }
 
-/// A step of a cycle: how long it is, and what it says.
+/// Step of a cycle, with its length and target.
 struct Step {
     to: NodeId,
     part: Part,
@@ -120,9 +120,9 @@ impl Shortcuts {
         found
     }
 
-    /// What cycles say that go along two of these ranges one after the other, along four of them, eight and so on. A longer
-    /// cycle often leaves a little less room for each step than a shorter one; without these, a cycle along one range more
-    /// would come up each time that a box is looked at.
+    /// Returns the cuts of cycles along two consecutive ranges, four, eight and so on. A longer
+    /// cycle often leaves a little less slack for each step than a shorter one. Without these cuts,
+    /// each check would find a cycle with one range more.
     fn joined(
         &self,
         reader: &Reader<'_>,
@@ -147,7 +147,7 @@ impl Shortcuts {
         found
     }
 
-    /// What the cycle says that goes from the beginning along these steps, and back.
+    /// Returns the cut of the cycle from the beginning along these steps, and back.
     fn cut_out(
         &self,
         reader: &Reader<'_>,

@@ -29,7 +29,7 @@ use elbowroom_plan::{
     InstanceId, Node, NodeId, ParameterKind, ParametrizedPlan, Schedule, Valuation,
 };
 
-/// How many combinations of outcomes of conditional effects are followed.
+/// Limit on combinations of outcomes of conditional effects.
 const MOST_RUNS: usize = 256;
 
 impl Obligations {
@@ -117,7 +117,7 @@ struct Compiler<'a> {
     /// The actions whose durations are open.
     open: BTreeSet<InstanceId>,
     substitution: Arc<Substitution>,
-    /// What goes on without a plan, if anything does.
+    /// Processes, events and constraints on all states, if there are any.
     nature: Option<Nature>,
 }
 
@@ -290,7 +290,7 @@ impl Compiler<'_> {
                 continue;
             };
             for condition in body.over_all.conjuncts() {
-                // Those have been looked at on the way.
+                // Conditions that depend on nature were compiled during the symbolic run.
                 if self
                     .nature
                     .as_ref()

@@ -10,7 +10,7 @@ use crate::linear::Linear;
 /// Alternatives, each a conjunction: none is never, an empty one is always.
 pub(crate) type Alternatives = Vec<Vec<Inequality>>;
 
-/// How many alternatives a condition may unfold into.
+/// Limit on the alternatives of a condition.
 const MOST_ALTERNATIVES: usize = 4096;
 
 /// The truth value that is asked of a condition.
@@ -45,7 +45,7 @@ impl Wanted {
 }
 
 impl Reading<'_> {
-    /// The alternatives in which the condition is as wanted.
+    /// Returns the alternatives that give the condition the wanted truth value.
     pub(crate) fn alternatives(
         &self,
         condition: &Condition,
@@ -64,7 +64,7 @@ impl Reading<'_> {
         }
     }
 
-    /// The alternatives in which the condition says nothing.
+    /// Returns the alternatives that make the condition neither true nor false.
     pub(crate) fn silent(&self, condition: &Condition) -> Result<Alternatives, Refusal> {
         let mut expressions = Vec::new();
         condition.visit_expressions(&mut |expression| expressions.push(expression.clone()));
@@ -136,7 +136,7 @@ impl Reading<'_> {
     }
 }
 
-/// The alternatives in which `left comparison right` is true (`wanted`) or false.
+/// Returns the alternatives that make `left comparison right` true (`wanted`) or false.
 pub(crate) fn compared(
     comparison: Comparison,
     left: &Linear,

@@ -10,10 +10,10 @@ use super::timeline::{Reading, Timeline};
 use super::{BadCase, Refusal, Substitution};
 use elbowroom_plan::NodeId;
 
-/// How one conjunct of the goal can be violated.
+/// Returns the ways to violate one conjunct of the goal.
 ///
-/// Everything has happened by then. Which change of a fact or fluent was the last is decided,
-/// because changes that do not commute interfere, and so keep their order
+/// All happenings are over by then. The last change of a fact or fluent is known, because changes
+/// that do not commute interfere, and so keep their order
 /// ([`Requirement::Separation`](super::Requirement::Separation)).
 pub(super) fn goal_cases(
     task: &Task,

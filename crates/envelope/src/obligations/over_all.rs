@@ -1,4 +1,4 @@
-//! Over-all conditions: what must hold at every moment of an action's open interval.
+//! Over-all conditions, which must hold at every moment of an action's open interval.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -33,15 +33,15 @@ pub struct OverAll {
     pub assumptions: Vec<Inequality>,
     /// Stands for the moment in differences and inequalities.
     pub moment: NodeId,
-    /// What the condition reads.
+    /// Facts that the condition reads.
     facts: Vec<FactId>,
     fluents: Vec<FluentId>,
     near: Near,
     all: Arc<Happenings>,
 }
 
-/// What is known of the places of a moment as long as the parameters' values are in their ranges, and all
-/// interfering happenings keep their order.
+/// Possible places of a moment among the events, provided that the parameters' values are in their
+/// ranges, and all interfering happenings keep their order.
 #[derive(Clone, Debug)]
 struct Near {
     /// The events that can be on either side of it, in nominal order.
@@ -114,11 +114,11 @@ impl OverAll {
         )
     }
 
-    /// The alternatives in which the condition is false at the moment, when exactly the events
-    /// for which `cut` is true have happened, of those that [may have](Self::events).
+    /// Returns the alternatives in which the condition is false at the moment. Of the
+    /// [events](Self::events), exactly those for which `cut` is true have happened by then.
     ///
     /// # Errors
-    /// When a value is not linear.
+    /// If a value is not linear.
     pub fn cases(
         &self,
         task: &Task,
@@ -146,12 +146,12 @@ impl OverAll {
     }
 }
 
-/// How an over-all condition on a single basic fact is violated: the fact is wrong from some
-/// event (or from the beginning) until all events that right it, and that time overlaps the
-/// action's open interval.
+/// Returns the ways to violate an over-all condition on a single basic fact: the fact is wrong from
+/// some event (or from the beginning) until the first event that corrects it, and that time
+/// overlaps the action's open interval.
 ///
-/// This is exact without any case split: events that make a fact true interfere with those that
-/// make it false, so each wrong event has a fixed set of righting events after it, and the first
+/// This is exact without any case split. Events that make a fact true interfere with those that
+/// make it false, so each wrong event has a fixed set of correcting events after it, and the first
 /// of these to happen ends the wrong time.
 pub(super) fn literal_cases(
     timeline: &Timeline,

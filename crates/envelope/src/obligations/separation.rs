@@ -94,7 +94,7 @@ fn nearest(candidates: &BTreeSet<usize>, links: &[Vec<usize>]) -> Vec<usize> {
     nearest
 }
 
-/// What a happening does to a fact or fluent.
+/// Kind of access of a happening to a fact or fluent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Use {
     Read,
@@ -106,11 +106,11 @@ enum Use {
     Assign,
 }
 
-/// The latest users of a fact or fluent.
+/// Latest users of a fact or fluent.
 ///
-/// Whoever uses it in one way only goes together with those who use it in the same way, unless they
-/// assign; everybody else interferes. So users come in blocks, each of which interferes with
-/// all of the one before, and by way of that with all earlier ones that are not of its own kind.
+/// Users with one kind of access are compatible with users of the same kind, unless they assign;
+/// all other pairs interfere. So users form blocks. Each user interferes with all users of the
+/// previous block, and transitively with all earlier ones that are not of its own kind.
 #[derive(Clone, Debug, Default)]
 struct Blocks {
     previous: Vec<usize>,
@@ -137,7 +137,7 @@ impl Blocks {
     }
 }
 
-/// Finds interfering happenings through an index of who touches what.
+/// Finds interfering happenings through an index of the facts and fluents they use.
 #[derive(Default)]
 struct Neighbours {
     facts: BTreeMap<FactId, Blocks>,

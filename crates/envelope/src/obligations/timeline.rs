@@ -1,4 +1,4 @@
-//! What happens to each fact and fluent, in the order of a nominal schedule.
+//! Changes of each fact and fluent, in the order of a nominal schedule.
 
 mod fluent;
 
@@ -43,7 +43,7 @@ pub(crate) struct FactHistory {
 /// A cut through a plan: whether a node has happened; `None` if all have that are recorded.
 pub(crate) type Cut<'a> = Option<&'a dyn Fn(NodeId) -> bool>;
 
-/// The context in which an expression is evaluated: a cut, a moment, and the action it belongs to.
+/// Context for evaluating an expression: a cut, a moment, and the action it belongs to.
 pub(crate) struct Reading<'a> {
     pub(crate) task: &'a Task,
     pub(crate) timeline: &'a Timeline,
@@ -94,8 +94,8 @@ impl Timeline {
         self.fluents.entry(fluent).or_default().push(node, change);
     }
 
-    /// What holds and counts at the node, after all that was recorded, as a timeline on which
-    /// nothing happens.
+    /// Returns the facts and values at the moment, after all recorded changes, as a timeline
+    /// without events.
     pub(crate) fn snapshot(&self, moment: NodeId) -> Self {
         let mut snapshot = Self {
             assumptions: self.assumptions.clone(),
@@ -129,8 +129,8 @@ impl Timeline {
         all.collect()
     }
 
-    /// What of this matters to a condition on these that is read inside an action; and the events of which it is not
-    /// known on which side of that moment they are.
+    /// Returns the part of the timeline that is relevant to a condition on these facts and fluents
+    /// inside an action. Also returns the events that may be on either side of the moment.
     pub(super) fn near(
         &self,
         (facts, fluents): (&[FactId], &[FluentId]),
@@ -195,11 +195,11 @@ impl Timeline {
 }
 
 impl FactHistory {
-    /// What of this matters to a moment inside an action. Collects the events of which it is not known on which side
-    /// of the moment they are.
+    /// Returns the part of the history that is relevant to a moment inside an action. Collects the
+    /// events that may be on either side of the moment.
     ///
-    /// What makes a fact true and what makes it false interfere: if one of either kind is to come, so are all later
-    /// ones.
+    /// Events that make a fact true and events that make it false interfere. So if an event of each
+    /// kind is known to come after the moment, so are all later ones.
     fn near(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
         let here = self
             .events
@@ -241,7 +241,7 @@ pub(crate) fn parameter_value(id: ParameterId, substitution: &Substitution) -> L
 }
 
 impl Reading<'_> {
-    /// Whether the fact is true at the cut.
+    /// Returns `true` if the fact is true at the cut.
     pub(crate) fn fact(&self, fact: FactId) -> Result<bool, Refusal> {
         if !self.task.is_derived(fact) {
             return Ok(self.timeline.is_true(fact, self.cut));
@@ -325,7 +325,7 @@ impl Reading<'_> {
     }
 }
 
-/// The context in which rules are evaluated: basic facts, and comparisons of constants.
+/// Context for evaluating rules: basic facts, and comparisons of constants.
 struct Basic<'a>(&'a Reading<'a>);
 
 impl Moment<Refusal> for Basic<'_> {

@@ -1,4 +1,4 @@
-//! What happenings change.
+//! Changes made by happenings.
 
 use std::collections::BTreeMap;
 
@@ -56,7 +56,7 @@ impl Compiler<'_> {
         Ok(drifts)
     }
 
-    /// Whether anything from the node on may change what the expression reads.
+    /// Returns `true` if the node or a later one may change a fluent that the expression reads.
     pub(super) fn changes_later(&self, expression: &Expression, node: NodeId) -> bool {
         let mut read = Vec::new();
         expression.visit_fluents(&mut |fluent| read.push(fluent));

@@ -7,8 +7,8 @@ use super::super::{Obligations, Refusal, Requirement};
 use super::{Compiler, Run, oblige};
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-/// Which part of which effect's guard: effects of the start come before those of the end, and
-/// those before continuous ones.
+/// Identifier of a part of an effect's guard: effects of the start come before those of the end,
+/// and those before continuous ones.
 pub(super) type GuardId = (InstanceId, usize, GuardPart);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,14 +1,14 @@
 //! Processes and events: the symbolic run between two happenings of the plan.
 //!
-//! Where the plan's happenings keep their order, and nature's turns — events, and processes that
-//! start and stop — keep theirs among them, the moment of each turn is a linear expression in the
-//! times before it: a number that changes at a constant rate reaches its threshold so much later.
-//! The run follows the course that nature takes at the nominal values, and demands that it is
-//! the same in every schedule: in each part between two turns no event's condition comes to hold,
-//! and processes stay at work or at rest. Within a part all numbers are linear in time, so what
-//! holds throughout it is decided at its two ends.
+//! Let the order of the plan's happenings and of nature's turns (events, and processes that start
+//! and stop) be fixed. Then the time of each turn is a linear expression in the times before it,
+//! because a number that changes at a constant rate reaches its threshold after a linear delay. The
+//! run follows the course that nature takes at the nominal values, and requires the same course in
+//! every schedule: in each part between two turns, no event's condition becomes true, and processes
+//! stay active or inactive. All numbers are linear in time within a part, so conditions throughout
+//! it are decided at its two ends.
 //!
-//! What is demanded is enough, not always needed: a plan may work with another course, too.
+//! The requirement is sufficient, but not necessary: a plan may also work with another course.
 
 mod condition;
 mod course;
@@ -27,11 +27,11 @@ use crate::obligations::{
 };
 use course::Course;
 
-/// What goes on without a plan, as far as that is the same for the whole run.
+/// Behaviour of the world without the plan, as far as it is the same for the whole run.
 pub(super) struct Nature {
-    /// What each event reads and writes.
+    /// Footprint of each event.
     footprints: Vec<Footprint>,
-    /// What must hold in every state.
+    /// Conditions that must hold in every state.
     always: Vec<Condition>,
     /// The facts that events change.
     facts: BTreeSet<FactId>,
@@ -131,7 +131,7 @@ impl Nature {
         Ok(())
     }
 
-    /// Whether a condition reads what processes and events change.
+    /// Returns `true` if a condition reads facts or fluents that processes and events change.
     pub(super) fn changes(&self, task: &Task, condition: &Condition) -> bool {
         let mut reads = false;
         task.visit_facts_of(condition, &mut |fact| reads |= self.facts.contains(&fact));
@@ -143,7 +143,7 @@ impl Nature {
 }
 
 impl Compiler<'_> {
-    /// What goes on from a happening to the next one.
+    /// Runs nature from a happening to the next one.
     pub(super) fn pass(
         &self,
         nature: &Nature,
@@ -155,7 +155,7 @@ impl Compiler<'_> {
         self.keep_from_events(nature, run, node, obligations);
         let mut course = Course::after((self, nature), run, (node, next), obligations);
         if node == NodeId::ZERO {
-            // The initial state counts, too.
+            // The initial state must be stable as well.
             course.stays()?;
         }
         course.happens_now()?;
@@ -227,7 +227,7 @@ impl Compiler<'_> {
     }
 }
 
-/// Adds an obligation, unless it cannot be violated. Differences of two times are told as such.
+/// Adds an obligation, unless it cannot be violated. Differences of two times are stored as such.
 fn oblige_nature(
     obligations: &mut Obligations,
     requirement: Requirement,
@@ -251,7 +251,7 @@ fn oblige_nature(
         }
         bad_cases.push(bad);
     }
-    // Numbers often stay as they are, and what is required is the same again.
+    // Numbers often do not change, so that the same requirement occurs again.
     let is_known = |known: &Obligation| {
         matches!(known.requirement, Requirement::Nature { .. }) && known.bad_cases == bad_cases
     };

@@ -25,7 +25,7 @@ fn footprints() -> impl Strategy<Value = Vec<Footprint>> {
     prop::collection::vec(footprint, 0..25)
 }
 
-/// All pairs are looked at, and kept if no third footprint is between.
+/// Examines all pairs, and keeps those without a third footprint between them.
 fn plainly(footprints: &[Footprint]) -> Vec<(usize, usize)> {
     let count = footprints.len();
     let mut is_before = vec![vec![false; count]; count];

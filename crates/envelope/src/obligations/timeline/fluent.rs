@@ -1,4 +1,4 @@
-//! What becomes of one fluent.
+//! History of one fluent.
 
 use std::collections::BTreeSet;
 
@@ -21,14 +21,14 @@ pub(crate) enum FluentChange {
     DriftEnd(NodeId),
 }
 
-/// What some changes have made of a fluent.
+/// State of a fluent after some changes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Standing {
     pub(super) base: Option<Linear>,
     drifts: Vec<Drift>,
 }
 
-/// A continuous change under way.
+/// Active continuous change.
 #[derive(Clone, Debug)]
 struct Drift {
     began: NodeId,
@@ -81,7 +81,7 @@ impl Standing {
         })
     }
 
-    /// The rates of the continuous changes under way.
+    /// Returns the rates of the active continuous changes.
     pub(super) fn rates(&self) -> impl Iterator<Item = &Linear> {
         self.drifts.iter().map(|drift| &drift.rate)
     }
@@ -138,11 +138,11 @@ impl FluentHistory {
         standing
     }
 
-    /// What of this matters to a moment inside an action. Collects the events of which it is not known on which side
-    /// of the moment they are.
+    /// Returns the part of the history that is relevant to a moment inside an action. Collects the
+    /// events that may be on either side of the moment.
     ///
-    /// Whatever else changes a fluent interferes with what gives it a value, so that before one that has happened
-    /// all earlier ones have, and after one that is to come so are all later ones.
+    /// Every change of a fluent interferes with its assignments. So all changes before a past
+    /// assignment are past, and all changes after a future assignment are in the future.
     pub(super) fn near(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
         let here = self
             .events

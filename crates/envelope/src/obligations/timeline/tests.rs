@@ -39,8 +39,8 @@ fn task(bodies: Vec<Condition>) -> Task {
     })
 }
 
-/// Whether `p` followed by the number is true when everything in the timeline has happened, or
-/// nothing has.
+/// Returns the value of `p` followed by the number, when everything in the timeline has happened,
+/// or nothing has.
 fn read(
     task: &Task,
     timeline: &Timeline,

@@ -1,5 +1,5 @@
-//! What breaks the truth of a condition at a moment, right after it, and throughout a part in
-//! which numbers change at constant rates.
+//! Violations of a condition at a moment, right after it, and throughout a part with constant rates
+//! of change.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::obligations::dnf::{Alternatives, always_if};
 use crate::obligations::timeline::Reading;
 use crate::obligations::{Inequality, Refusal};
 
-/// How many alternatives a condition may unfold into.
+/// Limit on the alternatives of a condition.
 const MOST_ALTERNATIVES: usize = 4096;
 
 /// A number that changes at a constant rate: `value` now, `rate` per unit of time.
@@ -45,7 +45,7 @@ impl View<'_> {
         value.value(self.nominal.0, self.nominal.1)
     }
 
-    /// Whether a condition holds in the schedule that is followed.
+    /// Returns `true` if a condition holds in the nominal schedule.
     pub(super) fn holds(&self, condition: &Condition, when: When<'_>) -> Result<bool, Refusal> {
         Ok(match condition {
             Condition::Fact(fact) => self.reading.fact(*fact)?,
@@ -70,8 +70,8 @@ impl View<'_> {
         })
     }
 
-    /// Whether one of the parts has the truth value; else the other value. Parts without numbers
-    /// decide first, so that others need not have values.
+    /// Returns `truth` if one of the parts has this truth value, else the other value. Parts
+    /// without numbers are evaluated first, so that the numbers of the others need not be defined.
     fn decided(&self, parts: &[Condition], truth: bool, when: When<'_>) -> Result<bool, Refusal> {
         for part in facts_first(parts) {
             if self.holds(part, when)? == truth {
@@ -154,7 +154,7 @@ impl View<'_> {
         }
     }
 
-    /// How a condition can fail to be as wanted right after now.
+    /// Returns the ways in which a condition can differ from the wanted value right after now.
     pub(super) fn broken_after(
         &self,
         condition: &Condition,
@@ -179,8 +179,8 @@ impl View<'_> {
         })
     }
 
-    /// How a condition can fail to be as wanted at some moment of the open part from now until
-    /// `then`, when so much time has elapsed.
+    /// Returns the ways in which a condition can differ from the wanted value at some moment of the
+    /// open part from now until `then`, after `elapsed`.
     pub(super) fn broken_throughout(
         &self,
         (then, elapsed): (&View<'_>, &Linear),
@@ -209,7 +209,8 @@ impl View<'_> {
         })
     }
 
-    /// How a condition can fail to be as wanted, where `leaf` says it of an inequality.
+    /// Returns the ways in which a condition can differ from the wanted value. `leaf` computes them
+    /// for an inequality.
     fn broken(
         &self,
         condition: &Condition,

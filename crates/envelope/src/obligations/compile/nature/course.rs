@@ -23,29 +23,29 @@ use crate::obligations::timeline::{Reading, Timeline};
 use crate::obligations::{Inequality, Obligations, Refusal, Requirement};
 use part::Part;
 
-/// How many turns of events and processes there may be between two happenings of the plan.
+/// Limit on the turns of events and processes between two happenings of the plan.
 const MOST_TURNS: usize = 200;
 
-/// The state at a moment, and what has been changed since the happening before.
+/// Symbolic state at a moment, and the changes since the previous happening.
 pub(super) struct Course<'a> {
     compiler: &'a Compiler<'a>,
     nature: &'a Nature,
     node: NodeId,
     next: Option<NodeId>,
-    /// The actions under way, each with its over-all conditions that nature may break; and, of no
-    /// action, what must always hold.
+    /// Running actions, each with its over-all conditions that nature may violate. The entry
+    /// without an action holds the conditions on all states.
     running: Vec<(Option<InstanceId>, Vec<&'a Condition>)>,
     /// The continuous changes of these.
     drifts: Vec<(FluentId, Linear)>,
-    /// What holds and counts now.
+    /// Facts and values now.
     now: Timeline,
     at: Linear,
     rates: BTreeMap<FluentId, Linear>,
-    /// Whether each process is at work.
+    /// For each process, `true` if it is active.
     at_work: Vec<bool>,
     /// The events that have happened at this moment.
     fired: BTreeSet<usize>,
-    /// Whether the next happening must not fall together with this moment.
+    /// `true` if the next happening must not coincide with this moment.
     must_go_on: bool,
     facts: BTreeSet<FactId>,
     fluents: BTreeSet<FluentId>,
@@ -55,7 +55,7 @@ pub(super) struct Course<'a> {
     obligations: &'a mut Obligations,
 }
 
-/// What nature has changed.
+/// Changes made by nature.
 pub(super) struct Changed {
     pub(super) facts: Vec<(FactId, bool)>,
     pub(super) values: Vec<(FluentId, Option<Linear>)>,
@@ -106,7 +106,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// What it has come to.
+    /// Returns the changes at the end of the course.
     pub(super) fn end(self) -> Changed {
         let reading = self.reading(&self.now);
         let truth = |fact: &FactId| (*fact, reading.fact(*fact).unwrap_or_default());
@@ -269,8 +269,8 @@ impl<'a> Course<'a> {
         oblige_nature(self.obligations, requirement, assumptions, broken);
     }
 
-    /// [`demand`](Self::demand), of the course that is followed: it goes on as it does, unless the
-    /// order of what falls together is not known.
+    /// [`demand`](Self::demand) for the nominal course, which must stay the same. Refused if the
+    /// order of coinciding turns is unknown.
     fn expect(&mut self, course: &str, broken: Alternatives) -> Result<(), Refusal> {
         if self.is_nominally(&broken) {
             return Err(self.obstacle(
@@ -282,7 +282,7 @@ impl<'a> Course<'a> {
         Ok(())
     }
 
-    /// Whether one of the alternatives comes about in the schedule that is followed.
+    /// Returns `true` if one of the alternatives holds in the nominal schedule.
     fn is_nominally(&self, alternatives: &Alternatives) -> bool {
         let holds = |inequality: &Inequality| {
             let value = &inequality.expression;

@@ -51,7 +51,7 @@ impl Course<'_> {
         Ok(None)
     }
 
-    /// The moment, so much later, at which these conditions turn.
+    /// Returns the moment, nominally `elapsed` from now, at which these conditions change.
     fn moment_of(
         &self,
         view: &View<'_>,
@@ -95,7 +95,7 @@ pub(super) fn zeros(
     for (left, right) in &sides {
         let moving = match view.difference(left, right) {
             Ok(moving) => moving,
-            // What has no value, or changes along a curve, does no harm where a fact decides.
+            // An undefined or non-linear number is harmless if a fact decides the condition.
             Err(_) if is_decided_by_facts(view, condition)? => continue,
             Err(refusal) => return Err(refusal),
         };
@@ -111,7 +111,7 @@ pub(super) fn zeros(
     Ok(zeros)
 }
 
-/// Whether a conjunction is false because of a fact.
+/// Returns `true` if a conjunction is false because of a fact.
 fn is_decided_by_facts(view: &View<'_>, condition: &Condition) -> Result<bool, Refusal> {
     for conjunct in condition.conjuncts() {
         let mut has_numbers = false;

@@ -1,4 +1,4 @@
-//! What a part has to keep to, in which nothing turns and all numbers change at constant rates.
+//! Requirements on a part: an interval without turns, with constant rates of change.
 
 use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_num::Rational;
@@ -14,11 +14,11 @@ use crate::obligations::timeline::Timeline;
 /// A part from now on.
 pub(super) struct Part {
     pub(super) to: Linear,
-    /// What holds and counts when it ends.
+    /// Facts and values at its end.
     pub(super) then: Timeline,
-    /// How the course can become another one than that which is followed.
+    /// Ways in which the course can deviate from the nominal one.
     pub(super) expected: Vec<(String, Alternatives)>,
-    /// How what must hold throughout can fail to.
+    /// Ways to violate the conditions that must hold throughout.
     pub(super) demanded: Vec<(String, Alternatives)>,
     /// A moment before its end at which to look again: it is too long for one look. Of a condition
     /// that is false, for example, one part is false at first and another one later.

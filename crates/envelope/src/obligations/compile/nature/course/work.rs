@@ -1,4 +1,4 @@
-//! Which processes are at work, and how numbers change then.
+//! Active processes, and the rates of change that they cause.
 
 use std::collections::{BTreeMap, BTreeSet};
 
