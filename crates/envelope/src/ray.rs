@@ -1,4 +1,4 @@
-//! How far a box can grow in one direction.
+//! Search for the largest box along one direction.
 
 use std::ops::ControlFlow;
 
@@ -11,7 +11,7 @@ use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 use crate::row::Row;
 
-/// How often an interval is halved where nothing linear is known.
+/// Number of halvings of an interval when no linear cut is known.
 const HALVINGS: usize = 40;
 
 /// Boxes that grow with a number: each end lies at `min(most, base + number · step)`.
@@ -21,19 +21,19 @@ pub(crate) struct Ray {
     pub(crate) base: Vec<Rational>,
     /// By how much the end moves out for each 1; not negative.
     pub(crate) step: Vec<Rational>,
-    /// How far out it may lie; `None` without limit.
+    /// Greatest reach of the end; `None` without limit.
     pub(crate) most: Vec<Option<Rational>>,
 }
 
-/// How far a box can grow along a [`Ray`].
+/// Largest box along a [`Ray`], as bounds on its number.
 #[derive(Clone, Debug)]
 pub(crate) struct Reached {
     /// The box with this number is inside the envelope.
     pub(crate) inside: Rational,
     /// No box with a greater number than this one is; the same as `inside` where that is exact.
     pub(crate) outside: Rational,
-    /// What stands against greater numbers, by position among the cuts; `None` if only the limit of
-    /// the question does, or if it is nothing linear.
+    /// Cut that refuses greater numbers, by position; `None` if only the caller's limit does, or if
+    /// the reason is not linear.
     pub(crate) cut: Option<usize>,
 }
 
@@ -62,7 +62,7 @@ impl Ray {
         ray
     }
 
-    /// How far out the end at a place lies.
+    /// Returns the reach of the end at a place.
     pub(crate) fn reach(&self, place: usize, number: &Rational) -> Rational {
         let reach = &self.base[place] + &self.step[place] * number;
         match &self.most[place] {
@@ -84,16 +84,16 @@ impl Ray {
         envelope
     }
 
-    /// The greatest number from `least` to `most` for which the box is inside the envelope. The box
-    /// of `least` is.
+    /// Searches for the greatest number from `least` to `most` whose box is inside the envelope.
+    /// The box of `least` must be inside.
     ///
-    /// A box that is refused says which others are; the greatest number that this leaves is the
-    /// next to be asked about, so that the first that is accepted is the answer. Where nothing
-    /// linear is known, the interval is halved. What is learnt is added to `cuts`; `on_step` is
-    /// told the greatest number so far before each box that is checked, and can end the search.
+    /// A refused box yields cuts. The greatest number that satisfies them is checked next, so the
+    /// first accepted number is the result. If no linear cut is known, the interval is halved. New
+    /// cuts are added to `cuts`. `on_step` receives the greatest number so far before each check,
+    /// and can end the search.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub(crate) fn shoot(
         &self,
         oracle: &mut Oracle,

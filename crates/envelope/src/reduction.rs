@@ -34,8 +34,8 @@ pub struct Edge {
 
 /// The plan's network over classes of rigidly connected nodes.
 ///
-/// Two nodes are in one class if constraints without parameters fix their difference. Plans are
-/// full of such pairs (fixed durations, timed initials); what is left is often tiny.
+/// Two nodes are in one class if constraints without parameters fix their difference. Plans contain
+/// many such pairs (fixed durations, timed initials), and the remaining network is often tiny.
 #[derive(Clone, Debug)]
 pub struct Reduction {
     /// For each node its class, and by how much it comes after the class's own time.
@@ -116,11 +116,10 @@ impl Reduction {
         reduction
     }
 
-    /// Drops constraints that the others imply whatever values the parameters take in their
-    /// ranges.
+    /// Drops constraints that the others imply for all values of the parameters in their ranges.
     ///
-    /// Besides being less work, this shows what parameters really bear on: a constraint "the end
-    /// comes after time 0" would put the duration before it on a cycle of constraints.
+    /// This saves work, and reveals the constraints that a parameter really affects: a constraint
+    /// "the end comes after time 0" would put the duration before it on a cycle of constraints.
     fn drop_implied(&mut self, plan: &ParametrizedPlan) {
         let ranges = DecoupledEnvelope::ranges(plan);
         let BoxNetwork { network, edges } = self.network(&ranges);
@@ -164,7 +163,7 @@ impl Reduction {
         }
     }
 
-    /// Whether the parameter bounds a difference of times.
+    /// Returns `true` if the parameter bounds a difference of times.
     pub fn is_in_network(&self, parameter: ParameterId) -> bool {
         self.mentioned.contains(&parameter)
     }
@@ -249,7 +248,7 @@ impl Reduction {
         &self.edges
     }
 
-    /// The constraints, for whoever keeps them.
+    /// Returns a shared reference to the constraints.
     pub(crate) fn shared_edges(&self) -> Arc<Vec<Edge>> {
         Arc::clone(&self.edges)
     }
@@ -264,7 +263,8 @@ impl Reduction {
         self.places.len()
     }
 
-    /// The network in which every parameter ranges over its interval, separately for each edge.
+    /// Returns the network for a box, with every parameter at the worst end of its interval,
+    /// separately for each edge.
     pub fn network(&self, envelope: &DecoupledEnvelope) -> BoxNetwork {
         let mut network = Network::with_nodes(self.class_count);
         let mut edges = Vec::with_capacity(self.edges.len());
@@ -328,7 +328,8 @@ fn implied<W: Weight>(
     let Some(schedule) = schedule.filter(|schedule| schedule.holds_in(network.network())) else {
         return network.implied(keep);
     };
-    // What is near in time is looked through at once, the way back to the beginning is not.
+    // Searches among nodes that are close in time are fast, but searches along constraints back to
+    // the beginning are not. So those constraints are handled first.
     let late = implied_by_earlier(network.network(), &schedule, &keep);
     let mut left = Network::with_nodes(network.network().node_count());
     let mut ids = Vec::new();
@@ -355,11 +356,12 @@ fn implied<W: Weight>(
     implied
 }
 
-/// Of the constraints that say that a node comes so long after the first one, those that follow from one that
-/// says so of a node that is no later in the schedule.
+/// Returns, for each constraint, `true` if it is a lower bound on the time from the first node to
+/// another one, and follows from such a bound of a node that is no later in the schedule.
 ///
-/// All of them can go: if they followed from each other in a circle, all of its nodes would be at one time, the
-/// bounds between them would add up to nothing, and so each would be 0. Nodes on such circles are left alone.
+/// All of them can be removed. If they implied each other in a cycle, all nodes of the cycle would
+/// be at one time, the bounds between them would add up to 0, and so each would be 0. Nodes on such
+/// cycles are skipped.
 fn implied_by_earlier<W: Weight>(
     network: &Network<W>,
     schedule: &Times<W>,

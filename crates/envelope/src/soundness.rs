@@ -1,11 +1,11 @@
-//! Whether every schedule of a plan is valid, for every value in a box.
+//! Check that every schedule of a plan is valid, for every value in a box.
 //!
 //! The second half of paper 1's CHECKINENVELOPE, `enc_tn ∧ enc_eff ∧ enc_R → enc_proofs`, without
-//! an SMT solver. Each way of breaking an obligation is a system of linear inequalities over the
-//! schedules of the box ([`BadCase`]); that it has no solution is shown by a path or a flow in the
-//! plan's network, or, where parameters are coupled, by a linear program. Such proofs are sums of
-//! constraints, so they are kept, and when a box is widened only those that use the moved end
-//! and no longer add up are looked for again.
+//! an SMT solver. Each way of violating an obligation is a system of linear inequalities over the
+//! schedules of the box ([`BadCase`]). A path or a flow in the plan's network proves that it has no
+//! solution or, if parameters are coupled, a linear program. Such proofs are sums of constraints,
+//! and they are stored. When a box is widened, only proofs that use the moved end and no longer
+//! hold are searched again.
 
 mod bad_case;
 mod certificate;
@@ -37,17 +37,17 @@ pub use sound_box::SoundBox;
 
 /// Decides, box by box, whether every schedule of a plan is valid.
 ///
-/// It does not hold the task and the plan, only what it has made of them: both are handed to it
-/// with each question, and must be those that it was made for.
+/// It does not store the task and the plan, only data derived from them. The caller passes both
+/// with each query, and they must be the ones that it was created for.
 #[derive(Clone, Debug)]
 pub(crate) struct Soundness {
     reduction: Reduction,
     obligations: Obligations,
-    /// The schedule from which the order of happenings was taken.
+    /// Schedule that defines the order of happenings.
     schedule: Schedule,
     direct: Vec<DirectCase>,
     over_all: Vec<Option<Proof>>,
-    /// Whether these proofs are about boxes within the ranges of the parameters.
+    /// `true` if these proofs are about boxes within the ranges of the parameters.
     is_in_ranges: bool,
     /// The numbers in all bounds but the ends of boxes; `None` if they are large.
     numbers: Option<Numbers>,
@@ -70,7 +70,7 @@ struct DirectCase {
 pub struct Broken {
     /// The requirement.
     pub requirement: Requirement,
-    /// How it is broken.
+    /// Violated case.
     pub case: BadCase,
 }
 
@@ -111,13 +111,13 @@ pub struct Conditions {
     /// Those that are bounds on the difference of two times: the network implies them, so that an
     /// executor that keeps to the network keeps to them.
     pub differences: usize,
-    /// Those on numbers, or on several differences at once: they hold in every schedule of the
-    /// network, so that an executor need not look at them.
+    /// Conditions on numbers, or on several differences at once. They hold in every schedule of the
+    /// network, so that an executor need not check them.
     pub all_schedules: usize,
 }
 
 impl Soundness {
-    /// How what is required is met.
+    /// Returns the numbers of conditions, by what enforces them.
     pub(crate) fn conditions(&self) -> Conditions {
         let direct = self.obligations.direct.iter();
         let is_difference =
@@ -197,15 +197,15 @@ impl Soundness {
         self.refutations
     }
 
-    /// The first obligation that some schedule for some value in the box breaks. The box contains
-    /// the values that this was made [around](Self::around).
+    /// Returns the first obligation that some schedule for some value in the box violates. The box
+    /// must contain the values that this was created [around](Self::around).
     ///
-    /// Remembers the proofs it finds. `moved` is a hint, for speed: the box differs only in that
-    /// end, further out than before, from the last one for which the answer was `None`, and all
-    /// boxes asked about since have been that one with an end moved out.
+    /// Stores the proofs it finds. `moved` is a hint, for speed: the box differs only in that end,
+    /// which is further out, from the last box with the result `None`, and all boxes checked since
+    /// have been that one with an end moved out.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub(crate) fn broken(
         &mut self,
         task: &Task,
@@ -217,10 +217,10 @@ impl Soundness {
         Ok(found.pop())
     }
 
-    /// The same for `most` obligations at most: those that are the better reasons, if any is.
+    /// The same for at most `most` obligations: if possible, those that give better reasons.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart, and nothing is known to be broken.
+    /// If there are too many cases to decide, and no violation is known.
     pub(crate) fn all_broken(
         &mut self,
         task: &Task,
@@ -357,9 +357,9 @@ impl Soundness {
         bad_case::witness(&self.reduction, envelope, &broken.case, None)
     }
 
-    /// Like [`counterexample`](Self::counterexample), but breaking the obligation by as much as
-    /// any does. Two happenings that should be apart may then be so far the wrong way round that
-    /// it does no harm.
+    /// Like [`counterexample`](Self::counterexample), but with the greatest violation of the
+    /// obligation. Two happenings that should be apart may then be far apart in the reverse order,
+    /// which is harmless.
     pub(crate) fn worst_case(
         &self,
         envelope: &DecoupledEnvelope,
@@ -374,7 +374,7 @@ impl Soundness {
 }
 
 impl DirectCase {
-    /// Whether the known proofs still stand.
+    /// Returns `true` if the known proofs still hold.
     fn stands(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
         let Some(proofs) = &self.proofs else {
             return false;

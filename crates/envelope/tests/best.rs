@@ -17,8 +17,8 @@ use given::Given;
 const NOMINAL: i64 = 2;
 const MOST: i64 = 6;
 
-/// Three actions, the first two of which use up something, with bounds between their starts and
-/// ends.
+/// Returns a problem with three actions, the first two of which consume a resource, and bounds
+/// between their starts and ends.
 fn problem(bounds: &str) -> String {
     format!(
         "parameter a default {NOMINAL} lb 0 ub {MOST}; parameter b default {NOMINAL} lb 0 ub {MOST};
@@ -109,7 +109,7 @@ fn widths(envelope: &DecoupledEnvelope) -> Rational {
     widths.filter_map(Interval::width).sum()
 }
 
-/// How far each end lies from the nominal value, the least first.
+/// Returns the distances of the ends from the nominal values, in ascending order.
 fn slacks(envelope: &DecoupledEnvelope) -> Vec<Rational> {
     let nominal = Rational::from(NOMINAL);
     let ends = envelope.intervals().iter().flat_map(|interval| {
@@ -281,7 +281,7 @@ fn no_box_on_a_grid_has_more_volume_than_the_best_one() {
     assert!(unproved * 10 < proved, "{proved} {unproved}");
 }
 
-/// A search for the least slack that is ended knows at least the box with which it began.
+/// A search for the least slack that is cancelled returns at least its initial box.
 #[test]
 fn search_that_is_ended_is_no_worse_than_its_beginning() {
     let mut dice = Dice(11);

@@ -1,4 +1,4 @@
-//! The box in which durations most likely stay, against all boxes on a grid.
+//! The box that durations most likely stay in, compared with all boxes on a grid.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -33,8 +33,8 @@ fn problem(bounds: &str) -> String {
     )
 }
 
-/// Bounds of several sorts: deadlines that two durations share, in which the later starts are waited
-/// for or fixed, and actions that have to end in each other.
+/// Bounds of several kinds: deadlines that two durations share, with later starts that wait or are
+/// fixed, and actions that have to end in each other.
 const BOUNDS: [&str; 6] = [
     "c: two.end - .zero in [0, 7];",
     "c: two.end - .zero in [0, 6]; c: three.end - two.start in [-inf, 3];",

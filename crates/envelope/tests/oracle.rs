@@ -102,8 +102,7 @@ fn an_oracle_can_be_made_in_one_thread_and_used_in_another() {
     assert_eq!(asked.join().unwrap(), Ok(true));
 }
 
-/// The relay needs nobody to know anything in advance: of guarantees the stronger one never gives
-/// more.
+/// A stronger guarantee never accepts more than a weaker one.
 #[test]
 fn a_stronger_guarantee_accepts_no_box_that_a_weaker_one_refuses() {
     let (task, plan) = RELAY.task_and_plan();

@@ -1,4 +1,4 @@
-//! What is wrong with a schedule, and what could be otherwise.
+//! Flaws of a schedule, and the alternatives that avoid them.
 
 use std::collections::BTreeSet;
 
@@ -18,9 +18,9 @@ use crate::obligations::{
 /// `expression <= 0`, or `< 0` when strict, and what asks for it.
 pub(super) type Alternative = (Linear, bool, Hindrance);
 
-/// What is wrong with a schedule.
+/// Flaw of a schedule.
 pub(super) enum Flaw {
-    /// Nothing that an obligation stands for.
+    /// All obligations are met.
     None,
     /// This cannot be met while happenings keep their order.
     Hopeless(Requirement),
@@ -53,7 +53,8 @@ impl Finder<'_> {
     ) -> Result<Flaw, Refusal> {
         let compiled =
             Obligations::compile(self.task, self.plan, (schedule, values), self.substitution)?;
-        // As long as separations are broken, the others go by an order that there may not be.
+        // Separations come first: while they are violated, the other obligations assume an order
+        // that may not exist.
         for obligation in &compiled.direct {
             if let Some(case) = broken(obligation, values, schedule) {
                 return Ok(self.flaw(obligation, case, decided));

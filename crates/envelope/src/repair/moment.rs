@@ -7,16 +7,17 @@ use elbowroom_plan::{NodeId, Schedule, StnPlan, Valuation};
 use crate::linear::{Factor, Linear};
 use crate::obligations::{Inequality, OverAll, Refusal};
 
-/// What could be otherwise so that the condition is not broken where it is in this schedule: of
-/// these (`<= 0`, or `< 0` when strict), one holds in every valid schedule. `None` if it is not
-/// broken.
+/// Returns alternatives that avoid this schedule's violation of the condition: one of these
+/// expressions is `<= 0` (`< 0` when strict) in every valid schedule. `None` if the condition is
+/// not violated.
 ///
-/// Between two of the events that the condition depends on, what breaks it is linear in the moment.
-/// So it holds between them exactly if it does on the way to both. Where it fails at one of them, either that changes,
-/// or this is not the last event before the moment, or the first one after it, any longer.
+/// Between two consecutive events that the condition depends on, the violation is linear in the
+/// moment. So the condition holds between them exactly if it holds in the limit at both. If it
+/// fails at one of them, either that value changes, or this event is no longer the last one before
+/// the moment, or the first one after it.
 ///
 /// # Errors
-/// When a value is not linear, or what breaks the condition has several parts.
+/// If a value is not linear, or if the violation has several parts.
 pub(super) fn broken(
     task: &Task,
     plan: &StnPlan,
@@ -127,7 +128,7 @@ fn read_at(expression: &Linear, moment: NodeId, at: NodeId) -> Linear {
     read
 }
 
-/// Whether all inequalities hold at one moment strictly between two times.
+/// Returns `true` if all inequalities hold at one moment strictly between two times.
 fn holds_between(
     case: &[Inequality],
     moment: NodeId,

@@ -1,4 +1,4 @@
-//! Which happenings keep their order, and which may change it.
+//! Happenings that keep their order, and happenings that may change it.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use elbowroom_plan::{Bound, Node, NodeId, ParametrizedPlan, Schedule, StnPlan};
 
 use crate::obligations::interfering_in_order;
 
-/// What a plan says of the order of its happenings.
+/// Order of a plan's happenings, as far as the plan fixes it.
 pub(super) struct Orders {
     /// Interfering actions, the earlier first, that keep their order.
     pub(super) kept: Vec<(NodeId, NodeId)>,
@@ -17,7 +17,8 @@ pub(super) struct Orders {
     pub(super) footprints: Vec<Footprint>,
     /// For each node those that come before it, or with it, whatever changes.
     before: Vec<BTreeSet<NodeId>>,
-    /// Whether effects have conditions, so that what one happening changes can depend on all others.
+    /// `true` if effects have conditions, so that the changes of one happening can depend on all
+    /// others.
     pub(super) is_conditional: bool,
 }
 
@@ -84,7 +85,7 @@ impl Orders {
         }
     }
 
-    /// Whether nothing says yet which of the two comes first.
+    /// Returns `true` if the order of the two nodes is not fixed.
     fn is_open(&self, one: NodeId, other: NodeId) -> bool {
         one != other
             && !self.before[one.index()].contains(&other)
@@ -119,7 +120,7 @@ impl Orders {
         } else {
             &[]
         };
-        // What is read where the flaw shows comes first: that decides most.
+        // Pairs with the nodes that read the flawed condition come first, because they decide most.
         let of = |own: &[NodeId]| -> Vec<(NodeId, NodeId)> {
             own.iter()
                 .flat_map(|&node| pairs_with(node, &writers))

@@ -123,8 +123,8 @@ impl<'a> Program<'a> {
         program
     }
 
-    /// A parameter: where its free values begin, and variables for what is added to that, those outside
-    /// of the free values at a cost.
+    /// Adds a parameter: a base value within its free values, and variables for deviations from it.
+    /// Those outside the free values have a cost.
     fn add_changeable(&mut self, own: &Changeable) {
         let range = &self.plan.parameter(own.parameter).range;
         let tag = self.tag(Hindrance::Range(own.parameter));
@@ -208,10 +208,11 @@ impl<'a> Program<'a> {
         self.simplex.assert_upper(sum, bound, tag);
     }
 
-    /// `expression <= 0`, or `< 0`, in some cases: its number.
+    /// Adds the row `expression <= 0`, or `< 0`, which holds in some cases only, and returns its
+    /// number.
     ///
     /// # Errors
-    /// When it is not linear in what may change.
+    /// If it is not linear in the times and the changeable parameters.
     pub(super) fn row(
         &mut self,
         expression: &Linear,
@@ -241,8 +242,10 @@ impl<'a> Program<'a> {
         Ok(self.rows.len() - 1)
     }
 
-    /// The least cost in the case in which these rows hold, and the earliest schedule at that cost;
-    /// or what contradicts itself.
+    /// Computes the least cost in the case of these rows, and the earliest schedule at that cost.
+    ///
+    /// # Errors
+    /// The constraints that contradict each other.
     pub(super) fn solve(&mut self, rows: &[usize]) -> Result<Solved, Vec<Hindrance>> {
         self.simplex.push();
         let tags = self.hindrances.len();
@@ -315,7 +318,7 @@ impl<'a> Program<'a> {
         })
     }
 
-    /// What these values cost.
+    /// Returns the cost of these values.
     pub(super) fn cost_of(&self, values: &Valuation) -> Rational {
         let costs = self.changeable.iter().map(|own| {
             let value = &values[own.parameter];

@@ -25,17 +25,18 @@ pub(crate) struct Schedules<'a, S: Scale> {
     pub(crate) envelope: &'a DecoupledEnvelope,
     network: ConsistentNetwork<S::Weight>,
     scale: S,
-    /// Where the next question begins, as far as that is not where this one did: those of a plan resemble each
-    /// other, so it is a schedule at which the last one that was answered by a flow came out greatest.
+    /// Schedule that the next check starts from, as differences to the current one. It is the
+    /// maximum of the last check that a flow decided, because the checks of a plan resemble each
+    /// other.
     next: Vec<(ClassId, S::Weight)>,
-    /// A schedule in which all that can take long does, if there is one, until the first question about inequalities.
+    /// Schedule with long durations, if there is one; dropped at the first check of inequalities.
     longest: Option<Schedule<S::Weight>>,
     workspace: flow::Workspace<S::Weight>,
     /// For the first constraints of the network, a position in [`Reduction::edges`].
     edges: Vec<usize>,
-    /// The constraints after these: what is assumed.
+    /// The constraints after these: the assumptions.
     assumed: Vec<Constraint<Delta>>,
-    /// Whether proofs tell what they add up.
+    /// `true` if proofs list the constraints that they add up.
     tells: bool,
 }
 
@@ -116,7 +117,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         })
     }
 
-    /// Lets proofs tell what they add up from now on.
+    /// Makes proofs list the constraints that they add up, from now on.
     pub(crate) fn tell(&mut self) {
         self.tells = true;
     }
@@ -149,7 +150,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         }
     }
 
-    /// Forgets what has been assumed since.
+    /// Undoes all assumptions made since.
     pub(crate) fn undo_to(&mut self, before: &Before) {
         self.assumed.truncate(before.assumed);
         self.network.go_back_to(before.checkpoint);
@@ -191,7 +192,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         certificate.complete()
     }
 
-    /// Whether all of the case can be at once.
+    /// Decides whether all constraints of the case can hold at once.
     pub(crate) fn possible(&mut self, case: &BadCase) -> Outcome {
         let before = self.before();
         let mut refuted = None;
@@ -206,8 +207,9 @@ impl<'a, S: Scale> Schedules<'a, S> {
         outcome
     }
 
-    /// Begins at a schedule from the next question on: the present one, but for some nodes. Its times count from the
-    /// beginning of the plan; one in which they are so large that sums might not fit is not taken.
+    /// Sets the schedule that the next check starts from: the present one with these changes. Its
+    /// times are relative to the beginning of the plan. It is ignored if its times are so large
+    /// that sums might overflow.
     fn begin_at(&mut self, moved: Vec<(ClassId, S::Weight)>) {
         let present = self.network.schedule();
         let mut times: BTreeMap<ClassId, S::Weight> = self
@@ -232,7 +234,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
         }
     }
 
-    /// Whether the inequalities can hold in the network as it is now, differences included.
+    /// Decides whether the inequalities can hold in the current network, which includes the
+    /// differences.
     pub(crate) fn inequalities_possible(&mut self, case: &BadCase) -> Outcome {
         if case.inequalities.is_empty() && self.reduction.coupled.is_empty() {
             return Outcome::Possible;
@@ -275,8 +278,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
         Outcome::Impossible(certificates)
     }
 
-    /// Where corners do not decide several inequalities at once, one of them may be impossible by
-    /// itself.
+    /// Checks each inequality on its own, for cases where the corners do not decide several
+    /// inequalities at once.
     fn each_possible(&mut self, case: &BadCase, parameter: ParameterId) -> Outcome {
         if case.inequalities.len() > 1 {
             for (index, inequality) in case.inequalities.iter().enumerate() {
@@ -372,8 +375,9 @@ impl<'a, S: Scale> Schedules<'a, S> {
             .then_some(certificate)
     }
 
-    /// Whether an expression is likely to be greater in this schedule than in the present one: whether it would be
-    /// with 1 and -1 for coefficients. Of one that reads a moment inside an action nothing is known.
+    /// Returns `true` if an expression is likely to be greater in this schedule than in the present
+    /// one: its coefficients are replaced by their signs. Always `true` if the expression reads a
+    /// moment inside an action.
     fn is_greater_at(&self, other: &Schedule<S::Weight>, demand: &Demand) -> bool {
         let present = self.network.schedule();
         let mut gain = S::Weight::zero();

@@ -16,7 +16,7 @@ use elbowroom_stn::{
 /// The flow along each constraint that has any.
 pub(crate) type Flow = BTreeMap<ConstraintId, Rational>;
 
-/// How many units have to come into a node net, where that is not none.
+/// Net number of units that have to flow into each node; nodes with 0 are left out.
 pub(crate) type Demand = BTreeMap<NodeId, Rational>;
 
 /// The cheapest flow that brings `demand[k]` units net into each node `k` (the demands add up to
@@ -57,16 +57,17 @@ enum Step {
     Back(ConstraintId),
 }
 
-/// What is known of nodes during a search, kept to spare allocations; between two of them that is nothing.
+/// Data about nodes during a search, reused to save allocations. Only `components` is kept between
+/// searches.
 #[derive(Debug)]
 pub(crate) struct Workspace<W> {
     /// The potentials of nodes that are not their times in the network's present schedule.
     potential: Vec<Option<W>>,
     /// The nodes that have one.
     moved: Vec<NodeId>,
-    /// What is known of the nodes during a search for a path.
+    /// Result of the current search for a path, by node.
     reached: Vec<Option<Reached<W>>>,
-    /// The nodes of which something is known.
+    /// Nodes with an entry in `reached`.
     touched: Vec<NodeId>,
     /// For nodes that lasting constraints are about, one for all that these lead to and back from: they lead to nodes with the same one, or
     /// a greater one.
@@ -131,14 +132,15 @@ impl<W: Weight> Workspace<W> {
 }
 
 impl<W: Weight> Search<'_, '_, W> {
-    /// Whether there is [no flow](is_endless) for the demand, as far as that can be told before one is looked for.
+    /// Returns `true` if [no flow](is_endless) meets the demand, as far as that is known without a
+    /// search.
     fn is_endless(&self, demand: &Demand) -> bool {
         let assumed = &self.network.network().constraints()[self.lasting..];
         let mut left = assumed.iter().map(|constraint| constraint.from);
         is_endless(demand, &self.workspace.components, &mut left)
     }
 
-    /// Sends what is demanded, by one cheapest path after the other; whether there are such.
+    /// Meets the demand along one cheapest path after the other. Returns `false` if there is none.
     fn meet(&mut self, demand: &mut Demand) -> bool {
         let sources = demand.iter().filter(|(_, amount)| amount.is_negative());
         let sources: Vec<NodeId> = sources.map(|(node, _)| *node).collect();
@@ -254,8 +256,8 @@ impl<W: Weight> Search<'_, '_, W> {
                     workspace.touched.push(far);
                 }
                 if known.as_ref().is_none_or(|old| candidate < old.distance) {
-                    // Nothing is nearer than what is no farther than the nearest of the queue: from
-                    // a good schedule, many nodes are as near, and need not be looked at.
+                    // A node as near as the head of the queue is the nearest one. From a good
+                    // schedule, many nodes are equally near, and need not be examined.
                     let is_nearest = candidate == distance && is_wanted(far);
                     if !is_nearest {
                         queue.push(Reverse((candidate.clone(), steps + 1, far)));
@@ -291,11 +293,12 @@ fn components(
     components.into_iter().map(|number| nodes[number]).collect()
 }
 
-/// Whether some nodes from which only constraints between themselves lead have more units that leave them than come into
-/// them. Then there is no flow; the search for a path would go everywhere before it says so.
+/// Returns `true` if a set of nodes without outgoing constraints has a net demand to send units
+/// out. There is then no flow, but the search for a path would visit the whole network before it
+/// fails.
 ///
-/// Such nodes are those of one component, and all of the greater ones, if `left` has none of them, from which other
-/// constraints lead.
+/// The sets considered are a component and all greater ones, provided that none of the nodes in
+/// `left`, where other constraints begin, belongs to them.
 fn is_endless(
     demand: &Demand,
     components: &[NodeId],
@@ -324,7 +327,7 @@ mod tests {
 
     use super::*;
 
-    /// A network of six nodes, in which 0, 1, 2, … is a schedule.
+    /// Returns a network of six nodes with the schedule 0, 1, 2, ….
     fn network(random: &mut ChaCha8Rng) -> Network<i64> {
         let mut network = Network::with_nodes(6);
         for _ in 0..random.random_range(4..12) {

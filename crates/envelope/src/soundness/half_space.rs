@@ -1,12 +1,12 @@
-//! What a broken obligation says about other boxes: a [`Row`].
+//! Derivation of a [`Row`] for other boxes from a violated obligation.
 //!
-//! Where the bad case is one inequality in differences of times that are parameters, what it says
-//! is a linear function of the parameters: some schedule exists for every value in a box inside the
-//! envelope, and whichever it is, these differences are what the values say. So the worst corner of
-//! the box decides, and every box inside the envelope satisfies one linear inequality in its ends.
+//! Let the bad case be one inequality in differences of times that are parameters. Then it is a
+//! linear function of the parameters: for every value in a box inside the envelope there is some
+//! schedule, and in each schedule these differences equal the values. So the worst corner of the
+//! box decides, and every box inside the envelope satisfies one linear inequality in its ends.
 //!
-//! An over-all condition is read at a moment that lies anywhere inside its action. It is taken as
-//! close to one of the events around it as one likes, if that is a possible place for the moment.
+//! An over-all condition is read at a moment anywhere inside its action. The moment is taken
+//! arbitrarily close to one of the events around it, if that is a possible place.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -30,8 +30,8 @@ struct Place {
 }
 
 impl Soundness {
-    /// What every box inside the envelope satisfies because of each of these, which are broken in this
-    /// one; `None` if that is nothing linear.
+    /// Returns, for each of these violations in `envelope`, the row that every box inside the
+    /// robustness envelope satisfies because of it; `None` if it is not linear.
     pub(crate) fn rows(
         &self,
         plan: &ParametrizedPlan,
@@ -87,8 +87,8 @@ impl Soundness {
         }
     }
 
-    /// Whether the moment can be as close to the event as one likes, for the values at which a box
-    /// with the nominal values in it breaks the row.
+    /// Returns `true` if the moment can be arbitrarily close to the event, for the values at which
+    /// a box that contains the nominal values violates the row.
     fn is_possible(
         &self,
         plan: &ParametrizedPlan,
@@ -114,7 +114,8 @@ impl Soundness {
     /// The network of all schedules for values in a box, if there are any.
     fn schedules_in(&self, envelope: &DecoupledEnvelope) -> Option<ConsistentNetwork<Delta>> {
         let network = self.reduction.network(envelope).network;
-        // From a schedule in which things take their time, what is far away in time is far away.
+        // Relative to the nominal schedule, nodes that are far apart in time are also far apart in
+        // the search for shortest paths.
         let times = self.reduction.class_times(&self.schedule).into_iter();
         let known = elbowroom_stn::Schedule::new(times.map(Delta::from).collect());
         if known.holds_in(&network) {
@@ -123,8 +124,8 @@ impl Soundness {
         ConsistentNetwork::try_from(network).ok()
     }
 
-    /// Whether the moment can be as close to the event as one likes in all schedules of a network, and so
-    /// in all of one that allows fewer.
+    /// Returns `true` if the moment can be arbitrarily close to the event in all schedules of a
+    /// network. The result also holds for every network with fewer schedules.
     fn is_there(
         &self,
         network: &ConsistentNetwork<Delta>,
@@ -148,8 +149,8 @@ impl Soundness {
     }
 }
 
-/// Whether a difference holds in all schedules of the network, the moment being just before or just
-/// after the event.
+/// Returns `true` if a difference holds in all schedules of the network, with the moment just
+/// before or just after the event.
 fn entails(
     reduction: &Reduction,
     network: &ConsistentNetwork<Delta>,

@@ -1,4 +1,4 @@
-//! The network of a box, made only when something has to be proved anew.
+//! The network of a box, built only when a new proof is needed.
 
 use elbowroom_model::Task;
 
@@ -49,7 +49,7 @@ impl<'a> AnySchedules<'a> {
         }
     }
 
-    /// The same, whose proofs tell what they add up.
+    /// Like [`new`](Self::new), but proofs list the constraints that they add up.
     pub(crate) fn telling(
         reduction: &'a Reduction,
         envelope: &'a DecoupledEnvelope,

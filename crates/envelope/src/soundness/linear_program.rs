@@ -1,4 +1,4 @@
-//! The general case: several inequalities at once, or parameters that stand in several places.
+//! The general case: several inequalities at once, or parameters that occur in several places.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side, Valuation};
 enum Meaning {
     Edge(usize),
     End(BoxEnd),
-    /// What is assumed, or an inequality.
+    /// An assumption or an inequality.
     Given(Term, Delta),
     Zero,
 }

@@ -1,7 +1,8 @@
-//! Weights of the networks in which bad cases are looked for.
+//! Weights of the networks for bad cases.
 //!
-//! Bounds are fractions, and strict ones an infinitesimal less. Nearly always they fit whole
-//! numbers, multiplied by their common denominator: that is several times faster, and as exact.
+//! Bounds are fractions, and strict ones an infinitesimal less. Multiplied by their common
+//! denominator, they almost always fit whole numbers, which are several times faster and equally
+//! exact.
 
 use elbowroom_num::{CommonDenominator, Delta, Rational};
 use elbowroom_stn::Weight;
@@ -17,7 +18,8 @@ pub(crate) trait Scale {
     /// The bound's weight.
     fn weight(&self, bound: &Delta) -> Self::Weight;
 
-    /// Whether a time is one that paths can add up to, so that sums with it fit.
+    /// Returns `true` if a time is no larger than the length of a path can be, so that sums with it
+    /// fit.
     fn is_moderate(&self, time: &Self::Weight) -> bool;
 }
 
@@ -43,7 +45,7 @@ pub(crate) struct Whole {
     denominator: i64,
 }
 
-/// How many δ make up the smallest difference of two bounds: more than anything adds up.
+/// Number of δ in the smallest difference of two bounds; more than any sum contains.
 const UNIT: i128 = 1 << 40;
 
 /// All weights on a path without repetition add up to less, δ apart.

@@ -50,7 +50,7 @@ fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     network.schedule().relative_to(zero).into()
 }
 
-/// Steps with what they need and do, and what is left of their order.
+/// Describes the steps with their conditions and effects, and their remaining order.
 fn shown(task: &Task, plan: &StnPlan, fixed: &TimeTriggeredPlan) -> String {
     let steps = fixed.steps.iter().map(|step| {
         let duration = step.duration.clone().unwrap_or_default();
@@ -74,7 +74,7 @@ fn shown(task: &Task, plan: &StnPlan, fixed: &TimeTriggeredPlan) -> String {
     steps.chain(order).chain([timed]).collect()
 }
 
-/// What some schedule of the plan breaks.
+/// Returns an obligation that some schedule of the plan violates.
 fn broken(task: &Task, plan: &StnPlan) -> Result<Option<Broken>, Refusal> {
     let closed = ParametrizedPlan::closed(task, plan.clone());
     let everything = DecoupledEnvelope::point(&Valuation::default());
@@ -108,8 +108,8 @@ fn deordered(seed: u64, is_timeless: bool) -> (ChaCha8Rng, Task, Deordered) {
     )
 }
 
-/// Deordering alone is claimed to be enough where [`keeps_all_that_is_read`] says so: the judge and the
-/// soundness check look at what it says so of.
+/// If [`keeps_all_that_is_read`] returns `true`, deordering alone keeps the plan valid. The
+/// validator and the soundness check confirm that.
 #[test]
 fn all_schedules_are_valid_where_deordering_is_said_to_keep_all_that_is_read() {
     let (mut kept, mut with_numbers, mut in_doubt, mut unsound) = (0, 0, 0, 0);
@@ -166,8 +166,8 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
     println!("{pinned} of 250 plans needed pins; of {untold} nothing could be told");
 }
 
-/// Of what a condition throughout an action reads, only what can happen on either side of a moment inside the action
-/// is placed; the slow way, which decides about each event, comes to the same wherever the moment is.
+/// For an over-all condition, only events that can be on either side of a moment inside the action
+/// are placed. The result equals that of placing every event, for every moment.
 #[test]
 fn what_is_far_from_an_action_makes_no_difference_to_what_holds_throughout() {
     let (mut conditions, mut fewer) = (0, 0);

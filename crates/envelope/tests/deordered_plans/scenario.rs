@@ -77,7 +77,8 @@ pub(super) fn time(rng: &mut ChaCha8Rng, most: i64) -> Rational {
     Rational::new(rng.random_range(1..=2 * most), 2)
 }
 
-/// What an effect depends on, mostly nothing. Only end effects look back.
+/// Returns the guard of an effect, usually trivial. Only end effects can read the state at the
+/// start.
 fn guard(rng: &mut ChaCha8Rng, is_end: bool) -> Guard {
     let mut part = |may_be: bool| {
         if may_be && rng.random_bool(0.08) {

@@ -18,14 +18,13 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 pub(crate) struct Given<'a> {
     /// `:synth-parameters` and actions.
     pub(crate) domain: &'a str,
-    /// What holds in the beginning, and what happens by itself. `(x)` and `(y)` begin at 5, `(z)`
-    /// has no value.
+    /// Initial state and timed initials. `(x)` and `(y)` begin at 5, `(z)` has no value.
     pub(crate) init: &'a str,
     /// The goal; `(and)` if empty.
     pub(crate) goal: &'a str,
     /// An STN plan file.
     pub(crate) plan: &'a str,
-    /// What else to leave open.
+    /// Further quantities to leave open.
     pub(crate) vary: &'a [&'a str],
 }
 
@@ -62,7 +61,8 @@ impl Given<'_> {
         (Arc::new(task), Arc::new(plan))
     }
 
-    /// What one oracle says of these boxes, one after the other: `inside`, or why not.
+    /// Returns the answers of one oracle for these boxes, one after the other: `inside`, or the
+    /// objection.
     pub(crate) fn answers(&self, boxes: &[&str]) -> Vec<String> {
         let (task, plan) = self.task_and_plan();
         let mut oracle = oracle(&task, &plan).expect("within reach");
@@ -81,7 +81,7 @@ impl Given<'_> {
             .collect()
     }
 
-    /// What shows that the box is not inside.
+    /// Returns the counterexample that shows that the box is not inside.
     pub(crate) fn counterexample(&self, text: &str) -> Counterexample {
         let (task, plan) = self.task_and_plan();
         let mut oracle = oracle(&task, &plan).expect("within reach");

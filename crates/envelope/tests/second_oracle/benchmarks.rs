@@ -104,7 +104,7 @@ fn our_boxes_are_inside_by_the_authors_encoding_and_cannot_grow() {
     );
 }
 
-/// What Z3 says of our boxes.
+/// Z3's verdicts on the computed boxes.
 #[derive(Debug, Default)]
 #[allow(dead_code, reason = "printed")]
 struct Tally {
@@ -112,7 +112,7 @@ struct Tally {
     inside: usize,
     shifted: usize,
     outside: usize,
-    /// What it could not tell in time.
+    /// Boxes that Z3 could not decide in time.
     open: Vec<String>,
 }
 

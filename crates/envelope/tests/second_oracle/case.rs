@@ -16,7 +16,7 @@ use elbowroom_plan::{
 
 use crate::numbers;
 
-/// A bound on the difference of two time points, which are named by what they mean.
+/// Bound on the difference of two time points, which are identified by their meaning.
 #[derive(Clone, Debug)]
 pub(crate) struct Gap {
     pub(crate) from: Node,
@@ -50,7 +50,7 @@ impl Case {
         times
     }
 
-    /// What the oracles are asked about.
+    /// Builds the task and the plan for the oracles.
     pub(crate) fn build(&self) -> (Task, ParametrizedPlan) {
         let mut problem = self.problem.clone();
         problem.unknowns = self.parameters.iter().map(|p| p.name.clone()).collect();
@@ -120,7 +120,7 @@ impl Case {
         Task::new(problem).with_epsilon(self.epsilon.clone())
     }
 
-    /// What the judge says of a schedule of the plan for these values.
+    /// Returns the validator's verdict on a schedule of the plan for these values.
     pub(crate) fn judge(&self, valuation: &Valuation, schedule: &Schedule) -> Verdict {
         let (_, plan) = self.build();
         let scheduled = plan.plan.at(valuation).scheduled(schedule);

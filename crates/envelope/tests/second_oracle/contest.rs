@@ -1,4 +1,4 @@
-//! All oracles are asked about the same boxes, and the judge about what they claim.
+//! Compares all oracles on the same boxes, and checks their claims with the validator.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -23,7 +23,7 @@ use crate::smt::{Encoding, Places, contained};
 use crate::system::System;
 use crate::z3::{Found, Z3};
 
-/// How many groups of happenings the plain oracle may look at for one box.
+/// Limit on groups of happenings that the plain oracle examines for one box.
 const MOST_GROUPS: usize = 1500;
 
 /// A box to ask about.
@@ -39,7 +39,7 @@ pub(crate) enum Step {
     LookWider { end: BoxEnd, by: Option<Rational> },
 }
 
-/// What came of it all.
+/// Statistics of a comparison.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
     /// Boxes asked about, by what the oracles agree on (or do not say).
@@ -224,7 +224,7 @@ struct Contest<'a> {
 }
 
 impl Contest<'_> {
-    /// Whether the box is inside; `None` if the fast oracle has no answer.
+    /// Returns `true` if the box is inside; `None` if the fast oracle has no answer.
     fn ask(
         &mut self,
         oracle: &mut Oracle,

@@ -30,7 +30,7 @@ impl Dice {
         least + i64::try_from(self.roll() % width).expect("small")
     }
 
-    /// True so many times in a hundred.
+    /// Returns `true` with this probability, in percent.
     pub(crate) fn chance(&mut self, percent: usize) -> bool {
         self.below(100) < percent
     }

@@ -14,7 +14,7 @@ use crate::dice::Dice;
 use crate::system::System;
 use skeleton::skeleton;
 
-/// What a case has more of than others.
+/// Feature that is more frequent in a case.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Theme {
     /// Nothing.
@@ -25,7 +25,7 @@ enum Theme {
     Rates,
     /// Conditional effects.
     Guards,
-    /// Parameters that stand in several places.
+    /// Parameters that occur in several places.
     Shared,
 }
 

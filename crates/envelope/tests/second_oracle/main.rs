@@ -50,7 +50,7 @@ fn script(seed: u64, length: usize) -> Script {
     Script { case, steps }
 }
 
-/// All mismatches, shrunk, and what was compared.
+/// Returns all mismatches, shrunk, and statistics.
 fn compare(cases: std::ops::Range<u64>, mut solver: Option<Z3>) -> (Tally, Vec<String>) {
     let mut tally = Tally::default();
     let mut complaints = Vec::new();

@@ -1,11 +1,11 @@
-//! The plainly right oracle: every order of the time points, ties included.
+//! Brute-force oracle: every order of the time points, ties included.
 //!
-//! It goes through all orders in which the happenings can fall, group by group, and does what the
-//! judge does, with values that are expressions in times and parameters. Each question ("can this
-//! condition be false here?") is one linear program over all schedules with that order.
+//! It enumerates all orders of the happenings, group by group, and applies the validator's rules,
+//! with values that are expressions in times and parameters. Each question ("can this condition be
+//! false here?") is one linear program over all schedules with that order.
 //!
-//! Parameters that multiply something are not left open: a few values of each are tried. So
-//! "inside" is certain only without such products; "broken" always comes with a schedule.
+//! Parameters that multiply something are not left open; a few values of each are tried. So
+//! "inside" is certain only without such products. "Broken" always comes with a schedule.
 
 mod effects;
 mod group;
@@ -22,7 +22,7 @@ use crate::polynomial::{Polynomial, Symbol};
 use crate::system::System;
 use search::{Search, Trouble};
 
-/// Whether a box is inside the robustness envelope.
+/// Verdict on a box.
 #[derive(Clone, Debug)]
 pub(crate) enum Answer {
     Inside,
@@ -32,7 +32,7 @@ pub(crate) enum Answer {
     Broken(Break),
 }
 
-/// What breaks, and where.
+/// Violation, with values and a schedule that show it.
 #[derive(Clone, Debug)]
 pub(crate) struct Break {
     pub(crate) what: String,
@@ -50,7 +50,7 @@ pub(crate) enum GaveUp {
     NotCovered,
 }
 
-/// Whether all values in the box have a schedule, and all schedules for them are valid.
+/// Checks that all values in the box have a schedule, and that all schedules for them are valid.
 pub(crate) fn check(
     task: &Task,
     plan: &ParametrizedPlan,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-/// What a value can depend on.
+/// Variable that a value can depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Symbol {
     /// The time of a node, by position in the plan.

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan};
 
-/// How many branches are looked at before giving up.
+/// Limit on branches that are examined.
 const MOST_BRANCHES: usize = 200_000;
 
 /// A number, and how often infinity is added to it.
@@ -31,7 +31,7 @@ enum Limit {
     Parameter(usize, i64),
 }
 
-/// Whether some values in the box have no schedule; `None` if that takes too long.
+/// Returns `true` if some values in the box have no schedule; `None` if the check takes too long.
 pub(crate) fn are_missing(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<bool> {
     let edges = edges(plan);
     let mut branches: Vec<BTreeMap<usize, Extended>> = vec![BTreeMap::new()];
@@ -134,7 +134,7 @@ fn plus(a: &Extended, b: &Extended) -> Extended {
     (a.0 + b.0, &a.1 + &b.1)
 }
 
-/// Whether a path may go over both edges, one after the other.
+/// Returns `true` if a path may contain both edges, one after the other.
 fn may_follow(first: &Edge, second: &Edge) -> bool {
     let goes_back = match (&first.bound, &second.bound) {
         (Limit::Parameter(a, _), Limit::Parameter(b, _)) => a == b && second.to == first.from,

@@ -125,7 +125,7 @@ fn without_timed(case: &Case, removed: usize) -> Option<Case> {
     Some(case)
 }
 
-/// The parameter's nominal value stands in its place.
+/// Replaces a parameter by its nominal value.
 fn without_parameter(script: &Script, removed: usize) -> Script {
     let mut script = script.clone();
     let case = &mut script.case;

@@ -28,7 +28,7 @@ use text::{and, apply, not, number, or, sum};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NotEncoded;
 
-/// The text that a plan's schedules satisfy, and the text of what may go wrong in them.
+/// Text of the constraints on a plan's schedules, and text of the violations.
 pub(crate) struct Encoding {
     schedules: String,
     effects: String,
@@ -69,7 +69,7 @@ impl Encoding {
         format!("{}(assert {violation})\n", self.lives(envelope))
     }
 
-    /// What holds in all schedules for values in the box.
+    /// Returns the text that holds in all schedules for values in the box.
     fn lives(&self, envelope: &DecoupledEnvelope) -> String {
         format!("{}{}{}", self.schedules, in_box(envelope), self.effects)
     }
@@ -80,7 +80,8 @@ impl Encoding {
     }
 }
 
-/// Whether the box is inside; `None` if Z3 cannot tell in time, or something is not encoded.
+/// Returns `true` if the box is inside; `None` if Z3 cannot decide in time, or something is not
+/// encoded.
 pub(crate) fn contained(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -131,7 +132,7 @@ fn in_box(envelope: &DecoupledEnvelope) -> String {
     text
 }
 
-/// Where an expression is read.
+/// Moment at which an expression is evaluated.
 #[derive(Clone)]
 enum At {
     /// On arrival at a position.
@@ -177,7 +178,7 @@ impl<'a> Encoder<'a> {
         self.line(&format!("(assert {formula})"));
     }
 
-    /// How many nodes have a position: all but zero.
+    /// Returns the number of nodes with a position: all but zero.
     fn count(&self) -> usize {
         self.plan.plan.nodes.len() - 1
     }

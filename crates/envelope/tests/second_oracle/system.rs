@@ -8,7 +8,7 @@ use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan, Schedule, Valua
 
 use crate::polynomial::{Polynomial, Symbol};
 
-/// How a polynomial compares with zero.
+/// Comparison of a polynomial with zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Relation {
     Below,
@@ -20,7 +20,7 @@ pub(crate) enum Relation {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NotLinear;
 
-/// All schedules of a plan for all values in a box, and what is assumed about them for a while.
+/// All schedules of a plan for all values in a box, with temporary assumptions.
 pub(crate) struct System {
     simplex: Simplex,
     variables: BTreeMap<Symbol, VariableId>,

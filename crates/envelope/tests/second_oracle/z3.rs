@@ -13,7 +13,7 @@ pub(crate) struct Z3 {
     milliseconds: u64,
 }
 
-/// Whether a text has a model.
+/// Result of a satisfiability check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Found {
     Model,
@@ -59,7 +59,7 @@ impl Z3 {
         })
     }
 
-    /// Whether the text, declarations and assertions, has a model.
+    /// Checks whether the text, declarations and assertions, has a model.
     pub(crate) fn ask(&mut self, text: &str) -> Found {
         let question = format!(
             "(reset)\n(set-option :timeout {})\n{text}(check-sat)\n",

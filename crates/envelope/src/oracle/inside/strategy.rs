@@ -8,8 +8,8 @@ use elbowroom_stn::NodeId as NetworkNode;
 
 use crate::proved::Strategy;
 
-/// What an executor has to keep to beside the plan's own constraints; `None` if the network is not
-/// dynamically controllable.
+/// Returns the constraints that an executor has to satisfy in addition to the plan's own; `None` if
+/// the network is not dynamically controllable.
 pub(super) fn strategy(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Strategy> {
     let plan_network = plan.uncertain_network(envelope).ok()?;
     let network = &plan_network.network;

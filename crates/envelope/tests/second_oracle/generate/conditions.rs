@@ -100,7 +100,8 @@ impl Nominal<'_> {
         }
     }
 
-    /// A comparison that holds by a little, as far as the judge can tell the value.
+    /// Returns a comparison that holds by a small margin, as far as the validator can compute the
+    /// value.
     fn near(&mut self, place: Place, left: &Expression) -> (Comparison, Rational) {
         let comparison = *self.dice.pick(&[
             Comparison::AtLeast,

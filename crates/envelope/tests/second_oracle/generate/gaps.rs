@@ -69,7 +69,7 @@ impl Nominal<'_> {
         });
     }
 
-    /// A constraint so many halves wide around the nominal difference, or without end.
+    /// Adds a constraint around the nominal difference, `width` halves wide, or unbounded.
     fn add_gap(&mut self, from: Node, to: Node, width: i64, least: Option<Rational>) {
         let gap = &self.time(to) - &self.time(from);
         let slack = Rational::new(width, 2);
@@ -134,7 +134,7 @@ impl Nominal<'_> {
     }
 }
 
-/// Whether an over-all condition of the running action reads what the footprint writes.
+/// Returns `true` if an over-all condition of the running action reads what the footprint writes.
 fn over_all_reads(
     task: &Task,
     plan: &elbowroom_plan::ParametrizedPlan,

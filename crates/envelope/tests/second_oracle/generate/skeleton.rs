@@ -179,7 +179,7 @@ fn body(dice: &mut Dice, facts: usize, fluents: usize, theme: Theme) -> Body {
     }
 }
 
-/// How many effects in a hundred depend on a condition.
+/// Returns the percentage of effects that depend on a condition.
 fn guarded(theme: Theme) -> usize {
     if theme == Theme::Guards { 40 } else { 4 }
 }

@@ -1,4 +1,4 @@
-//! What a group of happenings changes.
+//! Changes made by a group of happenings.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::search::{Context, Running, Search, Step, Trouble, World};
 use super::truth::Want;
 use crate::polynomial::Polynomial;
 
-/// Which effect's guard, and which part of it.
+/// Part of an effect's guard.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
     Now,
@@ -109,7 +109,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Carries out the group's effects and goes on with the next group, or looks at the goal.
+    /// Applies the group's effects and continues with the next group, or checks the goal.
     fn apply(
         &mut self,
         mut world: World,
@@ -216,7 +216,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// What a node changes.
+    /// Returns the changes of a node.
     fn changes(&self, node: usize, outcomes: &BTreeMap<GuardKey, bool>) -> Vec<&'a Change> {
         let effects = match self.node(node) {
             Node::Zero => return Vec::new(),

@@ -1,4 +1,4 @@
-//! What a group of happenings requires.
+//! Requirements of a group of happenings.
 
 use std::collections::BTreeMap;
 
@@ -96,7 +96,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether the time of a timed initial depends on a parameter: no constraint fixes it.
+    /// Returns `true` if the time of a timed initial depends on a parameter: no constraint fixes
+    /// it.
     fn is_open(&self, node: usize) -> bool {
         !self.plan.plan.constraints.iter().any(|constraint| {
             constraint.to.index() == node

@@ -11,7 +11,7 @@ use super::{Break, GaveUp};
 use crate::polynomial::{Polynomial, Symbol};
 use crate::system::{Relation, System};
 
-/// Why the search ended without an answer.
+/// Reason why the search ended without an answer.
 pub(super) enum Trouble {
     GaveUp(GaveUp),
     /// This is not linear.
@@ -27,7 +27,7 @@ pub(super) struct Search<'a> {
     pub(super) system: System,
     /// Values of parameters that multiply something.
     pub(super) fixed: BTreeMap<usize, Rational>,
-    /// How many more groups may be looked at.
+    /// Number of further groups that may be examined.
     pub(super) left: usize,
     pub(super) found: Option<Break>,
 }
@@ -47,12 +47,12 @@ pub(super) struct World {
 #[derive(Clone)]
 pub(super) struct Running {
     pub(super) is_new: bool,
-    /// What the guards read at the start said, of end effects and of continuous ones.
+    /// Values of the guards read at the start, of end effects and of continuous ones.
     pub(super) end_guards: Vec<bool>,
     pub(super) continuous: Vec<bool>,
 }
 
-/// What a condition or expression is read in.
+/// State in which a condition or expression is evaluated.
 #[derive(Clone)]
 pub(super) struct Context {
     pub(super) facts: Vec<bool>,

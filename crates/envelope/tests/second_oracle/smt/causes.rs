@@ -1,8 +1,8 @@
-//! Plans without numbers that change: no positions, only who comes before whom.
+//! Encoding of plans without changing numbers: no positions, only precedence.
 //!
-//! A fact is true at a moment exactly if something made it so before (the beginning counts) and
-//! nothing made it false in between. Time points that interfere must not coincide, which is
-//! asked for by itself; what is said here of coinciding ones does not matter then.
+//! A fact is true at a moment exactly if something made it true before (the beginning counts) and
+//! nothing made it false in between. Time points that interfere must not coincide, which is a
+//! separate requirement, so the encoding of coinciding ones does not matter.
 
 use elbowroom_model::ground::{Change, Condition, Effect, Expression, FactId};
 use elbowroom_model::problem::Comparison;
@@ -24,8 +24,8 @@ enum Moment {
 }
 
 impl Encoder<'_> {
-    /// What holds in all schedules for values in the box; leaves what may go wrong in
-    /// `violations`.
+    /// Returns the text that holds in all schedules for values in the box; adds the possible
+    /// violations to `violations`.
     pub(super) fn causes(&mut self, envelope: &DecoupledEnvelope) -> Result<String, NotEncoded> {
         self.check_no_changing_numbers()?;
         self.network();

@@ -84,7 +84,7 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// How much a fluent moves continuously from position `from` until the time `until`, which
+    /// Returns the continuous change of a fluent from position `from` until the time `until`, which
     /// comes before position `next` or at it.
     pub(super) fn drift(
         &self,

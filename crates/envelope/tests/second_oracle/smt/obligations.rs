@@ -1,4 +1,4 @@
-//! What may go wrong.
+//! Encoding of violations.
 
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::{Condition, Expression};

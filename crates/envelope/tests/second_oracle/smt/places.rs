@@ -1,4 +1,4 @@
-//! Which positions a time point may have among all time points, by time.
+//! Possible positions of a time point among all time points, by time.
 
 use std::ops::RangeInclusive;
 
@@ -22,9 +22,10 @@ impl Places {
         }
     }
 
-    /// The positions in schedules whose parameters lie in the box. `None` if there are none.
+    /// Returns the positions in schedules whose parameters lie in the box; `None` if there are
+    /// none.
     ///
-    /// What comes before a time point in all schedules comes before it in the order, too.
+    /// If a node comes before a time point in all schedules, it also comes before it in the order.
     pub(crate) fn within(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Self> {
         let farthest = farthest(plan, envelope);
         let count = plan.plan.nodes.len();
@@ -66,7 +67,7 @@ impl Places {
         }
     }
 
-    /// How much later `second` is than `first`, at least.
+    /// Returns the least time from `first` to `second`.
     pub(super) fn least_gap(&self, first: usize, second: usize) -> Option<Rational> {
         self.farthest[second][first].as_ref().map(|most| -most)
     }
