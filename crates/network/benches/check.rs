@@ -42,7 +42,7 @@ fn network(jobs: usize, tasks: usize, slack: i64) -> NetworkFile {
                 lower + 2 + task % 5
             ));
             if job > 0 {
-                // A hand-over: the neighbour begins this task neither long before nor after.
+                // A hand-over: the neighbour begins this task at about the same time.
                 requirement(
                     &format!("e{}.{task}", job - 1),
                     &begin,
@@ -118,7 +118,8 @@ fn reading(bencher: Bencher, (jobs, tasks): (usize, usize)) {
     bencher.bench_local(|| read("network", text.as_bytes()).is_ok());
 }
 
-/// The networks with published verdicts, where they are there: those of about 100 points, and all.
+/// Benchmarks the networks with published verdicts, if they are available: those of about 100
+/// points, and all.
 #[divan::bench(args = ["about 100 points", "all"], sample_count = 20, sample_size = 1)]
 fn published(bencher: Bencher, which: &str) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/stn");

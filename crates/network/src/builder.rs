@@ -1,4 +1,4 @@
-//! Puts a network together while its file is read.
+//! Builder for a network while its file is read.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::file::{Correlation, Duration, Format, GivenWait, NetworkFile};
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// A network that is being read.
+/// Network that is being read.
 #[derive(Debug)]
 pub(crate) struct Builder {
     format: Format,
@@ -58,7 +58,7 @@ impl Builder {
         }
     }
 
-    /// A new time point.
+    /// Adds a time point.
     pub(crate) fn point(&mut self, name: &str, at: usize, report: &mut Report) {
         if self.by_name.contains_key(name) {
             report.mistake(
@@ -73,12 +73,12 @@ impl Builder {
         self.by_name.insert(name.to_owned(), node);
     }
 
-    /// The time point of that name, if there is one.
+    /// Returns the time point of that name, if there is one.
     pub(crate) fn find(&self, name: &str) -> Option<NodeId> {
         self.by_name.get(name).copied()
     }
 
-    /// The time point of that name; that there is none is a mistake.
+    /// Returns the time point of that name; reports a mistake if there is none.
     pub(crate) fn named(&self, name: &str, at: usize, report: &mut Report) -> Option<NodeId> {
         let node = self.find(name);
         if node.is_none() {
@@ -91,7 +91,7 @@ impl Builder {
         node
     }
 
-    /// `lower <= to - from <= upper`.
+    /// Adds the requirement `lower <= to - from <= upper`.
     pub(crate) fn requirement(
         &mut self,
         (from, to): (NodeId, NodeId),
@@ -115,7 +115,7 @@ impl Builder {
         }
     }
 
-    /// Adds a contingent link; `None` after a mistake was noted.
+    /// Adds a contingent link. Returns `None` after reporting a mistake.
     pub(crate) fn link(&mut self, given: GivenLink, report: &mut Report) -> Option<LinkId> {
         let GivenLink {
             at,
@@ -196,7 +196,7 @@ impl Builder {
         self.ending.get(&node).copied()
     }
 
-    /// The link of that number.
+    /// Returns the link with that identifier.
     pub(crate) fn link_of(&self, id: LinkId) -> &ContingentLink<Rational> {
         &self.links[id.index()]
     }
@@ -236,7 +236,7 @@ impl Builder {
     }
 }
 
-/// The link that makes no sense. All but circles were found before.
+/// Returns the invalid link. All errors except cycles were reported before.
 fn place_of(bad: &BadLink) -> LinkId {
     match bad {
         BadLink::NoSuchNode(id)

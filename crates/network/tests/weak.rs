@@ -1,4 +1,4 @@
-//! Weak controllability against all corners.
+//! Weak controllability, compared with a check of all corners.
 
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ fn arbitrary_networks() -> impl Strategy<Value = UncertainNetwork<Rational>> {
             let bound = Rational::from(bound);
             requirements.add(Constraint::at_most(NodeId(from), NodeId(to), bound));
         }
-        // The link that ends at node n begins before n, so that none depends on itself.
+        // The link that ends at node n begins before n, so that no link depends on itself.
         let contingent = links
             .into_iter()
             .enumerate()
@@ -100,8 +100,8 @@ proptest! {
     }
 }
 
-/// Two links that must end together, whatever they take, are not weakly controllable; with their
-/// beginnings free they are.
+/// Two links that must end together, whatever their durations, are not weakly controllable. They
+/// are if the executor chooses when they begin.
 #[test]
 fn ends_can_be_brought_together_only_by_one_who_knows_the_durations() {
     let minutes = |n: i64| Rational::from(n);

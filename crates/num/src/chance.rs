@@ -21,12 +21,12 @@ use crate::Rational;
 pub use density::Density;
 pub use height::{Cut, Steps};
 
-/// The distribution of a number that is rounded to multiples of something.
+/// Distribution of a number that is rounded to multiples of a resolution.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Chance {
     /// A density; only the mass at its cuts is discrete.
     Dense(Dense),
-    /// One of these values, all alike; sorted, at least one.
+    /// Equally likely values; sorted, at least one.
     Values(Vec<Rational>),
 }
 
@@ -35,9 +35,9 @@ pub enum Chance {
 pub struct Dense {
     /// The density.
     pub density: Density,
-    /// Lesser numbers become this.
+    /// Lower cut: lesser numbers become this.
     pub minimum: Option<Rational>,
-    /// Greater numbers become this.
+    /// Upper cut: greater numbers become this.
     pub maximum: Option<Rational>,
     /// Length added to an interval at either end: half of the rounding resolution.
     pub margin: Rational,
@@ -54,7 +54,7 @@ pub struct Cell {
     pub below: [Rational; 2],
     /// The least and the greatest distance of the upper end.
     pub above: [Rational; 2],
-    /// Of the lower and of the upper end, whether the greatest distance is not reached.
+    /// For the lower and the upper end, `true` if the greatest distance is excluded.
     pub is_open: [bool; 2],
 }
 
@@ -70,18 +70,19 @@ pub enum Touch {
 }
 
 impl Chance {
-    /// A list of values.
+    /// Creates the distribution of a list of equally likely values.
     ///
-    /// `None` if it is empty.
+    /// `None` if the list is empty.
     pub fn values(mut values: Vec<Rational>) -> Option<Self> {
         values.sort_unstable();
         (!values.is_empty()).then_some(Self::Values(values))
     }
 
-    /// A density that is cut at both sides, of a number that is rounded to multiples of `resolution`.
-    /// Where nothing or everything is beyond a cut, that is said more simply.
+    /// Creates the distribution of a number with this density, cut at both sides and rounded to
+    /// multiples of `resolution`. Cuts without any mass are dropped. If a cut has all the mass, the
+    /// result is a single value.
     ///
-    /// `None` if the density makes no sense ([`Density::is_sound`]).
+    /// `None` if the density is invalid ([`Density::is_sound`]).
     pub fn dense(
         density: Density,
         minimum: Option<Rational>,
@@ -100,7 +101,7 @@ impl Chance {
         let minimum = minimum.map(round).filter(|cut| !is_beyond(cut, &first));
         let maximum = maximum.map(round);
         let maximum = maximum.filter(|cut| last.as_ref().is_none_or(|last| cut < last));
-        // The upper cut is the last to be made.
+        // The upper cut is applied last.
         let ends = [&maximum, &minimum];
         if let [Some(maximum), Some(minimum)] = ends
             && maximum <= minimum
@@ -153,8 +154,7 @@ impl Chance {
         }
     }
 
-    /// Between which two numbers lies the probability of an interval around a point, counted longer by
-    /// the margin.
+    /// Returns bounds on the probability of an interval around a point, extended by the margin.
     pub fn mass(&self, point: &Rational, [below, above]: &Reach) -> [Rational; 2] {
         let (lower, upper) = (point - below, point + above);
         match self {
@@ -178,10 +178,10 @@ impl Chance {
         }
     }
 
-    /// Of the lower and of the upper end, how far from a point it has to lie for the interval to have
-    /// any probability, and how far at most it gains anything.
+    /// Returns, for the lower and the upper end, the distance from a point from which the interval
+    /// has any probability, and the distance beyond which it gains none.
     ///
-    /// With a log-normal density, the most is where its logarithm is no longer concave.
+    /// With a lognormal density, the latter is where its logarithm is no longer concave.
     pub fn limits(&self, point: &Rational) -> [(Rational, Option<Rational>); 2] {
         let positive = |distance: Rational| distance.max(Rational::ZERO);
         let ([first, last], [gains_below, gains_above]) = match self {
@@ -214,8 +214,8 @@ impl Chance {
         [(least_below, most_below), (least_above, most_above)]
     }
 
-    /// The places at which what an interval around a point has jumps: of the lower end, and of the upper
-    /// one, the distances, the least first.
+    /// Returns the distances at which the probability of an interval around a point jumps, for the
+    /// lower and the upper end, in ascending order.
     pub fn jumps(&self, point: &Rational) -> [Vec<Rational>; 2] {
         match self {
             Self::Values(values) => {
@@ -255,7 +255,7 @@ impl Dense {
     }
 }
 
-/// The share of the values that satisfy something.
+/// Returns the share of the values that satisfy a condition.
 fn share(values: &[Rational], is_in: impl Fn(&Rational) -> bool) -> Rational {
     let count = |count: usize| Rational::from(i64::try_from(count).unwrap_or(i64::MAX));
     let inside = values.iter().filter(|own| is_in(own)).count();

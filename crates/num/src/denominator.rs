@@ -5,7 +5,7 @@ use crate::Rational;
 /// A common denominator of some fractions: multiplied by it, each of them is a whole number.
 ///
 /// Sums, differences and comparisons of the whole numbers are those of the fractions, and several
-/// times faster. How large they may become is for the algorithm to say that adds them up.
+/// times faster. The caller must ensure that sums do not overflow.
 ///
 /// ```
 /// use elbowroom_num::{CommonDenominator, Rational};

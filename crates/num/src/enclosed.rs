@@ -1,7 +1,7 @@
-//! Functions whose values are no fractions, between two fractions.
+//! Enclosures of functions with irrational values, between two fractions.
 //!
-//! Each value is an interval that the true one certainly lies in: computed with whole numbers, the
-//! unit being 2^-60, and every rounding counted.
+//! Each result is an interval that certainly contains the true value. It is computed with whole
+//! numbers in units of 2^-60, and every rounding error is counted.
 
 mod normal;
 
@@ -13,7 +13,7 @@ use crate::Rational;
 const ONE: i128 = 1 << 60;
 /// The logarithm of 2 in these units, rounded down.
 const LN_2: i128 = 0x0B17_217F_7D1C_F79A;
-/// No logarithm's series adds up more roundings than this, in these units.
+/// Upper bound on the rounding errors of a logarithm's series, in these units.
 const ROUNDED: i128 = 64;
 
 /// Returns bounds on the natural logarithm that are less than 10^-15 apart, unless the argument is
@@ -74,7 +74,7 @@ pub fn billionths_above(number: &Rational) -> Rational {
     (number * &billion).ceil() / billion
 }
 
-/// A positive number as `m·2^k`, with `m` between 3/4 and 3/2.
+/// Splits a positive number into `m·2^k`, with `m` between 3/4 and 3/2.
 fn halved(number: &Rational) -> (Rational, i64) {
     /// Exponents of the powers of two that scale a number to near 1, in descending order.
     const STEPS: [u32; 6] = [32, 16, 8, 4, 2, 1];
@@ -101,7 +101,7 @@ fn halved(number: &Rational) -> (Rational, i64) {
     (mantissa, power)
 }
 
-/// A number between -4 and 4 in units of 2^-60, rounded down.
+/// Converts a number between -4 and 4 to units of 2^-60, rounded down.
 fn steps(number: &Rational) -> Option<i64> {
     let unit = Rational::from(i64::try_from(ONE).ok()?);
     (number * &unit).floor().as_small().map(|(steps, _)| steps)
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn the_logarithm_of_the_base_is_enclosed() {
-        // 1/0! + 1/1! + … + 1/25!, and what the rest is less than.
+        // 1/0! + 1/1! + … + 1/25!, and an upper bound on the remainder.
         let (mut sum, mut term) = (Rational::ZERO, Rational::ONE);
         for n in 1..=25_i64 {
             sum += &term;

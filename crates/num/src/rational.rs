@@ -22,7 +22,7 @@ enum Repr {
     /// Numerator and denominator in lowest terms; the numerator is not `i64::MIN`, the denominator
     /// positive.
     Small(i64, i64),
-    /// Only what does not fit `Small`.
+    /// Used only for numbers that do not fit `Small`.
     Big(Box<RBig>),
 }
 
@@ -40,7 +40,7 @@ impl Rational {
         Self(Small(numerator, 1))
     }
 
-    /// The fraction `numerator / denominator`.
+    /// Creates the fraction `numerator / denominator`.
     ///
     /// # Panics
     /// If `denominator` is zero.
@@ -132,7 +132,7 @@ impl Rational {
         }
     }
 
-    /// -1, 0 or 1, as this is below, at or above 0.
+    /// Returns -1, 0 or 1, as this is below, at or above 0.
     pub fn signum(&self) -> i32 {
         match &self.0 {
             Small(numerator, _) => match numerator.cmp(&0) {
@@ -150,7 +150,7 @@ impl Rational {
         }
     }
 
-    /// The distance to 0.
+    /// Returns the absolute value.
     #[must_use]
     pub fn abs(&self) -> Self {
         if self.is_negative() {
@@ -160,12 +160,12 @@ impl Rational {
         }
     }
 
-    /// `1 / self`, or `None` for 0.
+    /// Returns `1 / self`, or `None` for 0.
     pub fn reciprocal(&self) -> Option<Self> {
         self.checked_div_into(&Self::ONE)
     }
 
-    /// `self / divisor`, or `None` when `divisor` is 0.
+    /// Returns `self / divisor`, or `None` when `divisor` is 0.
     pub fn checked_div(&self, divisor: &Self) -> Option<Self> {
         divisor.checked_div_into(self)
     }
@@ -193,7 +193,7 @@ impl Rational {
         -((-self).floor())
     }
 
-    /// The nearest floating-point number; for display and heuristics only.
+    /// Returns the nearest floating-point number; for display and heuristics only.
     #[allow(
         clippy::cast_precision_loss,
         reason = "that is what this function is for"
@@ -205,8 +205,7 @@ impl Rational {
         }
     }
 
-    /// The greatest multiple of a power of two, `2^-bits`, that is not above this, as a count of
-    /// these.
+    /// Returns this number in units of `2^-bits`, rounded down.
     pub(crate) fn in_units(&self, bits: usize) -> IBig {
         let unit = RBig::from(IBig::ONE << bits);
         (self.to_big() * unit).floor()
@@ -217,7 +216,7 @@ impl Rational {
         Self::from_big(RBig::from_parts(units, UBig::ONE << bits))
     }
 
-    /// Numerator and denominator, when both fit an `i64`.
+    /// Returns numerator and denominator, when both fit an `i64`.
     pub fn as_small(&self) -> Option<(i64, i64)> {
         match self.0 {
             Small(numerator, denominator) => Some((numerator, denominator)),
@@ -233,7 +232,7 @@ impl Rational {
         }
     }
 
-    /// The number in decimal notation with at most `digits` digits after the point, rounded
+    /// Formats the number in decimal notation with at most `digits` digits after the point, rounded
     /// half away from zero, without trailing zeros: `1/3` with 3 digits is `0.333`.
     pub fn to_decimal(&self, digits: u32) -> String {
         if let Small(whole, 1) = &self.0 {
@@ -276,7 +275,8 @@ pub(crate) fn gcd(a: u128, b: u128) -> u128 {
     a
 }
 
-/// The binary algorithm: shifts and subtractions instead of divisions.
+/// Computes the greatest common divisor by the binary algorithm: shifts and subtractions instead of
+/// divisions.
 fn gcd_u64(mut a: u64, mut b: u64) -> u64 {
     if a == 0 || b == 0 {
         return a | b;

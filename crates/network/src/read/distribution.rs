@@ -5,7 +5,7 @@ use elbowroom_num::Rational;
 use crate::file::Duration;
 use crate::number::Bound;
 
-/// The numbers in the names are seconds, the bounds beside them milliseconds.
+/// Factor between the numbers in the names (seconds) and the bounds (milliseconds).
 const MILLISECONDS: i64 = 1000;
 
 /// Parses the name of a distribution, such as `N_12.5_0.25`. The result is in the unit of the
@@ -42,21 +42,20 @@ pub(super) fn by_name(name: &str, lower: &Bound, upper: &Bound) -> Result<Durati
     })
 }
 
-/// A value that should lie between the bounds.
+/// Returns a value that should lie between the bounds.
 fn typical(duration: &Duration) -> Rational {
     match duration {
         Duration::Normal { mean, .. } => mean.clone(),
         Duration::Uniform { from, to } => (from + to) / Rational::from(2),
         Duration::Exponential { from, mean } => {
-            // Not the mean, which rare and long durations pull out of reach: the median is 0.69
-            // of it.
+            // The median, which is 0.69 of the mean. Rare long durations make the mean too large.
             from + mean * Rational::new(69, 100)
         }
         Duration::Gamma { from, shape, scale } => from + shape * scale,
     }
 }
 
-/// A distribution as it is named.
+/// Distribution with the numbers of its name.
 struct Named {
     kind: Kind,
     first: Rational,

@@ -109,7 +109,7 @@ pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
     reader.builder.finish(report)
 }
 
-/// The words of a line without their quotes, and where they begin.
+/// Returns the words of a line without their quotes, with their positions.
 fn words(line: &str, begin: usize) -> Vec<(usize, &str)> {
     let start = line.as_ptr() as usize;
     line.split_whitespace()
@@ -210,8 +210,8 @@ impl Reader {
         }
     }
 
-    /// That a number is not right may mean that the file is cut off, but not that it cannot be
-    /// used.
+    /// Compares the declared counts with the actual ones. A wrong count may mean that the file is
+    /// truncated, but the network can still be used, so it is only a remark.
     fn check_counts(&self, report: &mut Report) {
         for &(what, announced, at) in &self.announced {
             let (found, name) = match what {

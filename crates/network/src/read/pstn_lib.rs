@@ -37,7 +37,7 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFi
     builder.finish(report)
 }
 
-/// The time points by their numbers. The first one is the reference point.
+/// Reads the time points, by their numbers. The first one is the reference point.
 fn points(
     builder: &mut Builder,
     document: &Json<'_>,
@@ -145,7 +145,7 @@ fn read_constraint(
     }
 }
 
-/// `duration_bound`, which probabilistic constraints need not have.
+/// Reads `duration_bound`, which is optional for probabilistic constraints.
 fn duration_bound(
     constraint: &Json<'_>,
     is_required: bool,
@@ -168,7 +168,7 @@ fn duration_bound(
     lower.zip(upper)
 }
 
-/// `{ "mean": …, "sd": … }`.
+/// Reads `{ "mean": …, "sd": … }`.
 fn normal(given: &Json<'_>, report: &mut Report) -> Option<Duration> {
     let mut part = |name| {
         let json = required(given, name, report)?;

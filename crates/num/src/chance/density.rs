@@ -1,18 +1,18 @@
-//! Densities whose logarithm is concave, all over or as far as it matters.
+//! Densities whose logarithm is concave, everywhere or in the relevant range.
 
 use crate::{Rational, enclosed};
 
 /// A density.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Density {
-    /// All values between two numbers alike.
+    /// Uniform: all values between two numbers are equally likely.
     Uniform {
         /// The least value.
         from: Rational,
         /// The greatest value.
         to: Rational,
     },
-    /// Rises to the mode and falls after it.
+    /// Triangular: rises to the mode and falls after it.
     Triangular {
         /// The least value.
         from: Rational,
@@ -21,21 +21,21 @@ pub enum Density {
         /// The greatest value.
         to: Rational,
     },
-    /// Bell-shaped.
+    /// Normal.
     Normal {
         /// The mean.
         mean: Rational,
         /// The standard deviation.
         deviation: Rational,
     },
-    /// `from`, and what an exponential distribution adds.
+    /// Exponential, shifted by `from`.
     Exponential {
         /// The least value.
         from: Rational,
         /// Mean of the exponential part.
         mean: Rational,
     },
-    /// The logarithm is normal.
+    /// Lognormal: the logarithm is normal.
     Lognormal {
         /// The mean of the logarithm.
         location: Rational,
@@ -57,7 +57,7 @@ impl Density {
         }
     }
 
-    /// The least and the greatest value, where there are.
+    /// Returns the least and the greatest value, if they exist.
     pub fn support(&self) -> [Option<Rational>; 2] {
         match self {
             Self::Uniform { from, to } | Self::Triangular { from, to, .. } => {
@@ -69,12 +69,13 @@ impl Density {
         }
     }
 
-    /// The value beyond which the logarithm of the density is not known to be concave, if there is one.
+    /// Returns the value beyond which the logarithm of the density is not known to be concave, if
+    /// there is one.
     ///
-    /// The second derivative of the logarithm of a log-normal density has the sign of `ln x + spread² -
-    /// location - 1`.
+    /// The second derivative of the logarithm of a lognormal density has the sign of `ln x +
+    /// spread² - location - 1`.
     pub fn bend(&self) -> Option<Rational> {
-        /// Shorter numbers do as well; rounded down.
+        /// Resolution of the result, which is rounded down to keep numbers short.
         const GRID: i64 = 1 << 20;
         let Self::Lognormal { location, spread } = self else {
             return None;
@@ -91,7 +92,7 @@ impl Density {
         Some(if short.is_positive() { short } else { bend })
     }
 
-    /// Between which two numbers lies the probability of at most this.
+    /// Returns a lower and an upper bound on the probability of at most this value.
     pub fn at_most(&self, at: &Rational) -> [Rational; 2] {
         let exactly = |value: Rational| [value.clone(), value];
         let none = || exactly(Rational::ZERO);
@@ -162,7 +163,8 @@ impl Density {
         [(least - over).max(Rational::ZERO), most - under]
     }
 
-    /// Between which two numbers lies the density; at the end of the support, that inside of it.
+    /// Returns a lower and an upper bound on the density. At the end of the support, it is the
+    /// limit from inside.
     pub fn at(&self, at: &Rational) -> [Rational; 2] {
         let exactly = |value: Option<Rational>| {
             let value = value.unwrap_or_default();
@@ -225,7 +227,7 @@ impl Density {
             Self::Lognormal { spread, .. } => {
                 let [lower, upper] = ends;
                 let places = self.standardized(lower)?;
-                // Twice the area tangent of this part, which is the logarithm of their ratio.
+                // The logarithm of their ratio is twice the area tangent of this part.
                 let part = (upper - lower).checked_div(&(upper + lower))?;
                 let twice = &part * Rational::from(2);
                 let at_most = twice.checked_div(&(Rational::ONE - &part * &part))?;

@@ -6,25 +6,28 @@ use crate::{Rational, enclosed};
 /// Position of a cut relative to the intervals of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Cut {
-    /// There is none, or no interval of the cell reaches it: the interval ends inside.
+    /// No interval of the cell reaches the cut, or there is none: the interval ends inside.
     Before,
-    /// Some do: the logarithm gains at most `gain`, times the share of the way to `place` that is gone.
+    /// Some intervals reach the cut: the logarithm gains at most `gain`, in proportion to the
+    /// distance to `place`.
     Open {
-        /// Its distance from the point.
+        /// Distance of the cut from the point.
         place: Rational,
         /// Greatest increase of the logarithm from the mass at the cut.
         gain: Rational,
     },
-    /// All do: everything on this side of the point is inside.
+    /// All intervals reach the cut: everything on this side of the point is inside.
     Inside,
 }
 
 impl Chance {
-    /// For the intervals around a point in a cell: by how much the logarithm of their probability is at
-    /// most greater than the sum of how far their ends lie from the point, each times its slope. The
-    /// least is found where the bound touches, or nearly so, and with the slopes that are right there.
+    /// Returns an upper bound on the difference of the logarithm of the probability and the linear
+    /// function with these slopes, for all intervals around a point in a cell. The linear function
+    /// is the sum of the distances of the ends from the point, each times its slope. The bound is
+    /// tight, or nearly tight, if `touch` is a point of contact and the slopes are the right ones
+    /// there.
     ///
-    /// `None` if nothing follows from a bound that touches there.
+    /// `None` if no bound can be computed for this point of contact.
     pub fn height(
         &self,
         point: &Rational,
@@ -52,7 +55,8 @@ impl Chance {
                     let heights = std::iter::once(first)
                         .chain(steps)
                         .map(|(place, share)| Some(share.checked_div(mass)? - slope * &place));
-                    // Between steps nothing is gained; a slope that falls is worst at the far end.
+                    // Between steps the probability is constant, so a negative slope is worst at
+                    // the far end.
                     let own = heights.collect::<Option<Vec<_>>>()?.into_iter().max()?;
                     height += if slope.is_negative() {
                         own - slope * &(&side[1] - &side[0])
@@ -183,14 +187,14 @@ impl Dense {
 /// Values of a list that the intervals of a cell contain: the share in all intervals, and for each
 /// side the distances at which further values are added, each with the share added so far.
 pub struct Steps {
-    /// The share that all of them have.
+    /// Share of the values that all intervals contain.
     pub center: Rational,
-    /// Of the lower end and of the upper one.
+    /// Steps of the lower and the upper end.
     pub sides: [Vec<(Rational, Rational)>; 2],
 }
 
 impl Steps {
-    /// The values that intervals of a cell around a point may have.
+    /// Computes the steps for the intervals of a cell around a point.
     pub fn new(values: &[Rational], point: &Rational, cell: &Cell) -> Self {
         let one = Rational::from(i64::try_from(values.len()).unwrap_or(i64::MAX)).reciprocal();
         let one = one.unwrap_or_default();

@@ -38,10 +38,10 @@ const BEYOND: (i64, usize) = (1, 62);
 /// `1 / √(2π)`; all these digits are correct.
 const PEAK: &str = "0.3989422804014326779399460599343818684758586311649346576659258296706579258993";
 
-/// `e^-argument`, between two numbers some 10^-19 apart; the argument is not negative.
+/// Returns bounds on `e^-argument` that are some 10^-19 apart; the argument must not be negative.
 ///
-/// The series of the argument divided by a power of two, squared as often. Every step is off by a few
-/// units of 2^-160, and each squaring at most doubles that and adds one.
+/// The series of the argument divided by a power of two is squared repeatedly. Every step is off by
+/// a few units of 2^-160, and each squaring at most doubles that and adds one.
 ///
 /// ```
 /// use elbowroom_num::{Rational, enclosed};
@@ -50,7 +50,7 @@ const PEAK: &str = "0.3989422804014326779399460599343818684758586311649346576659
 /// assert!(below < above && above.to_decimal(12) == "0.367879441171");
 /// ```
 pub fn exp_of_minus(argument: &Rational) -> [Rational; 2] {
-    /// Beyond that, there is less than 2^-62.
+    /// Greatest argument that is computed; beyond it, the result is less than 2^-62.
     const MOST: i64 = 45;
     if *argument > Rational::from(MOST) {
         return [Rational::ZERO, beyond()];
@@ -58,7 +58,7 @@ pub fn exp_of_minus(argument: &Rational) -> [Rational; 2] {
     enclosed(&power(argument, QUICK.bits), QUICK)
 }
 
-/// The same in units of 2 to minus `bits`, off by less than 2^30 of these.
+/// Returns `e^-argument` in units of 2 to minus `bits`, off by less than 2^30 of these.
 fn power(argument: &Rational, bits: usize) -> IBig {
     /// Number of halvings after which 45 is less than a tenth.
     const HALVINGS: usize = 9;
@@ -113,7 +113,7 @@ fn at_most(at: &Rational, fineness: Fineness) -> [Rational; 2] {
     [below.max(Rational::ZERO), above.min(Rational::ONE)]
 }
 
-/// The density of that distribution, between two numbers.
+/// Returns bounds on the standard normal density.
 pub fn normal_density(at: &Rational) -> [Rational; 2] {
     let square = at * at / Rational::from(2);
     let [below, above] = exp_of_minus(&square);
@@ -147,7 +147,8 @@ fn at_units(units: &IBig, fineness: Fineness) -> [Rational; 2] {
     enclosed(&whole, fineness)
 }
 
-/// A number in units of the computation that is off by less than 2^94 of them.
+/// Returns bounds on a number that is given in units of the computation, and off by less than 2^94
+/// of them.
 fn enclosed(units: &IBig, fineness: Fineness) -> [Rational; 2] {
     let coarse: IBig = units >> (fineness.bits - fineness.told);
     [-1, 2].map(|more| {

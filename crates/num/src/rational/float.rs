@@ -1,4 +1,4 @@
-//! From floating-point numbers.
+//! Conversions from floating-point numbers.
 
 use dashu_ratio::RBig;
 

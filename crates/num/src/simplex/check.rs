@@ -30,7 +30,7 @@ impl Simplex {
         Ok(())
     }
 
-    /// A variable whose lower bound lies above its upper one.
+    /// Fails if a variable's lower bound lies above its upper one.
     fn refute_by_one_variable(&self) -> Result<(), Infeasible> {
         for variable in &self.variables {
             if let (Some(lower), Some(upper)) = (&variable.lower, &variable.upper)
@@ -44,7 +44,7 @@ impl Simplex {
         Ok(())
     }
 
-    /// The first basic variable outside its bounds (Bland's rule wants the first).
+    /// Returns the first basic variable outside its bounds (Bland's rule requires the first).
     fn violated_basic(&self) -> Option<(VariableId, Violated)> {
         self.tableau.basic().find_map(|basic| {
             let variable = &self.variables[basic.index()];
@@ -82,7 +82,7 @@ impl Simplex {
         }
     }
 
-    /// The row proves it: every variable in it is at the bound that holds the basic one back.
+    /// Returns the proof by a row: every variable in it is at the bound that blocks the basic one.
     fn refutation_by_row(&self, basic: VariableId, rises: bool) -> Infeasible {
         let variable = &self.variables[basic.index()];
         let violated = if rises {

@@ -10,8 +10,8 @@ impl Simplex {
         &self.variables[variable.index()].value
     }
 
-    /// Rational values of all variables that satisfy all bounds, strict ones strictly; to be
-    /// asked for after a successful [`Simplex::check`].
+    /// Returns rational values of all variables that satisfy all bounds, strict ones strictly.
+    /// Valid after a successful [`Simplex::check`].
     pub fn model(&self) -> Vec<Rational> {
         let delta = self.small_enough_delta();
         let variables = self.variables.iter();
@@ -36,7 +36,7 @@ impl Simplex {
     }
 }
 
-/// Makes `delta` so small that `less <= more` stays true when it is put in for δ.
+/// Reduces `delta` until `less <= more` stays true when δ is replaced by it.
 fn narrow(delta: &mut Rational, less: &Delta, more: &Delta) {
     if less.real < more.real && less.infinitesimal > more.infinitesimal {
         let room = &more.real - &less.real;
@@ -45,7 +45,7 @@ fn narrow(delta: &mut Rational, less: &Delta, more: &Delta) {
     }
 }
 
-/// `value` with `delta` put in for δ.
+/// Returns `value` with δ replaced by `delta`.
 fn at(value: &Delta, delta: &Rational) -> Rational {
     &value.real + &value.infinitesimal * delta
 }

@@ -22,7 +22,7 @@ pub(super) struct Tableau {
 }
 
 impl Tableau {
-    /// Makes room for one more variable; it is not basic, and occurs in no row.
+    /// Adds a variable; it is not basic, and occurs in no row.
     pub(super) fn add_column(&mut self) {
         self.rows.push(None);
         self.columns.push(BTreeSet::new());
@@ -73,7 +73,7 @@ impl Tableau {
         basic.map(move |&basic| (basic, &self.row(basic)[&variable]))
     }
 
-    /// In how many rows `variable` occurs.
+    /// Returns the number of rows that contain `variable`.
     pub(super) fn column_length(&self, variable: VariableId) -> usize {
         self.columns[variable.index()].len()
     }
@@ -99,7 +99,7 @@ impl Tableau {
         self.insert(entering, row);
     }
 
-    /// In the row of `basic`, writes `definition` for `variable`.
+    /// Replaces `variable` by `definition` in the row of `basic`.
     fn substitute(&mut self, basic: VariableId, variable: VariableId, definition: &Row) {
         let row = self.rows[basic.index()]
             .as_mut()

@@ -1,4 +1,4 @@
-//! The simplex against elimination by Fourier and Motzkin.
+//! The simplex, compared with Fourier-Motzkin elimination.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -58,7 +58,7 @@ fn eliminated(system: &[Inequality], variable: usize) -> Vec<Inequality> {
     tightest(rest)
 }
 
-/// The same without those that another one with the same left side, up to a factor, implies.
+/// Removes inequalities that another one with the same left side, up to a factor, implies.
 fn tightest(system: Vec<Inequality>) -> Vec<Inequality> {
     let mut bounds: BTreeMap<Vec<Rational>, Delta> = BTreeMap::new();
     for inequality in system {
@@ -118,8 +118,8 @@ fn supremum(system: &[Inequality], objective: &[Rational]) -> Optimum {
         .map_or(Optimum::Unbounded, Optimum::Value)
 }
 
-/// A simplex that holds inequalities, tagged by their place. Every second one is written the
-/// other way round, as a lower bound, and those on one variable need no definition.
+/// A simplex that holds inequalities, tagged by their position. Every second one is written in
+/// reverse, as a lower bound. Those on one variable need no definition.
 struct System {
     simplex: Simplex,
     variables: Vec<VariableId>,
