@@ -1,4 +1,4 @@
-//! Constraints on which it hangs that one node is reached from another.
+//! Strong bridges: constraints without which one node is no longer reachable from another.
 
 use crate::{Network, NodeId, Weight};
 
@@ -35,16 +35,16 @@ impl<W: Weight> Network<W> {
     }
 }
 
-/// A network with a node in the middle of each constraint that stays inside its component.
+/// Network with an additional node in the middle of each constraint inside a component.
 struct Split {
     /// Number of nodes of the network. Higher numbers are constraints.
     node_count: usize,
     /// For each node, the position in `next` of its first successor.
     first: Vec<usize>,
     next: Vec<usize>,
-    /// For each constraint, where it comes from.
+    /// Source node of each constraint.
     sources: Vec<usize>,
-    /// For each constraint, where it leads to.
+    /// Target node of each constraint.
     targets: Vec<usize>,
 }
 
@@ -88,13 +88,14 @@ impl Split {
         }
     }
 
-    /// Marks the constraints that all ways from the root of their component to where they lead to go through.
+    /// Marks the constraints that are on all paths from the root of their component to their
+    /// target.
     fn mark_dominating(&self, roots: &[NodeId], marked: &mut [bool]) {
         let mut tree = Tree::new(self.node_count + self.targets.len());
         for root in roots {
             tree.grow(self, root.index());
         }
-        // Who leads to a node, as numbers of the tree.
+        // Predecessors of each node, as numbers of the tree.
         let mut entering: Vec<Vec<usize>> = vec![Vec::new(); tree.nodes.len()];
         for (constraint, target) in self.targets.iter().enumerate() {
             let own = tree.numbers[self.node_count + constraint];
@@ -117,7 +118,7 @@ impl Split {
 
 /// Depth-first search tree. Nodes are numbered from 1 in order of discovery.
 struct Tree {
-    /// For each node its number; 0 while it is not seen.
+    /// Number of each node; 0 until it is discovered.
     numbers: Vec<usize>,
     /// Node of each number; entry 0 is unused.
     nodes: Vec<usize>,
@@ -134,7 +135,7 @@ impl Tree {
         }
     }
 
-    /// Sees everything that a root leads to.
+    /// Discovers everything that is reachable from a root.
     fn grow(&mut self, graph: &Split, root: usize) {
         // Nodes, each with the number of its successors that have been visited.
         let mut path = vec![(root, 0)];
@@ -158,7 +159,7 @@ impl Tree {
         self.parents.push(parent);
     }
 
-    /// For each number that of its immediate dominator; 0 of roots.
+    /// Returns, for each number, the number of its immediate dominator; 0 for roots.
     fn dominators(&self, entering: &[Vec<usize>]) -> Vec<usize> {
         let count = self.nodes.len();
         let mut semi: Vec<usize> = (0..count).collect();

@@ -43,7 +43,7 @@ impl<K: Copy + Ord, V> Few<K, V> {
         }
     }
 
-    /// Puts a value in, in place of the key's own if it has one.
+    /// Inserts a value, replacing the key's current one if there is one.
     pub(crate) fn insert(&mut self, key: K, value: V) {
         if let Some(own) = self.get_mut(key) {
             *own = value;

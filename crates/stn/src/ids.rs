@@ -7,7 +7,7 @@ use std::fmt;
 pub struct NodeId(pub u32);
 
 impl NodeId {
-    /// The node's place in a list of all nodes.
+    /// Returns the node's position in a list of all nodes.
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -28,7 +28,7 @@ impl fmt::Display for NodeId {
 pub struct ConstraintId(pub u32);
 
 impl ConstraintId {
-    /// The constraint's place in a list of all constraints.
+    /// Returns the constraint's position in a list of all constraints.
     pub fn index(self) -> usize {
         self.0 as usize
     }

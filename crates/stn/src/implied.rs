@@ -8,16 +8,16 @@ use crate::paths::ShortestPaths;
 use crate::{ConsistentNetwork, ConstraintId, NodeId, Schedule, Weight};
 
 impl<W: Weight> ConsistentNetwork<W> {
-    /// Constraints that can be left out all together without a new schedule becoming possible,
-    /// in ascending order; those for which `keep` holds stay in. Of what stays in, no constraint
-    /// but those of `keep` is implied by the others.
+    /// Returns constraints that can all be removed without adding a schedule, in ascending order.
+    /// Those for which `keep` holds stay. Of the remaining constraints, only those of `keep` may be
+    /// implied by the others.
     ///
-    /// Where several constraints imply each other, the oldest stay in.
+    /// If several constraints imply each other, the oldest stay.
     ///
-    /// Lengths are slacks in a schedule, hence never negative. The nodes on a cycle
-    /// of length zero form a *rigid* group and are contracted (Tsamardinos, Muscettola & Morris,
-    /// AAAI 1998): between groups no cycle has length zero, so it is no matter of order which
-    /// constraints have a detour, and one run of Dijkstra's algorithm per group finds them.
+    /// Lengths are slacks in a schedule, hence never negative. The nodes on a cycle of length zero
+    /// form a *rigid* group and are contracted (Tsamardinos, Muscettola & Morris, AAAI 1998). No
+    /// cycle between groups has length zero, so the set of constraints with a detour does not
+    /// depend on the order of removal, and one run of Dijkstra's algorithm per group finds them.
     pub fn implied(&self, keep: impl Fn(ConstraintId) -> bool) -> Vec<ConstraintId> {
         self.implied_seen_from(self.schedule(), keep)
     }
@@ -94,15 +94,15 @@ struct Search<'a, W> {
     slack: Vec<W>,
     /// `true` if the caller allows that a constraint is left out.
     can_go: Vec<bool>,
-    /// The constraints left out so far. Those that are not imply all of these.
+    /// `true` for constraints removed so far. The remaining ones imply all of these.
     is_gone: Vec<bool>,
     rigid: Rigid,
 }
 
 impl<W: Weight> Search<'_, W> {
-    /// Leaves out constraints between nodes of one group, newest first.
+    /// Removes constraints between nodes of one group, newest first.
     ///
-    /// Those with slack never matter. Those without must keep the group strongly connected.
+    /// Those with slack are never needed. Those without must keep the group strongly connected.
     fn within_groups(&mut self) {
         let network = self.network.network();
         let mut inner: Vec<ConstraintId> = Vec::new();
@@ -124,7 +124,8 @@ impl<W: Weight> Search<'_, W> {
         let mut mark = vec![None; network.node_count()];
         for id in inner.into_iter().rev() {
             let edge = network.constraint(id);
-            // A node's only way out, or in, is needed; this spares most of the searches.
+            // The only edge out of a node, or into it, is needed. This check saves most of the
+            // searches.
             let is_bridge =
                 tight_leaving[edge.from.index()] < 2 || tight_entering[edge.to.index()] < 2;
             if self.can_go[id.index()] && !is_bridge && self.has_tight_detour(id, &mut mark) {
@@ -164,12 +165,12 @@ impl<W: Weight> Search<'_, W> {
         false
     }
 
-    /// Leaves out constraints between nodes of different groups.
+    /// Removes constraints between nodes of different groups.
     fn between_groups(&mut self) {
         let group_count = self.rigid.groups.len();
         let mut sources: Vec<usize> = (0..group_count).collect();
-        // Most edges lead back in time. Early sources first: then what a later source looks
-        // through has been thinned out already.
+        // Most edges lead back in time. With early sources first, later sources search through
+        // edges that have already been thinned out.
         sources.sort_by(|&a, &b| {
             let time = |group: usize| &self.schedule[self.rigid.groups[group][0]];
             time(a).cmp(time(b)).then(a.cmp(&b))
@@ -186,9 +187,11 @@ impl<W: Weight> Search<'_, W> {
         }
     }
 
-    /// Of the edges between two groups, keeps the oldest shortest one if there is no detour.
+    /// Keeps the oldest shortest edge between two groups if there is no detour, and removes the
+    /// others.
     fn thin_out(&mut self, edges: &[Edge<W>], has_detour: bool) {
-        // What cannot go counts as older than the rest: it makes the others superfluous.
+        // Constraints that must stay count as older than the rest, because they make the others
+        // redundant.
         let age = |edge: &Edge<W>| (self.can_go[edge.id.index()], edge.id);
         let shortest = edges
             .iter()
@@ -205,7 +208,7 @@ impl<W: Weight> Search<'_, W> {
         self.rigid.group_of[node.index()]
     }
 
-    /// The edges between groups.
+    /// Returns the edges between groups.
     fn outgoing(&self) -> Outgoing<W> {
         let network = self.network.network();
         let mut edges = Vec::new();
@@ -229,8 +232,8 @@ impl<W: Weight> Search<'_, W> {
     }
 }
 
-/// The edges between groups that have not been left out, side by side by the group they leave and
-/// then by the one they lead to: most of the work is to walk along them.
+/// The remaining edges between groups, stored contiguously by source group and then by target
+/// group, because most of the work is to traverse them.
 struct Outgoing<W> {
     edges: Vec<Edge<W>>,
     ranges: Vec<Range<usize>>,
@@ -247,7 +250,7 @@ impl<W> Outgoing<W> {
         &self.edges[self.ranges[group].clone()]
     }
 
-    /// Forgets the edges of a group that have been left out.
+    /// Drops the removed edges of a group.
     fn drop_gone(&mut self, group: usize, is_gone: &[bool]) {
         let range = &mut self.ranges[group];
         let mut end = range.start;
@@ -269,8 +272,9 @@ const MANY_EDGES: usize = 8;
 /// beginning. A search that continued from the hub would visit the whole network.
 struct Hub<W> {
     group: usize,
-    /// The lengths of the shortest paths from each group to the hub, and from the hub to each, but for the hub's own time:
-    /// it is subtracted from the one and added to the other.
+    /// The lengths of the shortest paths from each group to the hub, and from the hub to each
+    /// group. They omit the hub's own time, which cancels: it is subtracted from one and added to
+    /// the other.
     to: Vec<Option<W>>,
     from: Vec<Option<W>>,
 }
@@ -307,7 +311,7 @@ impl<W: Weight> Hub<W> {
     }
 }
 
-/// The groups near a source, kept between searches to spare allocations.
+/// Groups near a source, reused between searches to save allocations.
 struct Reach<W> {
     /// The length of the shortest path found.
     length: Vec<Option<W>>,
@@ -329,8 +333,8 @@ impl<W: Weight> Reach<W> {
         }
     }
 
-    /// Dijkstra's algorithm from `source`, as far as needed to know which of its edges have a
-    /// detour. How long those through the hub are is known beforehand.
+    /// Dijkstra's algorithm from `source`, until all of its edges with a detour are known. The
+    /// lengths of detours through the hub are known beforehand.
     fn look_for_detours(
         &mut self,
         outgoing: &Outgoing<W>,

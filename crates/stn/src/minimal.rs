@@ -4,8 +4,8 @@ use elbowroom_num::Rational;
 
 use crate::{ConsistentNetwork, NodeId, Weight};
 
-/// The tightest bound on the difference of each two nodes. Memory grows with the square of the
-/// number of nodes.
+/// Minimal network: the tightest bound on the difference of each two nodes. Memory grows with the
+/// square of the number of nodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Minimal<W = Rational> {
     node_count: usize,
@@ -26,7 +26,7 @@ impl<W: Weight> Minimal<W> {
 }
 
 impl<W: Weight> ConsistentNetwork<W> {
-    /// The minimal network: Johnson's algorithm, one run of Dijkstra's per node.
+    /// Computes the minimal network by Johnson's algorithm, with one run of Dijkstra's per node.
     pub fn minimal(&self) -> Minimal<W> {
         let network = self.network();
         let mut distances = Vec::with_capacity(network.node_count() * network.node_count());

@@ -5,10 +5,10 @@ use elbowroom_num::Rational;
 use crate::lists::Lists;
 use crate::{ConstraintId, Direction, NodeId, Schedule, Weight};
 
-/// The constraint `to - from <= bound`, drawn as the edge `from --bound--> to`.
+/// The constraint `to - from <= bound`, or the edge `from --bound--> to`.
 ///
-/// "`to` at most `bound` after `from`"; a negative `bound` reads
-/// "`to` at least `-bound` before `from`".
+/// It means "`to` at most `bound` after `from`", or for a negative `bound`, "`to` at least `-bound`
+/// before `from`".
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Constraint<W = Rational> {
     /// Source of the edge: the time point that is subtracted.
@@ -20,12 +20,12 @@ pub struct Constraint<W = Rational> {
 }
 
 impl<W: Weight> Constraint<W> {
-    /// `to - from <= bound`.
+    /// Returns the constraint `to - from <= bound`.
     pub fn at_most(from: NodeId, to: NodeId, bound: W) -> Self {
         Self { from, to, bound }
     }
 
-    /// `to - from >= bound`, which is `from - to <= -bound`.
+    /// Returns the constraint `to - from >= bound`, which is `from - to <= -bound`.
     #[allow(
         clippy::needless_pass_by_value,
         reason = "both constructors take the bound alike"
@@ -43,10 +43,11 @@ impl<W: Weight> Constraint<W> {
         schedule[self.to] <= schedule[self.from].plus(&self.bound)
     }
 
-    /// `schedule[from] + bound - schedule[to]`: how far the constraint is from being violated.
+    /// Returns the slack `schedule[from] + bound - schedule[to]`, which is negative if the
+    /// constraint is violated.
     ///
-    /// Measured by a schedule, the length of a path changes only by the times of its two ends;
-    /// where all constraints hold, no edge is negative.
+    /// With slacks as lengths, the length of a path changes only by the times of its two ends. If
+    /// all constraints hold, no length is negative.
     pub fn slack_in(&self, schedule: &Schedule<W>) -> W {
         schedule[self.from]
             .plus(&self.bound)
@@ -54,7 +55,7 @@ impl<W: Weight> Constraint<W> {
     }
 }
 
-/// Time points and constraints `to - from <= bound` between them. May contradict itself.
+/// Time points and constraints `to - from <= bound` between them. May be inconsistent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Network<W = Rational> {
     constraints: Vec<Constraint<W>>,
@@ -75,12 +76,12 @@ impl<W> Default for Network<W> {
 }
 
 impl<W: Weight> Network<W> {
-    /// The network without nodes.
+    /// Creates a network without nodes.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// `node_count` nodes and no constraint.
+    /// Creates a network with `node_count` nodes and no constraints.
     pub fn with_nodes(node_count: usize) -> Self {
         Self {
             constraints: Vec::new(),
@@ -89,7 +90,7 @@ impl<W: Weight> Network<W> {
         }
     }
 
-    /// A new time point, free of constraints.
+    /// Adds a time point without constraints.
     pub fn add_node(&mut self) -> NodeId {
         let node = NodeId::from_index(self.node_count());
         self.leaving.add_node();
@@ -106,12 +107,12 @@ impl<W: Weight> Network<W> {
         id
     }
 
-    /// Changes what a constraint demands.
+    /// Replaces the bound of a constraint.
     pub(crate) fn set_bound(&mut self, id: ConstraintId, bound: W) {
         self.constraints[id.index()].bound = bound;
     }
 
-    /// The number of nodes; the nodes are `NodeId(0)`, `NodeId(1)`, and so on.
+    /// Returns the number of nodes; the nodes are `NodeId(0)`, `NodeId(1)`, and so on.
     pub fn node_count(&self) -> usize {
         self.leaving.node_count()
     }
@@ -121,17 +122,17 @@ impl<W: Weight> Network<W> {
         (0..self.node_count()).map(NodeId::from_index)
     }
 
-    /// The constraint of that number.
+    /// Returns the constraint with that identifier.
     pub fn constraint(&self, id: ConstraintId) -> &Constraint<W> {
         &self.constraints[id.index()]
     }
 
-    /// All constraints; `ConstraintId` counts along this list.
+    /// Returns all constraints, indexed by `ConstraintId`.
     pub fn constraints(&self) -> &[Constraint<W>] {
         &self.constraints
     }
 
-    /// The numbers of all constraints.
+    /// Returns the identifiers of all constraints.
     pub fn constraint_ids(&self) -> impl ExactSizeIterator<Item = ConstraintId> + use<W> {
         (0..self.constraints.len()).map(ConstraintId::from_index)
     }
@@ -211,7 +212,7 @@ impl<W: Weight> Network<W> {
     /// Returns the strongly connected component of each node, whatever the bounds. No edges lead to
     /// components with smaller numbers.
     pub fn components(&self) -> Vec<usize> {
-        // Kosaraju's algorithm: the last one left first, and against the edges.
+        // Kosaraju's algorithm: in reverse postorder, and against the edges.
         let order = self.depth_first_postorder(|_| true);
         let mut component = vec![usize::MAX; self.node_count()];
         for (number, &root) in order.iter().rev().enumerate() {

@@ -49,7 +49,7 @@ pub use spoiler::Spoiler;
 pub use strong::StrongConflict;
 pub use whole::{Unit, WholeNetwork};
 
-/// `lower <= end - activation <= upper`, where the world decides how much it is.
+/// Contingent link `lower <= end - activation <= upper`; the world chooses the difference.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ContingentLink<W = Rational> {
     /// Time point that the difference counts from.
@@ -62,12 +62,12 @@ pub struct ContingentLink<W = Rational> {
     pub upper: Option<W>,
 }
 
-/// A contingent link, by its place in [`UncertainNetwork::links`].
+/// Identifier of a contingent link: its position in [`UncertainNetwork::links`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LinkId(pub u32);
 
 impl LinkId {
-    /// The link's place in a list of all links.
+    /// Returns the link's position in a list of all links.
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -77,12 +77,12 @@ impl LinkId {
     }
 }
 
-/// A network whose contingent links make no sense.
+/// Error for invalid contingent links.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BadLink {
     /// A link names a node that the network does not have.
     NoSuchNode(LinkId),
-    /// A link ends where it begins, or links depend on each other in a circle.
+    /// A link ends where it begins, or links depend on each other in a cycle.
     Circular(LinkId),
     /// The least difference is negative.
     Negative(LinkId),
@@ -137,11 +137,11 @@ pub struct UncertainNetwork<W = Rational> {
 }
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// A network with these requirements and contingent links. The links need not be repeated
-    /// among the requirements.
+    /// Creates a network with these requirements and contingent links. The links need not be
+    /// repeated as requirements.
     ///
     /// # Errors
-    /// When the links make no sense.
+    /// If the links are invalid.
     pub fn new(requirements: Network<W>, links: Vec<ContingentLink<W>>) -> Result<Self, BadLink> {
         let mut ending: Vec<Option<LinkId>> = vec![None; requirements.node_count()];
         for (index, link) in links.iter().enumerate() {
@@ -174,22 +174,22 @@ impl<W: Weight> UncertainNetwork<W> {
         }
     }
 
-    /// The constraints that have to be satisfied.
+    /// Returns the constraints that have to be satisfied.
     pub fn requirements(&self) -> &Network<W> {
         &self.requirements
     }
 
-    /// The contingent links; [`LinkId`] counts along this list.
+    /// Returns the contingent links, indexed by [`LinkId`].
     pub fn links(&self) -> &[ContingentLink<W>] {
         &self.links
     }
 
-    /// The link of that number.
+    /// Returns the link with that identifier.
     pub fn link(&self, id: LinkId) -> &ContingentLink<W> {
         &self.links[id.index()]
     }
 
-    /// The numbers of all links.
+    /// Returns the identifiers of all links.
     pub fn link_ids(&self) -> impl ExactSizeIterator<Item = LinkId> + use<W> {
         (0..self.links.len()).map(LinkId::from_index)
     }

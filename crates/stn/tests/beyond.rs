@@ -18,7 +18,7 @@ use elbowroom_stn::{Constraint, Network, NodeId};
 use game::{Board, Random};
 use rows::rows;
 
-/// As many as the variable says, to try more by hand.
+/// Returns the number in the environment variable, for longer manual runs, or the default.
 fn many(default: u64) -> u64 {
     std::env::var("ELBOWROOM_NETWORKS")
         .ok()
@@ -31,7 +31,7 @@ struct Run {
     network: UncertainNetwork<i64>,
     dispatcher: Dispatcher<i64>,
     now: i64,
-    /// Links that may last until another time than their bounds say.
+    /// Prolonged links, with their latest ends.
     prolonged: BTreeMap<LinkId, Option<i64>>,
 }
 
@@ -115,7 +115,8 @@ impl Run {
         link.lower <= self.now - begun && last.is_none_or(|last| self.now <= last)
     }
 
-    /// The world lets links end or not; `None` when the rest does not work any more.
+    /// Lets the world end some links. Returns `None` when the remaining network is no longer
+    /// executable.
     fn world(&mut self, random: &mut Random, counts: &mut Counts, told: &str) -> Option<()> {
         loop {
             let mut ending = self.active();
@@ -244,7 +245,7 @@ impl Run {
     }
 }
 
-/// The network without what holds from node 0 to others.
+/// Returns the network without constraints from node 0 to others.
 fn without_horizon(network: &UncertainNetwork<i64>) -> UncertainNetwork<i64> {
     let mut requirements = Network::with_nodes(network.requirements().node_count());
     for constraint in network.requirements().constraints() {

@@ -1,4 +1,4 @@
-//! Constraints that bind less than they did.
+//! Loosening of constraints.
 
 use super::{MovingWindows, Source, WindowEnd};
 use crate::direction::Direction;
@@ -30,7 +30,7 @@ impl<W: Weight> MovingWindows<W> {
         }
     }
 
-    /// Computes the distances of `node`, and of all whose paths go through it, once more.
+    /// Recomputes the distances of `node`, and of all nodes whose paths contain it.
     fn look_again(&mut self, direction: Direction, node: NodeId) {
         let mut lost = vec![node];
         let mut at = 0;

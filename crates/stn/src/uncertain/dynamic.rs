@@ -44,8 +44,8 @@ use crate::{NodeId, Weight, spend_step};
 const MOST_STEPS: usize = 10_000;
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// The network's dispatchable form with all edges that were found, if it is dynamically controllable:
-    /// what shows that it is.
+    /// Returns the network's dispatchable form with all edges found, if it is dynamically
+    /// controllable. The edges are the proof of controllability.
     ///
     /// # Errors
     /// The cycle that shows that it is not.
@@ -77,7 +77,8 @@ impl<W: Weight> UncertainNetwork<W> {
         self.search(false, false).is_ok()
     }
 
-    /// With all edges that are found if it `is_full`, else without those that say nothing.
+    /// Searches for a conflict. The graph contains all edges found if `is_full`, else redundant
+    /// ones are left out.
     pub(super) fn search(&self, keeps_edges: bool, is_full: bool) -> Result<Graph<W>, Conflict<W>> {
         let mut graph = Graph::new(self);
         graph.is_full = is_full;
@@ -105,29 +106,30 @@ pub(super) struct Search<'a, W> {
     /// For each processed node, the nodes through which negative ways lead to it. The edges found
     /// for the node depend only on them, and on the edges that end at them.
     pub(super) regions: Vec<Vec<NodeId>>,
-    /// The negative nodes being dealt with, each for the sake of the one before.
+    /// Stack of negative nodes being processed; each one is needed by the previous one.
     frames: Vec<Frame<W>>,
     /// `true` if negative edges found are kept for dispatching.
     keeps_edges: bool,
 }
 
-/// Hears of a cycle, where it closes and its ways in order, and says whether to look for more.
+/// Callback for cycles: receives the place where a cycle closes and its ways in order, and returns
+/// whether the search continues.
 type OnCycle<'a, W> = dyn FnMut(&Graph<W>, Closed, &[WayId]) -> ControlFlow<()> + 'a;
 
-/// A negative node being dealt with.
+/// Negative node being processed.
 struct Frame<W> {
     node: NodeId,
     /// The upper-case edges into it that are still to be followed.
     upper: Vec<EdgeId>,
     /// The upper-case edge being followed; `None` for the plain edges.
     label: Option<LinkId>,
-    /// Plain edges that the waits have been found to be.
+    /// Plain edges that waits have turned into.
     plain: Vec<EdgeId>,
     /// `true` once the plain edges are being followed.
     is_last: bool,
     reached: Few<NodeId, Reached<W>>,
-    /// Edges that close a cycle at the node in this pass, other than that of the shortest one. Those found last, of
-    /// which the others may be parts, come first.
+    /// Edges that close a cycle at the node in this pass, other than that of the shortest one. The
+    /// newest edges, which may contain the others, are processed first.
     others: BTreeSet<EdgeId>,
     region: Vec<NodeId>,
     queue: BinaryHeap<Reverse<(Extended<W>, NodeId)>>,
@@ -147,13 +149,13 @@ impl<W: Weight> Frame<W> {
 /// Place where the ways of the current frames close a cycle.
 #[derive(Clone, Copy)]
 pub(super) enum Closed {
-    /// At a node that is being dealt with, by the shortest way to it.
+    /// At a node that is being processed, by the shortest way to it.
     At(NodeId),
-    /// At the node of the last frame, by a longer way that has this edge first.
+    /// At the node of the last frame, by a longer way that begins with this edge.
     By(EdgeId),
 }
 
-/// A way from a node to the frame's.
+/// Way from a node to the frame's node.
 struct Reached<W> {
     distance: Extended<W>,
     /// Its first edge.
@@ -163,7 +165,7 @@ struct Reached<W> {
 }
 
 impl<'a, W: Weight> Search<'a, W> {
-    /// Nothing has been dealt with.
+    /// Creates a search without processed nodes.
     pub(super) fn new(
         links: &'a UncertainNetwork<W>,
         graph: &'a mut Graph<W>,
@@ -180,7 +182,7 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// Deals with a node, and with those that have to be dealt with before.
+    /// Processes a node, and the nodes that have to be processed before it.
     pub(super) fn settle(&mut self, node: NodeId) -> Result<(), Conflict<W>> {
         self.begin(node);
         match self.go_on() {
@@ -189,9 +191,10 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// Deals with a node, and with those that have to be dealt with before, whatever conflicts there
-    /// are: `on_cycle` hears of each, way by way, each from where the one before ends, and says whether to
-    /// look for more. Where a way has led to a conflict, it is not followed any further.
+    /// Processes a node, and the nodes that have to be processed before it, and continues after
+    /// conflicts. `on_cycle` receives each conflict as ways, each beginning where the previous one
+    /// ends, and returns whether the search continues. A way that has led to a conflict is not
+    /// followed any further.
     pub(super) fn settle_all(
         &mut self,
         node: NodeId,
@@ -231,7 +234,7 @@ impl<'a, W: Weight> Search<'a, W> {
             match self.stage[node.index()] {
                 Stage::Underway => return Some(Closed::At(node)),
                 Stage::New => {
-                    // It comes back to this one when that node has been dealt with.
+                    // This node is continued when that node has been processed.
                     frame.queue.push(Reverse((distance, node)));
                     self.begin(node);
                 }
@@ -270,8 +273,8 @@ impl<'a, W: Weight> Search<'a, W> {
         });
     }
 
-    /// Goes on to the next upper-case edge of the last frame, or to the plain edges. `false` if
-    /// there is nothing left.
+    /// Starts the pass of the next upper-case edge of the last frame, or of the plain edges.
+    /// Returns `false` if there is none.
     fn next_pass(&mut self) -> bool {
         let Some(frame) = self.frames.last_mut() else {
             return false;
@@ -300,7 +303,7 @@ impl<'a, W: Weight> Search<'a, W> {
         true
     }
 
-    /// Notes a way that begins with that edge.
+    /// Records a way that begins with that edge.
     fn reach(&mut self, edge: EdgeId, distance: Extended<W>) {
         let from = self.graph.edges[edge].from;
         let Some(frame) = self.frames.last_mut() else {
@@ -347,9 +350,9 @@ impl<'a, W: Weight> Search<'a, W> {
             origin: Origin::Way(way),
         };
         match frame.label {
-            // It waits for that in any case.
+            // The node comes after the link's end anyway.
             Some(link) if self.graph.is_after(node, links.link(link).end) => false,
-            // The link cannot have ended before: it holds in any case.
+            // The link cannot have ended before, so the wait is a plain edge.
             Some(link) if distance >= Extended::from(links.link(link).lower.clone()).negated() => {
                 if node == frame.node {
                     return false;
@@ -385,14 +388,14 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// Adds an edge that is not negative, unless it says nothing.
+    /// Adds an edge that is not negative, unless it is redundant.
     fn add(&mut self, edge: Edge<W>) {
         if !self.graph.is_after(edge.from, edge.to) {
             self.graph.add(edge);
         }
     }
 
-    /// The shortest way from a node to the last frame's, from now on.
+    /// Returns the shortest way from a node to the last frame's node, and fixes it.
     fn way(&mut self, node: NodeId) -> WayId {
         let way = self.way_to(self.frames.len() - 1, node);
         let frame = self.frames.last_mut();
@@ -402,13 +405,13 @@ impl<'a, W: Weight> Search<'a, W> {
         way
     }
 
-    /// The shortest way from a node to that frame's, as far as it is known.
+    /// Returns the shortest known way from a node to that frame's node.
     fn way_to(&mut self, frame: usize, node: NodeId) -> WayId {
         let edge = self.frames[frame].at(node).edge;
         self.way_by(frame, edge)
     }
 
-    /// The shortest way to that frame's node that has this edge first, as far as it is known.
+    /// Returns the shortest known way to that frame's node that begins with this edge.
     fn way_by(&mut self, frame: usize, edge: EdgeId) -> WayId {
         let frame = &self.frames[frame];
         let next = self.graph.edges[edge].to;
@@ -438,8 +441,8 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// The ways from where it closes to the last frame's node, and from each frame's node to the one before, down to
-    /// there again, are a cycle.
+    /// Returns the cycle that closes there: the ways from that place to the last frame's node, and
+    /// from each frame's node to the previous one, back to that place.
     fn cycle(&mut self, closed: Closed) -> Vec<WayId> {
         let node = match closed {
             Closed::At(node) => node,
@@ -462,7 +465,7 @@ impl<'a, W: Weight> Search<'a, W> {
         first.expect("a node under way has a frame")
     }
 
-    /// The cycle that closes there, step by step.
+    /// Returns the conflict that closes there, step by step.
     fn conflict(&mut self, closed: Closed) -> Conflict<W> {
         let mut total = Extended::zero();
         let mut steps = Vec::new();

@@ -2,7 +2,7 @@
 
 use crate::NodeId;
 
-/// The limit on the chains that nodes are put into: each takes a number for each node.
+/// Limit on chains: each takes one number per node.
 const MOST_CHAINS: usize = 64;
 
 /// Order of nodes: chains of nodes that follow each other, and for each node the last node of each
@@ -11,14 +11,14 @@ const MOST_CHAINS: usize = 64;
 /// Incomplete for nodes that fit into no chain, and for nodes on a cycle.
 #[derive(Clone, Debug)]
 pub(super) struct Order {
-    /// For each node, its chain and its place there, from 1.
+    /// For each node, its chain and its position there, from 1.
     places: Vec<Option<(usize, u32)>>,
-    /// For each node and chain, the last place that it comes after, or its own; 0 is none.
+    /// For each node and chain, the last position that precedes it, or its own; 0 for none.
     latest: Vec<[u32; MOST_CHAINS]>,
 }
 
 impl Order {
-    /// From the nodes that each comes after, directly.
+    /// Computes the order from the direct predecessors of each node.
     pub(super) fn new(earlier: &[Vec<NodeId>]) -> Self {
         let count = earlier.len();
         let mut later: Vec<Vec<usize>> = vec![Vec::new(); count];
@@ -48,7 +48,7 @@ impl Order {
         order
     }
 
-    /// Puts a node at the end of a chain that it comes after, if there is one.
+    /// Appends a node to a chain whose last node precedes it, if there is one.
     fn place(
         &mut self,
         node: usize,

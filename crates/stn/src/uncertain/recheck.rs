@@ -1,4 +1,4 @@
-//! Dynamic controllability again, after the bounds of one link have changed.
+//! Incremental check of dynamic controllability, after the bounds of one link have changed.
 
 use super::dynamic::{Search, Stage};
 use super::extended::Extended;
@@ -6,7 +6,7 @@ use super::graph::{EdgeId, Graph};
 use super::{Conflict, LinkId, UncertainNetwork};
 use crate::{NodeId, Weight};
 
-/// Leftovers of earlier searches may grow to this multiple of one search's results.
+/// Limit on unused results of earlier searches, as a multiple of one search's results.
 const MOST_LEFTOVERS: usize = 4;
 
 /// Dynamically controllable network that supports changes of link bounds, one link at a time.
@@ -20,7 +20,7 @@ pub struct Recheck<W> {
     graph: Graph<W>,
     /// For each node, the nodes through which negative ways lead to it.
     regions: Vec<Vec<NodeId>>,
-    /// For each node, how many of the edges that end there and are not negative are the network's.
+    /// For each node, the number of the network's own edges that end there and are not negative.
     given: Vec<usize>,
     /// Number of edges and ways that the last search of the whole network found.
     fresh: usize,
@@ -60,7 +60,7 @@ impl<W: Weight> Recheck<W> {
         &self.network
     }
 
-    /// Gives a link other bounds, if the network stays dynamically controllable.
+    /// Changes the bounds of a link, if the network stays dynamically controllable.
     ///
     /// # Errors
     /// The cycle that shows that it does not; the network stays as it was.
@@ -73,7 +73,7 @@ impl<W: Weight> Recheck<W> {
         let link = self.network.links[id.index()].clone();
         let takes_time = |upper: &Option<W>| *upper != Some(W::zero());
         if takes_time(&link.upper) != takes_time(&upper) {
-            // The edges of a link that takes no time are of another kind.
+            // The edges of a link with duration 0 are of another kind.
             let mut network = self.network.clone();
             network.links[id.index()].lower = lower;
             network.links[id.index()].upper = upper;
@@ -149,7 +149,7 @@ impl<W: Weight> Recheck<W> {
         nodes.filter(move |other| self.regions[other.index()].contains(&node))
     }
 
-    /// These nodes and all that depend on them, in order.
+    /// Returns these nodes and all that depend on them, in order.
     fn depending_on(&self, mut open: Vec<NodeId>) -> Vec<NodeId> {
         let count = self.network.requirements.node_count();
         let mut dependants = vec![Vec::new(); count];

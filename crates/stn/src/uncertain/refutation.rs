@@ -15,8 +15,8 @@ const MOST_PARTS: usize = 10_000;
 /// The limit on the parts of all refutations of a network, for each of its nodes.
 const MOST_PARTS_A_NODE: usize = 8;
 
-/// The limit on ways that lie in one another: what follows from what along a long plan would lie as deep as the plan is
-/// long.
+/// Limit on the nesting of ways. Derivations along a long plan can be nested as deeply as the plan
+/// is long.
 const MOST_DEPTH: usize = 200;
 
 /// One part of a way through the graph of a network, from its beginning to its end.
@@ -33,14 +33,14 @@ pub enum Part {
     Way(Way),
 }
 
-/// Parts one after the other.
+/// Sequence of parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Way {
-    /// Each begins where the one before ends.
+    /// The parts; each begins where the previous one ends.
     pub parts: Vec<Part>,
-    /// The way is a wait for the end of that link, taken for an edge that always holds, because it
-    /// is not longer than the link takes at least. Whatever the bounds, an edge of minus the link's
-    /// lower bound holds in its place: so the edge's length is the greater of the two.
+    /// If present, the way is a wait for the end of that link, used as an edge that always holds,
+    /// because it is no longer than the link's minimum duration. For all bounds, an edge of minus
+    /// the link's lower bound holds instead. So the edge's length is the greater of the two.
     pub unlabelled: Option<LinkId>,
 }
 
@@ -52,7 +52,7 @@ pub struct Way {
 /// Muscettola 2005).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refutation {
-    /// The cycle; each way begins where the one before ends.
+    /// The cycle; each way begins where the previous one ends.
     pub cycle: Vec<Way>,
     /// `true` if the ways are nested so deeply that only their steps are given, as one way. With
     /// other bounds such a refutation proves something only if it contains no link both as
@@ -66,9 +66,9 @@ pub struct Refutation {
 pub enum Refuted {
     /// The network is dynamically controllable.
     No,
-    /// It is not, and each of these is a reason.
+    /// It is not, and each of these is a proof.
     Because(Vec<Refutation>),
-    /// It is not, but to say why takes too many words.
+    /// It is not, but all proofs found are too long.
     TooLong,
 }
 
@@ -134,7 +134,7 @@ impl<W: Weight> UncertainNetwork<W> {
 
 /// Record of the edges that refutations have used so far.
 struct Told {
-    /// The edges that have, but for requirements.
+    /// The used edges, except requirements.
     edges: BTreeSet<EdgeId>,
     /// The limit on the parts of one refutation.
     most: usize,
@@ -160,7 +160,7 @@ impl Told {
         if depth > MOST_DEPTH {
             return Err(TooMuch::Deep);
         }
-        // There are many of them, most of them short.
+        // Exact capacity, because there are many ways, most of them short.
         let mut parts = Vec::with_capacity(ways_from(graph, way).count());
         for way in ways_from(graph, way) {
             parts.push(self.part(graph, graph.ways[way].edge(), count, depth)?);
@@ -205,7 +205,7 @@ impl Told {
         })
     }
 
-    /// The steps of a cycle one after the other; `None` if there are too many.
+    /// Returns the steps of a cycle as one way; `None` if there are too many.
     fn flat<W: Weight>(&mut self, graph: &Graph<W>, cycle: &[WayId]) -> Option<Way> {
         let mut edges = Vec::new();
         for way in cycle.iter().flat_map(|&way| ways_from(graph, way)) {
@@ -229,9 +229,9 @@ impl Told {
 
 /// Reason why a refutation cannot be given part by part.
 enum TooMuch {
-    /// It has too many.
+    /// Too many parts.
     Long,
-    /// They lie too deep in one another.
+    /// Nested too deeply.
     Deep,
 }
 
@@ -240,7 +240,7 @@ fn ways_from<W>(graph: &Graph<W>, way: WayId) -> impl Iterator<Item = WayId> + '
     std::iter::successors(Some(way), |&way| graph.ways[way].rest())
 }
 
-/// The link for whose end a way waits.
+/// Returns the link whose end a way waits for.
 fn label<W: Weight>(graph: &Graph<W>, way: WayId) -> Option<LinkId> {
     let last = ways_from(graph, way).last()?;
     match graph.edges[graph.ways[last].edge()].kind {

@@ -1,4 +1,4 @@
-//! A world that beats every executor where a network is not dynamically controllable.
+//! Adversary that makes every executor fail if a network is not dynamically controllable.
 
 use std::collections::BTreeSet;
 
@@ -23,7 +23,7 @@ pub struct Spoiler {
 }
 
 impl Spoiler {
-    /// A spoiler for a network whose times count from `origin`.
+    /// Creates a spoiler for a network whose times are relative to `origin`.
     pub fn new(network: UncertainNetwork, origin: NodeId) -> Self {
         Self { network, origin }
     }
@@ -39,7 +39,7 @@ impl Spoiler {
         let mut happened = happened.to_vec();
         let mut ending = Vec::new();
         let mut later = BTreeSet::new();
-        // The end of one link may activate another one that takes no time.
+        // The end of one link may activate another one with duration 0.
         while let Some(id) = self.next_candidate(now, &happened, &later) {
             let link = self.network.link(id);
             let begun = running_since(link, &happened);
@@ -74,7 +74,7 @@ impl Spoiler {
         links.find(may_end)
     }
 
-    /// When to ask again if nothing happens before.
+    /// Returns the time of the next query if nothing happens before.
     pub fn next_look(&self, now: &Rational, happened: &[Option<Rational>]) -> Option<Rational> {
         let links = self.network.links().iter();
         let looks = links.flat_map(|link| {
@@ -95,7 +95,8 @@ impl Spoiler {
     ) -> bool {
         let times = happened.iter().flatten().chain([now]);
         if let Some(unit) = self.network.unit_with(times) {
-            // Strictly less is less by a part of a unit that all of them together do not add up to.
+            // A strict bound is less by a part of a unit that is so small that all of them together
+            // do not add up to a unit.
             let whole = |number: &Delta| {
                 let (infinitesimal, _) = number.infinitesimal.as_small()?;
                 let real = unit.whole(&number.real)?;
@@ -110,7 +111,7 @@ impl Spoiler {
             .unwrap_or(true)
     }
 
-    /// The same in other numbers; `None` if some number is none of them.
+    /// The same with another number type; `None` if some number cannot be represented in it.
     fn is_lost_in<W: Weight>(
         &self,
         now: &Rational,
@@ -197,12 +198,12 @@ impl Spoiler {
 
 /// The remaining part of a network.
 enum Rest<W> {
-    /// Something has happened that cannot be made good.
+    /// Some past event violates a requirement.
     Lost,
     Network(UncertainNetwork<W>),
 }
 
-/// The time at which a link that is not over was activated.
+/// Returns the activation time of a running link.
 fn running_since(link: &ContingentLink, happened: &[Option<Rational>]) -> Option<Rational> {
     let is_over = happened[link.end.index()].is_some();
     happened[link.activation.index()]

@@ -5,13 +5,13 @@ use elbowroom_num::Rational;
 use super::{Ground, LinkId, UncertainNetwork};
 use crate::{Constraint, ConstraintId, Network, NodeId, Schedule, Weight};
 
-/// Requirements that no times fixed beforehand satisfy whatever the links do.
+/// Requirements that no fixed times satisfy for all durations of the links.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StrongConflict<W = Rational> {
     /// The requirements and the bounds of links that contradict each other, in the order of a
     /// cycle.
     pub grounds: Vec<Ground>,
-    /// By how much; negative. `None` if it is without limit, because a link may last for ever.
+    /// Length of the cycle; negative. `None` if it is unlimited, because a link has no upper bound.
     pub total: Option<W>,
 }
 
@@ -94,12 +94,12 @@ impl<W: Weight> UncertainNetwork<W> {
         (root, links)
     }
 
-    /// A requirement in terms of the points that the executor chooses.
+    /// Returns a requirement in terms of the points that the executor chooses.
     fn reduced(&self, id: ConstraintId) -> Reduced<W> {
         let constraint = self.requirements.constraint(id);
         let (from, from_links) = self.chain(constraint.from);
         let (to, to_links) = self.chain(constraint.to);
-        // Links that both have before them take as long for the one as for the other.
+        // Links before both points have the same duration for both.
         let shared = from_links
             .iter()
             .zip(&to_links)

@@ -17,7 +17,7 @@ use crate::uncertain::{Extended, LinkId};
 use crate::{NodeId, Weight, WindowEnd, spend_step};
 
 impl<W: Weight> Dispatcher<W> {
-    /// When a link that began then ends at the latest; `None` if there is no such time.
+    /// Returns the latest end of a link that began at `begun`; `None` if there is none.
     pub(super) fn last_end(&self, id: LinkId, begun: &W) -> Option<W> {
         if let Some((_, until)) = self.prolonged.iter().find(|(other, _)| *other == id) {
             return until.clone();
@@ -194,12 +194,12 @@ impl<W: Weight> Dispatcher<W> {
     }
 }
 
-/// The nodes that have to wait for the end of a link.
+/// Nodes that have to wait for the end of a link.
 struct Waiting<W> {
     /// Nodes, each with the time until which it waits, as far as is known, and the edge that
     /// implies it.
     known: Vec<(NodeId, Extended<W>, EdgeId)>,
-    /// Their places in that list.
+    /// Position of each node in that list.
     places: BTreeMap<NodeId, usize>,
     /// Nodes to process, the latest time first, so that each is processed once. The times are
     /// negated.
