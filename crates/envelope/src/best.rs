@@ -60,10 +60,10 @@ pub enum Objective {
     LeastSlack,
     /// The sum of the widths of all intervals, each times its parameter's weight.
     Widths,
-    /// The product of the widths of all intervals, each in relation to its nominal value and raised
-    /// to its parameter's weight. To each a millionth is added first, so that the product is not 0
-    /// wherever one duration cannot deviate at all. The value is the logarithm of the product, and
-    /// a box is the best one if no other has more than a millionth more.
+    /// The product of the widths of all intervals, each relative to its nominal value and raised to
+    /// its parameter's weight. A millionth is added to each width first, so that the product is not
+    /// 0 if one duration cannot deviate at all. The value is the logarithm of the product. A box
+    /// counts as best if no other is better by more than a millionth.
     Volume,
     /// The probability that independent durations, each with its distribution
     /// ([`BestSettings::chances`]), all stay inside. The value is the logarithm; [`NEVER`] replaces
@@ -75,7 +75,7 @@ pub enum Objective {
 pub const NEVER: i64 = -1_000_000;
 
 impl Objective {
-    /// Its name in documents and on the command line.
+    /// Returns its name in documents and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::LeastSlack => "least-slack",
@@ -101,13 +101,13 @@ pub struct BestSettings {
     pub symmetric: bool,
     /// Greatest deviation that counts, as a multiple of the nominal value.
     pub most: Rational,
-    /// For [`Objective::Probability`]: how each parameter is distributed, in their order. One without
-    /// a distribution, as are all that are missing, always has its nominal value.
+    /// For [`Objective::Probability`]: the distribution of each parameter, in their order. A
+    /// parameter without a distribution, or missing in the list, always has its nominal value.
     pub chances: Vec<Option<Chance>>,
 }
 
 impl Default for BestSettings {
-    /// Least slack, ends counted up to nine times the nominal value away from it.
+    /// Least slack, with deviations up to nine times the nominal value.
     fn default() -> Self {
         Self {
             objective: Objective::default(),
@@ -118,8 +118,8 @@ impl Default for BestSettings {
     }
 }
 
-/// A box is the best one by an objective that is a logarithm if no other is worth more than so much
-/// more: a millionth.
+/// Returns the tolerance of objectives that are logarithms: a box counts as best if no other is
+/// better by more than a millionth.
 pub(crate) fn tolerance() -> Rational {
     Rational::new(1, 1_000_000)
 }
@@ -127,13 +127,13 @@ pub(crate) fn tolerance() -> Rational {
 /// The result of [`best`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct BestRun {
-    /// The box; `Err` if the plan does not even work at the nominal values.
+    /// The box; `Err` if the plan does not work at the nominal values.
     pub envelope: Result<DecoupledEnvelope, Objection>,
     /// The value of the objective: the least slack, the sum of widths, or the logarithm of the
     /// volume, which is rounded down to a billionth.
     pub value: Rational,
     /// An upper bound on the objective of all boxes; equal to `value` if the box is proved to be
-    /// the largest, but for at most a millionth where the objective is a logarithm.
+    /// the largest, except for at most a millionth if the objective is a logarithm.
     pub bound: Rational,
     /// `true` if there is no better box. With [`Objective::LeastSlack`], the second least slack is
     /// also proven to be the greatest possible, and so on.
@@ -186,21 +186,21 @@ impl Default for Reasons {
     }
 }
 
-/// A variable that can have no more slack unless another one with no more slack gets less.
+/// Variable that can only gain slack if another one with no more slack loses some.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stopped {
     /// The ends that the variable moves.
     pub ends: Vec<BoxEnd>,
     /// Deviation relative to the nominal value.
     pub slack: Rational,
-    /// The cut that stops it, by position; `None` if its own range or the limit on counting does.
+    /// The cut that stops it, by position; `None` if its own range or the greatest deviation does.
     pub cut: Option<usize>,
 }
 
 /// One case of a tree: a bound on the objective, or a distinction of cases.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Case {
-    /// One row of the cut at this position holds: for each, the position of the case in the tree.
+    /// One row of the cut at this position holds: one case for each row.
     Either {
         /// The cut.
         cut: usize,
@@ -212,15 +212,15 @@ pub enum Case {
     Bounded {
         /// The bounds.
         multipliers: Vec<(Source, Rational)>,
-        /// For an objective that is no sum, of each parameter the slope of the tangent that stands
-        /// for it; for a probability, that for its lower end and that for its upper one.
+        /// For an objective that is not linear, the slope of the tangent of each parameter; for a
+        /// probability, those of its lower end and of its upper one.
         slopes: Vec<Rational>,
-        /// For a probability, of each parameter where that tangent touches.
+        /// For a probability, the point of contact of each parameter's tangent.
         touches: Vec<Touch>,
         /// `true` if there is no box in this case.
         is_impossible: bool,
     },
-    /// The variable is less than this, or not: for each, the position of the case in the tree.
+    /// The variable is less than this, or not: one case for each.
     Split {
         /// The variable.
         variable: usize,
@@ -236,9 +236,9 @@ pub enum Case {
 pub enum Source {
     /// A row of a cut: position of the cut, position of the row.
     Row(usize, usize),
-    /// The most that a variable can be.
+    /// The upper bound of a variable.
     Most(usize),
-    /// That a variable is not negative.
+    /// The lower bound 0 of a variable.
     Least(usize),
 }
 
@@ -254,7 +254,7 @@ pub struct BestStep<'a> {
 /// Variables of the search: each moves one end, or both ends of a parameter if boxes are symmetric.
 #[derive(Clone, Debug)]
 pub(crate) struct Variables {
-    /// The ends that each moves.
+    /// The ends moved by each variable.
     pub(crate) ends: Vec<Vec<BoxEnd>>,
     /// Size of the nominal value that its slack is relative to.
     pub(crate) scales: Vec<Rational>,
@@ -313,7 +313,7 @@ impl Variables {
         .collect()
     }
 
-    /// The least slack of a box, up to what counts.
+    /// Returns the least slack of a box, up to the greatest deviation.
     fn least_slack(
         &self,
         nominal: &DecoupledEnvelope,
@@ -347,7 +347,7 @@ impl Variables {
         envelope
     }
 
-    /// A row as `Σ factor · variable <= bound`.
+    /// Converts a row to `Σ factor · variable <= bound`.
     pub(crate) fn row(
         &self,
         plan: &ParametrizedPlan,
@@ -413,7 +413,7 @@ pub fn best(
         }
     };
     if run.is_cancelled && settings.objective == Objective::LeastSlack && !settings.symmetric {
-        // A search that ends early may know less than it began with.
+        // A search that ends early may be worse than the start.
         if let (Some(start), Ok(envelope)) = (start, &mut run.envelope)
             && let Some(slack) = variables.least_slack(&nominal, start)
             && slack >= run.value
@@ -431,7 +431,7 @@ pub fn best(
     Ok(run)
 }
 
-/// The box with those ends infinite that are as far out as counts, if nothing stops them.
+/// Makes the ends at the greatest deviation infinite, if nothing stops them.
 fn let_go(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,

@@ -1,4 +1,4 @@
-//! On which cycles of constraints parameters lie.
+//! Cycles of constraints that parameters lie on.
 
 use std::collections::BTreeMap;
 
@@ -7,14 +7,14 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, ParameterId, Side};
 use elbowroom_stn::{Constraint, Network, NodeId as ClassId};
 
-/// Through which of its ends a parameter can make the network inconsistent.
+/// The ends through which a parameter can make the network inconsistent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     /// It is on no cycle.
     None,
-    /// Small values break things: it is only used as an upper bound.
+    /// Small values can: it is only used as an upper bound.
     Lower,
-    /// Large values break things: it is only used as a lower bound.
+    /// Large values can: it is only used as a lower bound.
     Upper,
     /// Both can.
     Both,
@@ -53,7 +53,7 @@ pub(crate) fn own_limits(
             continue;
         };
         for (end, constant) in opposite {
-            // The way there must not be shorter than the way back, at the end that shortens it.
+            // The path there must not be shorter than the path back, at the end that shortens it.
             let inner = BoxEnd {
                 side: end.side.opposite(),
                 ..*end
@@ -68,7 +68,7 @@ pub(crate) fn own_limits(
     (limits, left)
 }
 
-/// For each parameter, the positions of its edges.
+/// Returns the positions of each parameter's edges.
 fn own_edges<'a>(edges: impl Iterator<Item = &'a Edge>) -> BTreeMap<ParameterId, Vec<usize>> {
     let mut own: BTreeMap<ParameterId, Vec<usize>> = BTreeMap::new();
     for (index, edge) in edges.enumerate() {
@@ -93,14 +93,14 @@ fn is_difference(edges: &[Edge], own: &[usize]) -> bool {
     }
 }
 
-/// On which cycles the parameters are.
+/// Analysis of the cycles that parameters lie on.
 pub(crate) struct Cycles<'a> {
     edges: Vec<&'a Edge>,
     /// For each parameter, the positions of its edges.
     own: BTreeMap<ParameterId, Vec<usize>>,
-    /// For each class, those with the same number reach each other.
+    /// The strongly connected component of each class.
     component: Vec<usize>,
-    /// For each edge, whether there is no way around it between classes that reach each other.
+    /// For each edge, `true` if it is a strong bridge.
     is_bridge: Vec<bool>,
 }
 
@@ -108,7 +108,7 @@ impl<'a> Cycles<'a> {
     pub(crate) fn new(edges: Vec<&'a Edge>, class_count: usize) -> Self {
         let mut graph: Network<i128> = Network::with_nodes(class_count);
         for edge in &edges {
-            // Only where it leads counts.
+            // Only the ends of the edge matter, not its bound.
             graph.add(Constraint::at_most(edge.from, edge.to, 0));
         }
         Self {

@@ -1,4 +1,4 @@
-//! Obligations that a dispatcher can see to.
+//! Obligations that a dispatcher can enforce.
 
 use elbowroom_model::Task;
 use elbowroom_plan::{Bound, Constraint, DecoupledEnvelope, ParametrizedPlan, Reason};
@@ -66,7 +66,7 @@ pub fn enforced(
     Ok((enforced, added))
 }
 
-/// The difference that is too small in a bad case, if nothing else is wrong in it.
+/// Returns the difference that is too small in a bad case, if the case has no other constraints.
 fn avoidable(case: &BadCase) -> Option<&Difference> {
     match (case.differences.as_slice(), case.inequalities.as_slice()) {
         ([difference], []) if difference.is_strict => Some(difference),

@@ -27,16 +27,16 @@ pub use volume::{Body, Component};
 /// The limit on polyhedra of the union.
 const MOST_PIECES: usize = 256;
 
-/// All values for which a plan works: those that are in one of the pieces.
+/// All values for which a plan works: the union of the pieces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Region {
-    /// No two of them have a point in common. None if there are no such values.
+    /// Disjoint polyhedra; empty if there are no such values.
     pub pieces: Vec<Piece>,
     /// Reason why the pieces may not cover the whole region; `None` if they do.
     pub missing: Option<ExactError>,
 }
 
-/// A polyhedron of values, without rows that follow from others.
+/// Polyhedron of values, without redundant rows.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Piece {
     /// Inequalities that the values satisfy.
@@ -68,7 +68,7 @@ pub enum RegionSource {
     Requirement(usize),
 }
 
-/// The region cannot be written as a union of polyhedra, or is too large for that.
+/// Error for a region that is not a union of polyhedra, or that is too large.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ExactError {
     /// A condition is not linear.
@@ -80,7 +80,7 @@ pub enum ExactError {
         /// The position of the requirement; `None` if it is a bound of the network.
         requirement: Option<usize>,
     },
-    /// Too many inequalities on the way.
+    /// The elimination takes too many inequalities.
     #[error("the region takes more than {limit} inequalities at once; leave less open")]
     TooManyRows {
         /// Limit on the number kept.
@@ -92,7 +92,7 @@ pub enum ExactError {
         /// Limit on the number kept.
         limit: usize,
     },
-    /// The caller wanted no more.
+    /// The caller ended the computation.
     #[error("the region was not done when there was no more time")]
     Ended,
 }
@@ -150,7 +150,8 @@ pub fn exact(
     if !scheduled.is_feasible() {
         return Ok(Region::default());
     }
-    // What breaks a requirement, with how many of its rows the schedules do not imply.
+    // The polyhedra of violations, each with the number of its rows that the schedules do not
+    // imply.
     let mut bad: Vec<(usize, Polyhedron)> = Vec::new();
     for (index, obligation) in obligations.iter().enumerate() {
         let source = RegionSource::Requirement(index);
@@ -174,7 +175,7 @@ pub fn exact(
             bad.push((broken.rows().len(), broken));
         }
     }
-    // Those that cut off a half-space first, which makes no new pieces.
+    // Those that cut off a half-space come first, because they do not split a piece.
     bad.sort_by_key(|(count, _)| *count);
     let bad: Vec<Polyhedron> = bad.into_iter().map(|(_, broken)| broken).collect();
     let (pieces, missing) = without_all(scheduled, &bad, flow);
@@ -220,7 +221,7 @@ fn without_all(
     (done, None)
 }
 
-/// `to - from <= bound` as an inequality.
+/// Converts `to - from <= bound` to an inequality.
 fn difference(difference: &crate::obligations::Difference) -> Inequality {
     let mut expression = Linear::difference(difference.from, difference.to);
     expression.constant = -&difference.bound;
@@ -236,7 +237,7 @@ struct Coordinates {
 }
 
 impl Coordinates {
-    /// `None` if it is not linear.
+    /// Converts an inequality; `None` if it is not linear.
     fn row(&self, inequality: &Inequality, source: RegionSource) -> Option<Halfspace> {
         let expression = &inequality.expression;
         if !expression.products.is_empty() {
@@ -254,7 +255,7 @@ impl Coordinates {
         })
     }
 
-    /// The natural range of a parameter.
+    /// Returns the half-spaces of the natural range of a parameter.
     fn range(&self, id: ParameterId, parameter: &elbowroom_plan::Parameter) -> Vec<Halfspace> {
         let range = &parameter.range;
         let sides = [(&range.lower, -1), (&range.upper, 1)];

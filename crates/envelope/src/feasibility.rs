@@ -1,4 +1,4 @@
-//! The first half of the box check: for every value in the box there is a schedule.
+//! The first half of the box check: there is a schedule for every value in the box.
 
 mod rules;
 
@@ -37,12 +37,12 @@ pub(crate) const MOST_BRANCHES: usize = 1 << 14;
 pub(crate) struct Feasibility {
     /// The reduced network's edges.
     all_edges: Arc<Vec<Edge>>,
-    /// The positions of those that are not limits of a parameter.
+    /// The positions of the edges that are not limits of a parameter.
     left: Vec<u32>,
     /// Limits on the reach of single ends ([`BoxEnd::reach`]).
     own_limits: BTreeMap<BoxEnd, Rational>,
     class_count: usize,
-    /// Each parameter's role in the cycles of the edges that are left.
+    /// Each parameter's role in the cycles of these edges.
     roles: Vec<Role>,
     /// Parameters that bound several differences.
     coupled: Vec<ParameterId>,
@@ -61,9 +61,9 @@ struct Corner {
 /// Values in the box for which there is no schedule.
 #[derive(Clone, Debug)]
 pub(crate) enum Infeasible {
-    /// These.
+    /// These values.
     At(Valuation),
-    /// Some far out on that side, wherever the other parameters are.
+    /// Some values far out on that side, whatever the other parameters are.
     FarOut(BoxEnd),
 }
 
@@ -104,10 +104,10 @@ impl Feasibility {
             .map(|&index| &self.all_edges[index as usize])
     }
 
-    /// Values in the box without a schedule, if any.
+    /// Returns values in the box without a schedule, if any.
     ///
-    /// `moved` says that the box differs only in that end, further out, from the last one that was
-    /// found feasible.
+    /// If `moved` is given, the box differs from the last feasible one only in that end, which is
+    /// further out.
     pub(crate) fn infeasible(
         &mut self,
         envelope: &DecoupledEnvelope,
@@ -148,7 +148,7 @@ impl Feasibility {
         }
     }
 
-    /// A corner without a schedule.
+    /// Returns a corner without a schedule.
     fn branching(
         &self,
         envelope: &DecoupledEnvelope,
@@ -200,7 +200,7 @@ impl Feasibility {
         }
         let mut network = Network::with_nodes(self.class_count);
         for edge in self.edges() {
-            // An upper bound follows the parameter, a lower bound holds against it.
+            // An upper bound increases with the parameter, a lower bound decreases the edge.
             let bound = match edge.end {
                 Some(other) if other.parameter == end.parameter && other.side == end.side => 1,
                 Some(other) if other.parameter == end.parameter => -1,
@@ -215,7 +215,7 @@ impl Feasibility {
         ConsistentNetwork::try_from(network).is_ok()
     }
 
-    /// The values that were meant.
+    /// Converts the finding to values.
     pub(crate) fn values(&self, envelope: &DecoupledEnvelope, found: Infeasible) -> Valuation {
         match found {
             Infeasible::At(values) => values,
@@ -308,7 +308,7 @@ impl Feasibility {
         ConsistentNetwork::try_from(network).ok()
     }
 
-    /// The bound of an edge at a corner of the box; `None` if it does not matter.
+    /// Returns the bound of an edge at a corner of the box; `None` if the edge does not matter.
     fn bound(
         &self,
         edge: &Edge,
@@ -335,7 +335,8 @@ impl Feasibility {
             Role::None => return None,
             Role::Lower if end.side == Side::Upper => return None,
             Role::Upper if end.side == Side::Lower => return None,
-            // Both of a parameter's edges move, one of them to looser: start afresh.
+            // Both of a parameter's edges move, and one of them becomes looser, so the networks are
+            // rebuilt.
             Role::Both => return self.rebuild_corners(envelope, end),
             Role::Lower | Role::Upper => {}
         }
@@ -393,7 +394,7 @@ impl Feasibility {
     }
 }
 
-/// The values at a corner; parameters that do not matter at some value.
+/// Returns the values at a corner; parameters that do not matter have any value.
 fn valuation(sides: &BTreeMap<ParameterId, Side>, envelope: &DecoupledEnvelope) -> Valuation {
     envelope
         .intervals()
@@ -406,8 +407,8 @@ fn valuation(sides: &BTreeMap<ParameterId, Side>, envelope: &DecoupledEnvelope) 
         .collect()
 }
 
-/// That end of the interval, or, if it is infinite, some value in it: that the plan has schedules
-/// in that direction for ever is asked apart.
+/// Returns that end of the interval or, if it is infinite, some value in it. Whether the plan has
+/// schedules arbitrarily far in that direction is checked separately.
 fn any_value(interval: &Interval, side: Side) -> Rational {
     let (wanted, other) = (side.of(interval), side.opposite().of(interval));
     let value = wanted.value().or(other.value());

@@ -4,15 +4,15 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, Parameter, ParameterId, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
 
-/// The step size after a successful widening.
+/// Change of the step size after a successful widening.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Growth {
-    /// They double until both directions of the parameter have been refused for the first time,
-    /// as in the authors' code.
+    /// Steps double until both directions of the parameter have been refused for the first time, as
+    /// in the authors' code.
     #[default]
     Doubling,
-    /// They stay, as in the paper.
+    /// Steps stay constant, as in the paper.
     Constant,
 }
 
@@ -45,8 +45,9 @@ struct Progress {
 }
 
 impl Frontier {
-    /// All directions open; steps as in the authors' code, `max(nominal, 1) · weight`, or `scale ·
-    /// weight` if there are scales, but at least the precision.
+    /// Creates the frontier with all directions open. Steps are as in the authors' code,
+    /// `max(nominal, 1) · weight`, or `scale · weight` if there are scales, but at least the
+    /// precision.
     pub(crate) fn new(
         plan: &ParametrizedPlan,
         precisions: Vec<Rational>,
@@ -78,10 +79,11 @@ impl Frontier {
         }
     }
 
-    /// The next end to move and by how much; `None` when every step is below the precision.
+    /// Returns the next end to move, and the step; `None` when every step is below the precision.
     ///
     /// Round robin over the parameters, the upper end first. While some step is at least the
-    /// precision, those down to half of it take part as well, as in the authors' code.
+    /// precision, parameters with at least half the precision also take part, as in the authors'
+    /// code.
     pub(crate) fn next_end(&mut self) -> Option<(BoxEnd, Rational)> {
         if self.going == 0 {
             return None;
@@ -109,7 +111,7 @@ impl Frontier {
         None
     }
 
-    /// The end was moved.
+    /// Records that the end was moved.
     pub(crate) fn accept(&mut self, end: BoxEnd) {
         let growth = self.growth;
         self.change(end, |progress, _| {
@@ -119,8 +121,8 @@ impl Frontier {
         });
     }
 
-    /// The end could not be moved: the direction closes; when both have, the step is halved and
-    /// they open again.
+    /// Records that the end could not be moved: the direction closes. When both directions are
+    /// closed, the step is halved and they open again.
     pub(crate) fn reject(&mut self, end: BoxEnd) {
         self.change(end, |progress, place| {
             progress.is_open[place] = false;
@@ -128,7 +130,7 @@ impl Frontier {
         });
     }
 
-    /// The end can go no further whatever the step: it is infinite, or at the border of its range.
+    /// Records that the end cannot move any further: it is infinite, or at the border of its range.
     pub(crate) fn finish(&mut self, end: BoxEnd) {
         self.change(end, |progress, place| {
             progress.is_done[place] = true;

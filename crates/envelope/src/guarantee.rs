@@ -30,22 +30,22 @@ const MANY: usize = 10_000;
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Guarantee {
-    /// For all values there is a schedule, for an executor that knows them in advance (weak
-    /// controllability). What the papers compute.
+    /// There is a schedule for all values, for an executor that knows them in advance (weak
+    /// controllability). The papers compute this guarantee.
     Weak,
     /// The plan can be executed by an executor that observes each value only when it is realised
     /// (dynamic controllability).
     #[default]
     Dynamic,
-    /// One schedule does for all values (strong controllability).
+    /// One schedule works for all values (strong controllability).
     Strong,
 }
 
 impl Guarantee {
-    /// All of them, the weakest first.
+    /// All guarantees, the weakest first.
     pub const ALL: [Self; 3] = [Self::Weak, Self::Dynamic, Self::Strong];
 
-    /// Its name in documents and on the command line.
+    /// Returns its name in documents and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Weak => "weak",
@@ -77,7 +77,8 @@ pub(crate) enum Controllability {
 #[derive(Clone, Debug)]
 pub(crate) struct Control {
     pub(crate) plan: Arc<ParametrizedPlan>,
-    /// That there is no schedule at all is the better reason, where it is one. Of many plans it is never asked.
+    /// Feasibility check, computed on first use. Values without any schedule are a better
+    /// explanation of a refusal than a conflict. For many plans it is never needed.
     feasibility: OnceLock<Feasibility>,
 }
 
@@ -97,7 +98,7 @@ pub(crate) enum Uncontrollable {
 }
 
 impl Controllability {
-    /// For this plan, whose reduced network may be known already.
+    /// Creates the check for this plan, whose reduced network may be known already.
     pub(crate) fn new(
         guarantee: Guarantee,
         plan: &Arc<ParametrizedPlan>,

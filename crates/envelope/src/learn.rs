@@ -28,18 +28,18 @@ use shorter::Shortcuts;
 /// The limit on the rows of a cut.
 const MOST_ROWS: usize = 64;
 
-/// The outcome of a check, in terms of other boxes.
+/// Result of a check, in terms of cuts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Learnt {
-    /// Nothing is against it.
+    /// The box is accepted.
     Nothing,
-    /// It is refused, and others with it: at least one cut.
+    /// The box is refused, with at least one cut.
     Cuts(Vec<Cut>),
-    /// It is refused, but nothing linear can be said about others.
+    /// The box is refused, but there is no linear cut.
     Unknown,
 }
 
-/// That these values have no schedule.
+/// Returns the cut that follows from values without a schedule.
 pub(crate) fn without_schedule(
     plan: &ParametrizedPlan,
     values: &Valuation,
@@ -54,7 +54,7 @@ pub(crate) fn without_schedule(
         .iter()
         .map(|id| origins[id.index()])
         .collect();
-    // How often each parameter counts: its sign says which of its ends is the worse one.
+    // The sum of each parameter's coefficients; its sign determines the worse end.
     let mut constant = Rational::ZERO;
     let mut counts = vec![Rational::ZERO; plan.parameters.len()];
     for origin in &cycle {
@@ -130,7 +130,7 @@ pub(crate) fn without_strategy(
     }
 }
 
-/// The conflict that prevents strong controllability in the box.
+/// Returns the conflict that prevents strong controllability in the box.
 pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Learnt {
     let Ok(network) = plan.uncertain_network(envelope) else {
         return Learnt::Unknown;
@@ -139,7 +139,7 @@ pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledE
         return Learnt::Nothing;
     };
     if total.is_none() {
-        // An infinite end, whatever the others are: nothing adds up.
+        // An end is infinite, whatever the others are, so there is no sum.
         return Learnt::Unknown;
     }
     let reader = Reader {
@@ -178,7 +178,7 @@ fn learnt(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope)
     }
 }
 
-/// One of these is not negative; in the box all are, or it is no cut.
+/// Returns the cut that one of these is not negative; `None` unless all are negative in the box.
 fn cut(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope) -> Option<Cut> {
     let mut rows = Vec::new();
     for ends in alternatives {
@@ -191,10 +191,10 @@ fn cut(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope) ->
     (!cut.holds_in(envelope)).then_some(cut)
 }
 
-/// All sums of one of these and one of those.
+/// Returns all sums of one element of each list.
 fn sums(mut some: Vec<Ends>, others: &[Ends]) -> Vec<Ends> {
     if let [other] = others {
-        // So it is nearly always, and a way may have thousands of parts.
+        // The usual case, and a way may have thousands of parts.
         for one in &mut some {
             one.add(other);
         }
@@ -226,7 +226,8 @@ fn whole<'a>(
     cut(vec![total], Ground::Cycle(origins), envelope)
 }
 
-/// The steps of a cycle one after the other, whatever ways they are parts of: ways lie in ways, as deep as a plan is long.
+/// Returns the steps of a cycle in order, without the structure of ways, which are nested as deeply
+/// as a plan is long.
 fn steps(cycle: &[Way]) -> impl Iterator<Item = &Part> {
     let mut open: Vec<&Part> = cycle.iter().flat_map(|way| &way.parts).rev().collect();
     std::iter::from_fn(move || {
@@ -306,7 +307,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The bound of a requirement, and where it comes from.
+    /// Returns the bound of a requirement, and its origin.
     fn requirement(&self, id: ConstraintId) -> Option<(Length, Origin)> {
         let requirement = self.network.network.requirements().constraint(id);
         let fixed = Length::Fixed(requirement.bound.clone());
@@ -331,7 +332,8 @@ impl Reader<'_> {
             // A second duration that ends at the same node.
             return None;
         }
-        // Whatever the value, the bound has to hold: an upper bound at the parameter's lower end.
+        // The bound has to hold for all values, so an upper bound applies at the parameter's lower
+        // end.
         let (side, sign) = if is_upper {
             (Side::Lower, 1)
         } else {
@@ -368,7 +370,7 @@ impl Reader<'_> {
         Some(lengths)
     }
 
-    /// The way in terms of the plan.
+    /// Converts a way to the terms of the plan.
     fn way(&self, way: &Way) -> Option<ProofWay> {
         let constraint = |link: LinkId| self.network.links[link.index()];
         let parts = way.parts.iter().map(|part| {

@@ -42,7 +42,7 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// `earlier < later`.
+    /// Returns `earlier < later`.
     pub fn before(earlier: NodeId, later: NodeId) -> Self {
         Self {
             from: later,
@@ -52,7 +52,7 @@ impl Difference {
         }
     }
 
-    /// `earlier <= later`.
+    /// Returns `earlier <= later`.
     pub fn not_after(earlier: NodeId, later: NodeId) -> Self {
         Self {
             from: later,
@@ -116,7 +116,7 @@ pub enum Requirement {
         /// The condition, one conjunct.
         condition: Condition,
     },
-    /// The action's duration obeys its domain.
+    /// The action's duration satisfies its constraints.
     Duration {
         /// The action.
         instance: InstanceId,
@@ -128,15 +128,15 @@ pub enum Requirement {
         /// Happening that needs the number.
         node: NodeId,
     },
-    /// A happening changes a fluent in one way only, unless all it does is to increase and
-    /// decrease it.
+    /// A happening changes a fluent in one way only, unless all its changes are increases and
+    /// decreases.
     OneUpdate {
         /// The happening.
         node: NodeId,
         /// The fluent.
         fluent: FluentId,
     },
-    /// Processes and events keep their course.
+    /// Processes and events keep their nominal course.
     Nature {
         /// The happening after which it would change.
         after: NodeId,
@@ -155,7 +155,7 @@ pub enum Requirement {
 pub struct Obligation {
     /// The requirement.
     pub requirement: Requirement,
-    /// Violated exactly when one of these is the case.
+    /// The obligation is violated exactly when one of these holds.
     pub bad_cases: Vec<BadCase>,
 }
 
@@ -164,11 +164,11 @@ pub struct Obligation {
 pub struct Obligations {
     /// Obligations whose bad cases are known.
     pub direct: Vec<Obligation>,
-    /// Numeric and compound over-all conditions; their cases unfold on demand.
+    /// Numeric and compound over-all conditions; their cases are computed on demand.
     pub over_all: Vec<OverAll>,
 }
 
-/// The exact method does not cover something in the plan or its problem.
+/// Error for a plan or problem that the exact method does not cover.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -182,7 +182,7 @@ pub enum Refusal {
         /// The expression.
         expression: String,
     },
-    /// A rate changes while it acts.
+    /// A rate changes while it is active.
     #[error("{place}: the rate of change of {fluent} depends on something that changes later on")]
     ChangingRate {
         /// Location in the plan or problem.
@@ -190,7 +190,7 @@ pub enum Refusal {
         /// The fluent it changes.
         fluent: String,
     },
-    /// A conditional effect hangs on what holds throughout its action.
+    /// A conditional effect depends on a condition throughout its action.
     #[error("{place}: a conditional effect with an over-all condition cannot be analysed")]
     GuardOverAll {
         /// Location in the plan or problem.
@@ -210,13 +210,13 @@ pub enum Refusal {
         /// Location that reads the derived fact.
         place: String,
     },
-    /// A number is left open that is not among the plan's parameters.
+    /// A number is left open that is not one of the plan's parameters.
     #[error("{place}: a number is left open that is no parameter; vary it or give it a value")]
     OpenNumber {
         /// Location in the plan or problem.
         place: String,
     },
-    /// The ends of a parameter's interval do not decide what happens between them.
+    /// The ends of a parameter's interval do not decide the values between them.
     #[error(
         "parameter {name} is multiplied by itself, or by a time that it also bounds, or with \
          several numbers of one condition; give it a value, or vary one of these only"
@@ -240,7 +240,7 @@ pub enum Refusal {
 }
 
 impl Requirement {
-    /// The requirement in words.
+    /// Describes the requirement in words.
     pub fn describe(&self, task: &Task, plan: &StnPlan) -> String {
         match self {
             Self::Separation { first, second } => format!(

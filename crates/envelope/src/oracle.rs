@@ -43,8 +43,8 @@ pub struct Oracle {
     guarantee: Guarantee,
     asked: Asked,
     controllability: Controllability,
-    /// The conditions on all schedules; `None` while no values with a schedule are known, and where they are not asked
-    /// about.
+    /// The conditions on all schedules; `None` while no values with a schedule are known, or if
+    /// only the times are checked.
     soundness: Option<Soundness>,
     /// Values that determine the order of happenings in `soundness`; initially the nominal ones.
     around: Valuation,
@@ -65,13 +65,13 @@ pub struct Oracle {
 /// Scope of the check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Asked {
-    /// Every condition that all its schedules have to meet, and the times.
+    /// The conditions on all schedules, and the times.
     All,
-    /// Nothing but the times: its network is known to see to the conditions.
+    /// Only the times: the network is known to imply the conditions.
     Times,
 }
 
-/// An [`Objection`] before the values are worked out.
+/// [`Objection`] without its values.
 enum Reason {
     /// The plan has no schedule at these values.
     NoSchedule(Valuation),
@@ -80,11 +80,11 @@ enum Reason {
 }
 
 impl Oracle {
-    /// The oracle for a plan. If the plan has no schedule at its nominal values, that is what
-    /// stands against each box that holds them.
+    /// Creates the oracle for a plan. If the plan has no schedule at its nominal values, every box
+    /// that contains them is refused for that reason.
     ///
     /// # Errors
-    /// When the plan holds something beyond exact linear reasoning; the message names it.
+    /// If the plan contains something beyond exact linear reasoning; the message names it.
     pub fn new(
         task: &Arc<Task>,
         plan: &Arc<ParametrizedPlan>,
@@ -150,7 +150,8 @@ impl Oracle {
         self.guarantee
     }
 
-    /// The box that was accepted by [`start`](Self::start), as widened since; `None` before that.
+    /// Returns the box that was accepted by [`start`](Self::start), as widened since; `None` before
+    /// that.
     pub fn accepted(&self) -> Option<&DecoupledEnvelope> {
         self.accepted.as_ref()
     }
@@ -288,8 +289,8 @@ impl Oracle {
         self.soundness.as_ref()?.counterexample(envelope, broken)
     }
 
-    /// The accepted box with an end moved out, and why that is refused; `None` if it is not, and
-    /// is the accepted box now.
+    /// Moves an end of the accepted box out. Returns the wider box and the reason if it is refused;
+    /// `None` if it is the accepted box now.
     fn widen(
         &mut self,
         end: BoxEnd,
@@ -326,7 +327,7 @@ impl Oracle {
         }
     }
 
-    /// The nominal values as a box, if they are inside.
+    /// Returns the nominal values as a box, if they are inside.
     fn start_at_nominal(
         &mut self,
     ) -> Result<Result<DecoupledEnvelope, (DecoupledEnvelope, Reason)>, Refusal> {
@@ -355,9 +356,8 @@ impl Oracle {
             return self.check_afresh(candidate);
         }
         self.checks += 1;
-        // Proofs found for a box that was refused, and is not the last accepted one with an end
-        // moved out, may not hold in the last accepted one: then which end has moved says nothing
-        // about them.
+        // Proofs found for a refused box that is not the last accepted one with an end moved out
+        // may not hold in the last accepted one. The moved end then says nothing about them.
         let trusted = self.proofs_hold_in_last.then_some(end);
         let reason = self.sound_and_controllable(candidate, Some(end), trusted);
         if let Ok(None) = &reason {
@@ -366,7 +366,7 @@ impl Oracle {
         reason
     }
 
-    /// Checks a box that need not have anything to do with the one before.
+    /// Checks a box that may be unrelated to the previous one.
     fn check_afresh(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Reason>, Refusal> {
         self.checks += 1;
         let reason = self.sound_and_controllable(envelope, None, None);
@@ -380,8 +380,8 @@ impl Oracle {
         moved: Option<BoxEnd>,
         trusted: Option<BoxEnd>,
     ) -> Result<Option<Reason>, Refusal> {
-        // A sound box with an infeasible one rejected afterwards would leave the networks of the
-        // feasibility check ahead of the accepted box, so soundness comes first.
+        // Soundness comes first. If a sound box were rejected as infeasible afterwards, the
+        // networks of the feasibility check would be ahead of the accepted box.
         if self.asked == Asked::All
             && let Some(reason) = self.unsound(envelope, trusted)?
         {
@@ -416,10 +416,11 @@ impl Oracle {
         Ok(broken.map(Reason::Broken))
     }
 
-    /// Goes by the order that happenings have in the box from now on. The box need not hold the
-    /// nominal values, and elsewhere a plan may work in another order.
+    /// Switches to the order of happenings in the box. The box need not contain the nominal values,
+    /// and elsewhere a plan may work in another order.
     ///
-    /// Values in the box that have no schedule, if that shows already; then nothing changes.
+    /// Returns values in the box without a schedule, if they are found on the way; then nothing
+    /// changes.
     fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
         let nearest = envelope.nearest(&self.plan.nominal());
         let Some(soundness) = Soundness::around(&self.task, &self.plan, &nearest)? else {

@@ -8,7 +8,8 @@ use crate::obligations::{Difference, Inequality, Requirement};
 /// Proof that there are times for all points, for all values in a box.
 #[derive(Clone, Debug)]
 pub enum ControlProof {
-    /// These times do, for the strong guarantee; those that the world decides on are the earliest.
+    /// These times work, for the strong guarantee; those that the world decides on are the
+    /// earliest.
     Times(Schedule),
     /// Rules for an executor that knows the values; the first case is split into the others.
     Schedules(Vec<ScheduleCase>),
@@ -21,7 +22,7 @@ pub enum ControlProof {
 pub enum ScheduleCase {
     /// The parameter is at its least value in the first case, and at its greatest in the second.
     Split(ParameterId, [usize; 2]),
-    /// For each node how its time depends on the values.
+    /// A rule for the time of each node, depending on the values.
     Rule(Vec<TimeRule>),
 }
 
@@ -34,13 +35,13 @@ pub struct TimeRule {
     pub factors: Vec<(ParameterId, Rational)>,
 }
 
-/// A dispatchable form of the plan's network.
+/// Dispatchable form of the plan's network.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Strategy {
-    /// `to - from <= bound`, beside the plan's own constraints.
+    /// Edges `to - from <= bound`, in addition to the plan's own constraints.
     pub edges: Vec<(NodeId, NodeId, Rational)>,
-    /// Nodes that wait for the end of a duration (the plan's constraint at this position), and how
-    /// long at most after its beginning.
+    /// Nodes that wait for the end of a duration (the plan's constraint at this position), and the
+    /// longest wait after its beginning.
     pub waits: Vec<(NodeId, usize, Option<Rational>)>,
 }
 
@@ -69,7 +70,7 @@ pub enum Unfailing {
 /// Way for a condition to fail, with the proof that it is impossible.
 #[derive(Clone, Debug)]
 pub struct Impossible {
-    /// Differences of times, beside those of the place of the moment.
+    /// Differences of times, in addition to those for the place of the moment.
     pub differences: Vec<Difference>,
     /// Other inequalities.
     pub inequalities: Vec<Inequality>,
@@ -82,7 +83,7 @@ pub struct Impossible {
 /// Inequalities with multipliers, whose sum is a contradiction.
 pub type Refutation = Vec<(Summand, Rational)>;
 
-/// An inequality of a [`Refutation`].
+/// Inequality of a [`Refutation`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Summand {
     /// The node comes at 0 or later.
@@ -91,8 +92,8 @@ pub enum Summand {
     AtLeast(usize),
     /// The upper bound of the plan's constraint at this position.
     AtMost(usize),
-    /// That difference: those of the place of the moment first.
+    /// The difference at this position: those for the place of the moment come first.
     Difference(usize),
-    /// That inequality.
+    /// The inequality at this position.
     Inequality(usize),
 }

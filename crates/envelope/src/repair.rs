@@ -36,12 +36,12 @@ use flaw::{Finder, Flaw};
 use orders::Orders;
 use program::{Program, Solved};
 
-/// A parameter of the plan that a repair may change.
+/// Parameter of the plan that a repair may change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Changeable {
-    /// The parameter. Its range, as far as it is closed, is not left; open ends count as closed.
+    /// The parameter. It stays in its range; open ends of the range count as closed.
     pub parameter: ParameterId,
-    /// Values that cost nothing: the nominal value, or what the domain allows.
+    /// Values without cost: the nominal value, or the values that the domain allows.
     pub free: Interval,
     /// Cost per unit of the value's distance from `free`; positive.
     pub weight: Rational,
@@ -56,7 +56,7 @@ pub enum Hindrance {
     Beginning,
     /// Two interfering happenings keep their order, at least ε apart.
     Order(NodeId, NodeId),
-    /// Something that every valid schedule satisfies.
+    /// A requirement on every valid schedule.
     Requirement(Requirement),
     /// The parameter stays in its range, or does not change at all.
     Range(ParameterId),
@@ -67,12 +67,12 @@ pub enum Hindrance {
 pub struct Repair {
     /// The values of all parameters.
     pub values: Valuation,
-    /// A valid schedule, as early as can be at this cost.
+    /// The earliest valid schedule at this cost.
     pub schedule: Schedule,
     /// Cost of the changes: the sum of weight times deviation.
     pub cost: Rational,
-    /// No repair costs less than this. It is the cost, unless that comes arbitrarily near to the
-    /// bound without reaching it.
+    /// Lower bound on the cost of any repair. It equals the cost, unless costs arbitrarily close to
+    /// the bound are possible, but not the bound itself.
     pub bound: Rational,
     /// Explanation of the cost: inequalities that add up to the bound, each with its multiplier.
     pub because: Vec<(Hindrance, Rational)>,
@@ -81,7 +81,7 @@ pub struct Repair {
 /// Result of a search for a repair.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RepairRun {
-    /// There is a repair, and none is cheaper.
+    /// A repair was found, and none is cheaper.
     Repaired {
         /// The repair.
         repair: Repair,
@@ -102,11 +102,11 @@ pub enum RepairRun {
         /// The schedule.
         schedule: Schedule,
     },
-    /// It was ended before anything was found.
+    /// The search was stopped before anything was found.
     Stopped {
         /// `true` if the caller cancelled the search; otherwise a limit was reached.
         is_cancelled: bool,
-        /// No repair costs less.
+        /// Lower bound on the cost of any repair.
         bound: Rational,
     },
 }
@@ -131,7 +131,7 @@ impl Default for RepairLimits {
 
 /// Solved case that has not been examined yet.
 struct Open {
-    /// The rows that hold in it besides those that always do.
+    /// The rows of this case, in addition to those of all cases.
     rows: Vec<usize>,
     /// The happenings whose order it decides.
     decided: BTreeSet<(NodeId, NodeId)>,
@@ -257,8 +257,8 @@ pub fn repair(
     })
 }
 
-/// The earliest schedule with the nominal values, or the free ones nearest to them, if there is one: often nothing
-/// else is needed, and it takes no linear program.
+/// Returns the earliest schedule with the nominal values, or the free ones nearest to them, if
+/// there is one. Often this is already the repair, and it needs no linear program.
 fn unchanged(
     plan: &ParametrizedPlan,
     changeable: &[Changeable],
@@ -286,7 +286,7 @@ fn unchanged(
     Some((values, schedule.into()))
 }
 
-/// The case of least cost; of several the one that was opened last, which is the most decided.
+/// Removes the case of least cost. Ties go to the newest case, which has the most decisions.
 fn take_cheapest(open: &mut Vec<Open>) -> Option<Open> {
     let cost = |case: &Open| -> Delta { case.solved.cost.clone() };
     let best = (0..open.len()).rev().min_by_key(|&at| cost(&open[at]))?;

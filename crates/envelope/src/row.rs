@@ -1,4 +1,4 @@
-//! A linear inequality in the ends of boxes.
+//! Linear inequalities in the ends of boxes.
 
 use elbowroom_num::{Rational, Total};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
@@ -18,7 +18,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// The left-hand side in a box; `None` if an infinite end counts.
+    /// Returns the left-hand side in a box; `None` if it contains an infinite end.
     pub fn value(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
         let mut value = Total::default();
         for (end, factor) in &self.factors {

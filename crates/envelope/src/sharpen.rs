@@ -1,4 +1,4 @@
-//! Moving the ends of a box onto their limits.
+//! Moves the ends of a box to their limits.
 
 use std::ops::ControlFlow;
 
@@ -9,7 +9,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side};
 use crate::irr::farthest;
 use crate::oracle::Oracle;
 
-/// The largest distance between an end and its limit where the limit is not found exactly: 10⁻¹².
+/// The largest distance between an end and a limit that is not found exactly: 10⁻¹².
 const RESOLUTION: (i64, i64) = (1, 1_000_000_000_000);
 
 /// Moves each end of the box out until it reaches its limit: upper before lower, parameter by
@@ -68,7 +68,7 @@ fn push(
     let mut outside = if let Some(border) = border {
         border
     } else {
-        // Something stops it: go out until there.
+        // There is a limit: move out until it is enclosed.
         let mut step = Rational::ONE;
         loop {
             if inside > farthest {
@@ -106,7 +106,7 @@ fn push(
     ControlFlow::Continue(())
 }
 
-/// The fraction with the smallest denominator strictly between two numbers, `low < high`.
+/// Returns the fraction with the smallest denominator strictly between two numbers, `low < high`.
 fn simplest_between(low: &Rational, high: &Rational) -> Rational {
     if low.is_negative() {
         if high.is_positive() {
@@ -134,7 +134,7 @@ fn simplest_between(low: &Rational, high: &Rational) -> Rational {
             .expect("greater than `least`, which is positive")
 }
 
-/// A number with as few decimals as possible strictly between two numbers, `low < high`.
+/// Returns a number with as few decimals as possible strictly between two numbers, `low < high`.
 fn shortest_decimal_between(low: &Rational, high: &Rational) -> Rational {
     let tenth = Rational::new(1, 10);
     let mut unit = Rational::ONE;

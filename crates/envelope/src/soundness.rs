@@ -49,15 +49,16 @@ pub(crate) struct Soundness {
     over_all: Vec<Option<Proof>>,
     /// `true` if these proofs are about boxes within the ranges of the parameters.
     is_in_ranges: bool,
-    /// The numbers in all bounds but the ends of boxes; `None` if they are large.
+    /// The numbers in all bounds except the ends of boxes; `None` if they are large.
     numbers: Option<Numbers>,
-    /// The case that broke last: the likeliest to break next. At first, one after all others.
+    /// The case that was violated last, which is likely to be violated next. Initially one past the
+    /// end.
     suspect: usize,
     /// The number of bad cases refuted from scratch.
     refutations: usize,
 }
 
-/// A bad case of a direct obligation with the proofs that it is impossible.
+/// Bad case of a direct obligation with the proofs that it is impossible.
 #[derive(Clone, Debug)]
 struct DirectCase {
     obligation: usize,
@@ -65,7 +66,7 @@ struct DirectCase {
     proofs: Option<Vec<Certificate>>,
 }
 
-/// An obligation that some schedule of a box breaks.
+/// Obligation that some schedule of a box violates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Broken {
     /// The requirement.
@@ -74,7 +75,7 @@ pub struct Broken {
     pub case: BadCase,
 }
 
-/// Values of the parameters and a schedule that break an obligation.
+/// Values of the parameters and a schedule that violate an obligation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Counterexample {
     /// The parameters' values.
@@ -85,14 +86,14 @@ pub struct Counterexample {
     pub moment: Option<Rational>,
 }
 
-/// The first obligation that some schedule for some value in the box (not empty) breaks; `None` if
-/// every schedule is valid.
+/// Returns the first obligation that some schedule for some value in the box (not empty) violates;
+/// `None` if every schedule is valid.
 ///
-/// That there is a schedule for every value is not asked: see [`Oracle`](crate::Oracle) for the
-/// whole check.
+/// It does not check that there is a schedule for every value: see [`Oracle`](crate::Oracle) for
+/// the whole check.
 ///
 /// # Errors
-/// When the plan has no schedule at the values in the box nearest to its nominal ones, or holds
+/// If the plan has no schedule at the values in the box nearest to its nominal ones, or contains
 /// something beyond exact linear reasoning.
 pub fn broken_in(
     task: &Task,
@@ -105,11 +106,11 @@ pub fn broken_in(
     soundness.broken(task, plan, envelope, None)
 }
 
-/// The number of conditions of a plan, by what enforces them in all its schedules.
+/// Numbers of conditions of a plan, by what enforces them in all its schedules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conditions {
-    /// Those that are bounds on the difference of two times: the network implies them, so that an
-    /// executor that keeps to the network keeps to them.
+    /// Bounds on the difference of two times: the network implies them, so an executor that
+    /// respects the network also respects them.
     pub differences: usize,
     /// Conditions on numbers, or on several differences at once. They hold in every schedule of the
     /// network, so that an executor need not check them.
@@ -132,14 +133,14 @@ impl Soundness {
         }
     }
 
-    /// Compiles a plan's obligations for boxes that hold these values; `None` if it has no schedule
-    /// there.
+    /// Compiles a plan's obligations for boxes that contain these values; `None` if it has no
+    /// schedule there.
     ///
-    /// Happenings are required to keep the order that they have there. That is no restriction in a
-    /// box with these values in it; in others, a different order may work as well.
+    /// Happenings are required to keep the order that they have there. In a box that contains these
+    /// values, that is no restriction. In others, a different order may also work.
     ///
     /// # Errors
-    /// When the plan holds something beyond exact linear reasoning.
+    /// If the plan contains something beyond exact linear reasoning.
     pub(crate) fn around(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -187,7 +188,7 @@ impl Soundness {
         }))
     }
 
-    /// The plan's network with rigidly connected nodes taken together.
+    /// Returns the plan's network with rigidly connected nodes merged.
     pub(crate) fn reduction(&self) -> &Reduction {
         &self.reduction
     }
@@ -241,8 +242,8 @@ impl Soundness {
             ..
         } = self;
         let mut schedules = Lazy::Unmade(reduction, envelope, numbers.as_ref());
-        // What deviates adds up, so in a box later conditions are the first to break, and the one that
-        // broke last is the likeliest. Of a single course of events the earliest is named.
+        // Deviations accumulate, so in a box later conditions are violated first, and the one that
+        // was violated last is the most likely. In a point, the earliest violation is reported.
         let is_point = envelope.is_point();
         let count = direct.len();
         let first = (*suspect + 1).min(count);
@@ -253,8 +254,9 @@ impl Soundness {
             let direct = &mut direct[index];
             let obligation = &obligations.direct[direct.obligation];
             let is_separation = matches!(obligation.requirement, Requirement::Separation { .. });
-            // What happenings read is known only where those that interfere keep their order, so
-            // that they do not is the better reason, and the only one with a counterexample.
+            // The values that happenings read are only known if interfering ones keep their order.
+            // So a violated separation is the better reason, and the only one with a
+            // counterexample.
             let is_enough = found.len() >= most || !apart.is_empty();
             if is_enough && !is_separation || direct.stands(envelope, moved) {
                 continue;
@@ -335,7 +337,7 @@ impl Soundness {
         Ok(found)
     }
 
-    /// Values and a schedule in the box that break the obligation as said.
+    /// Returns values and a schedule in the box that violate the obligation in the given case.
     pub(crate) fn counterexample(
         &self,
         envelope: &DecoupledEnvelope,
@@ -344,9 +346,9 @@ impl Soundness {
         if let Requirement::Separation { first, second } = broken.requirement
             && broken.case.differences.len() == 1
         {
-            // The wrong way round may do no harm if they are far apart. But schedules are convex:
-            // between such a one and the one that the order was taken from lies one with the
-            // happenings in order, and too near.
+            // The reverse order may be harmless if the happenings are far apart. But schedules are
+            // convex: between such a schedule and the reference schedule there is one with the
+            // happenings in order, and too close.
             let mut near = broken.case.clone();
             near.differences.push(Difference::not_after(first, second));
             let witness = bad_case::witness(&self.reduction, envelope, &near, None);
@@ -386,7 +388,7 @@ impl DirectCase {
     }
 }
 
-/// The earliest schedule at these values, by node.
+/// Returns the earliest schedule at these values, by node.
 pub(crate) fn earliest_schedule(reduction: &Reduction, valuation: &Valuation) -> Option<Schedule> {
     let point = DecoupledEnvelope::point(valuation);
     let network = reduction.network(&point).network;
@@ -400,8 +402,8 @@ pub(crate) fn earliest_schedule(reduction: &Reduction, valuation: &Valuation) ->
     Some(reduction.times(&times))
 }
 
-/// Products are exact only one inequality at a time, and only if the multiplied parameter does not
-/// also move the times.
+/// Checks that products are exact: that holds only for one inequality at a time, and only if the
+/// multiplied parameter does not also move the times.
 fn check_products(
     plan: &ParametrizedPlan,
     reduction: &Reduction,
@@ -416,7 +418,7 @@ fn check_products(
 }
 
 /// The same for an over-all condition, read at any place of its moment among the events of the
-/// nominal schedule. Other places come to light with a box.
+/// nominal schedule. Other places are checked for each box.
 fn check_over_all(
     (task, plan): (&Task, &ParametrizedPlan),
     reduction: &Reduction,

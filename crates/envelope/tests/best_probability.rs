@@ -21,7 +21,7 @@ const MOST: i64 = 6;
 const DOMAIN: &str = "
     (:durative-action run :parameters () :duration (>= ?duration 0) :condition () :effect (and))";
 
-/// Three actions, with bounds between their starts and ends.
+/// Returns a problem with three actions, and bounds between their starts and ends.
 fn problem(bounds: &str) -> String {
     format!(
         "parameter a default {NOMINAL} lb 0 ub {MOST}; parameter b default {NOMINAL} lb 0 ub {MOST};
@@ -57,7 +57,7 @@ fn values(tenths: &[i64]) -> Chance {
     Chance::values(tenths.iter().copied().map(number).collect()).expect("values")
 }
 
-/// Distributions of all sorts for three durations: `None` for one that is as planned.
+/// Distributions of all kinds for three durations; `None` for a duration that is as planned.
 fn families() -> Vec<[Option<Chance>; 3]> {
     let normal = |mean, deviation, cuts| {
         let (mean, deviation) = (number(mean), number(deviation));

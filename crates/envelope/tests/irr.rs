@@ -1,4 +1,4 @@
-//! The search against the algorithm as it is written: one check of one box after the other.
+//! The search compared with the algorithm as published: one check of one box after the other.
 
 mod given;
 
@@ -13,7 +13,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, S
 
 use given::Given;
 
-/// A sequence of numbers that look like chance.
+/// Pseudorandom number generator.
 struct Dice(u64);
 
 impl Dice {
@@ -134,7 +134,7 @@ impl Progress {
     }
 }
 
-/// Algorithm 1, box by box. `most` is the number of steps after which it is ended.
+/// Algorithm 1, box by box. It ends after `most` steps.
 fn one_by_one(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,
@@ -337,7 +337,8 @@ fn the_search_takes_the_steps_of_one_check_after_the_other() {
     );
 }
 
-/// The sum of how far ends are from the nominal values, without those that nothing keeps near.
+/// Returns the sum of the distances of ends from the nominal values, without ends that have no
+/// limit.
 fn room(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
     let point = DecoupledEnvelope::point(&plan.nominal());
     BoxEnd::all(plan.parameters.len())

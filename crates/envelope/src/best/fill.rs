@@ -31,7 +31,7 @@ struct Fill<'a> {
     is_proved: bool,
 }
 
-/// The fairest box.
+/// Searches for the fairest box.
 pub(super) fn fill(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,
@@ -61,7 +61,7 @@ pub(super) fn fill(
         }
         if !fill.stop(&level, &reached)? {
             fill.is_proved = false;
-            // Some grow alone, but not all of them together: the first one gives way.
+            // Some can grow alone, but not all of them together: the first one is stopped.
             let first = fill.stopped.iter().position(Option::is_none);
             fill.halt(first.expect("some still grow"), &level, None);
         }
@@ -76,7 +76,7 @@ pub(super) fn fill(
         .map(|(s, w)| s * w)
         .collect();
     let value = slacks.iter().min().cloned().unwrap_or_default();
-    // The least slack is no more than any variable can have at all.
+    // The least slack is no more than the greatest possible slack of any variable.
     let far = variables.most.iter().zip(&variables.scales);
     let far = far
         .filter_map(|(most, scale)| most.checked_div(scale))
@@ -149,7 +149,7 @@ impl Fill<'_> {
         )
     }
 
-    /// Stops the variables that cannot grow beyond the level; whether there are any.
+    /// Stops the variables that cannot grow beyond the level. Returns `true` if there are any.
     fn stop(&mut self, level: &Rational, reached: &Reached) -> Result<bool, Refusal> {
         let mut any = false;
         for variable in 0..self.variables.count() {
@@ -160,7 +160,7 @@ impl Fill<'_> {
                 any = true;
             }
         }
-        // Every variable in the only row that stops them all is stopped by it.
+        // The only row that stops them all stops every variable in it.
         if let Some(index) = reached.cut
             && reached.inside == reached.outside
             && let [row] = &self.cuts[index].rows[..]

@@ -11,7 +11,7 @@ use super::probability::Probability;
 use super::volume::Volume;
 use super::{Source, Touch, Variables};
 
-/// An objective over the ends of a box.
+/// Objective over the ends of a box.
 pub(super) enum Goal {
     /// The sum of the variables, each with its weight.
     Sum(Vec<Rational>),
@@ -21,29 +21,28 @@ pub(super) enum Goal {
     Probability(Probability),
 }
 
-/// The best values of a case, or about the best ones.
+/// The best values of a case, possibly approximate.
 pub(super) enum Outcome {
-    /// Of these values.
+    /// The best values.
     Best {
         values: Vec<Rational>,
-        /// Nothing in this case is worth more than this.
+        /// Upper bound on the objective in this case.
         bound: Rational,
         /// Proof of the bound.
         proof: Vec<(Source, Rational)>,
-        /// Of each parameter the slope of the tangent that the proof is about; none if the
-        /// objective is linear itself.
+        /// The slope of the proof's tangent for each parameter; empty if the objective is linear.
         slopes: Vec<Rational>,
-        /// For probabilities, where these touch.
+        /// For probabilities, the points of contact of the tangents.
         touches: Vec<Touch>,
     },
-    /// There are none, because of this.
+    /// There are no values; with the proof.
     Impossible(Vec<(Source, Rational)>),
-    /// Nobody wanted to wait for them.
+    /// The caller ended the search.
     Unknown,
 }
 
 impl Goal {
-    /// The weighted sum of widths.
+    /// Creates the weighted sum of widths.
     pub(super) fn widths(plan: &ParametrizedPlan, variables: &Variables) -> Self {
         let worths = variables.ends.iter().map(|ends| {
             let weights = ends.iter().map(|end| &plan.parameter(end.parameter).weight);
@@ -98,7 +97,7 @@ impl Goal {
         }
     }
 
-    /// The best values in a case.
+    /// Computes the best values in a case.
     pub(super) fn solve(
         &self,
         master: &mut Master,

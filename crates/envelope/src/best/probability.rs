@@ -81,7 +81,8 @@ impl Probability {
         }
     }
 
-    /// Between which numbers the variables lie where there is any probability, and where they gain any.
+    /// Returns the ranges of the variables in which there is any probability, and in which it
+    /// increases.
     pub(super) fn spans(&self, variables: &Variables) -> Vec<Span> {
         let mut limits: Vec<(Rational, Option<Option<Rational>>)> =
             vec![(Rational::ZERO, None); variables.count()];
@@ -93,7 +94,7 @@ impl Probability {
             for (variable, (least, most)) in term.ends.into_iter().zip(own) {
                 let limit = &mut limits[variable];
                 limit.0 = limit.0.clone().max(least);
-                // Where one variable moves both ends, it gains as long as one of them does.
+                // If one variable moves both ends, it gains as long as one of them does.
                 limit.1 = Some(match limit.1.take() {
                     None => most,
                     Some(other) => other.zip(most).map(|(one, other)| one.max(other)),
@@ -177,7 +178,7 @@ impl Probability {
                 .map(|(value, span)| value.clone().max(span.least.clone()).min(span.most.clone()))
                 .collect()
         });
-        // Rounding makes boxes simpler, but slopes are best where nothing has been rounded.
+        // Rounding makes boxes simpler, but unrounded values give better slopes.
         let mut best: Option<Bounded> = None;
         for at in guess.iter().chain([&at]) {
             let (touches, slopes) = self.tangents(case.spans, at);
@@ -232,7 +233,7 @@ impl Probability {
                     Chance::Dense(dense) => {
                         let seen = dense.seen(&term.nominal, &cell)?;
                         let (_, rises) = dense.tangent(&term.nominal, &seen, &at)?;
-                        // Where nothing rises any more, it does not matter where a tangent touches.
+                        // If nothing increases any more, the point of contact does not matter.
                         let nothing = Rational::new(1, 1_000_000_000_000_000);
                         let far = [&cell.below[1], &cell.above[1]];
                         for ((at, [_, high]), far) in at.iter_mut().zip(&rises).zip(far) {
@@ -317,15 +318,15 @@ impl Probability {
     }
 }
 
-/// The cut that a case counts in part and that adds most where its bound touches: how much, on which
-/// side, and at which distance.
+/// Returns the partially counted cut that adds most at the point of contact: the amount, the side,
+/// and the distance.
 fn open_cut(
     term: &Term,
     dense: &Dense,
     cell: &Cell,
     touch: &Touch,
 ) -> Option<(f64, usize, Rational)> {
-    /// Less does not keep a box from being proved the best.
+    /// Amount that does not prevent the proof that a box is the best.
     const LITTLE: f64 = 1e-9;
     let seen = dense.seen(&term.nominal, cell)?;
     let cuts = seen.into_iter().enumerate().filter_map(|(side, seen)| {
@@ -362,7 +363,7 @@ fn middle_jump(
     let (place, _) = longer.get(longer.len() / 2)?;
     let far = [cell.below[1].clone(), cell.above[1].clone()];
     let [_, most] = chance.mass(&term.nominal, &far);
-    // All that is left if intervals may have nothing at all.
+    // Lower bound for cases with intervals that contain no value.
     let least = steps.center.to_f64().max(1e-12);
     Some(((most.to_f64() / least).ln(), side, place.clone()))
 }
@@ -377,7 +378,7 @@ fn cell(term: &Term, spans: &[Span]) -> Cell {
     }
 }
 
-/// A slope with some fourteen digits.
+/// Rounds a slope to some fourteen digits.
 fn short(slope: &Rational) -> Rational {
     let grid = power_of_ten(&(slope * &Rational::new(1, 10_000_000_000_000)));
     if slope.is_positive() {

@@ -25,7 +25,7 @@ pub(super) struct Halfspace {
 }
 
 impl Halfspace {
-    /// The rest of the space.
+    /// Returns the complement.
     pub(super) fn negated(&self) -> Self {
         let factors = self.factors.iter();
         Self {
@@ -36,7 +36,7 @@ impl Halfspace {
         }
     }
 
-    /// The sum of both, each times a positive factor that makes the coordinate go.
+    /// Returns the sum of both, each times a positive factor, so that the coordinate is eliminated.
     fn combined(&self, other: &Self, coordinate: usize) -> Self {
         let (one, two) = (&self.factors[&coordinate], &other.factors[&coordinate]);
         let (one, two) = (two.abs(), one.abs());
@@ -55,14 +55,15 @@ impl Halfspace {
         }
     }
 
-    /// The same with whole factors without a common divisor.
+    /// Scales the factors to whole numbers without a common divisor.
     fn normalized(mut self) -> Self {
         let Some(first) = self.factors.values().next() else {
             return self;
         };
         let mut scale = first.abs();
-        // Whole numbers once divided by the first and multiplied by the denominators that are left;
-        // few steps, since factors are sums of ones nearly always.
+        // The factors become whole numbers when divided by the first and multiplied by the
+        // remaining denominators. That takes few steps, because nearly all factors are sums of
+        // ones.
         for factor in self.factors.values() {
             let own = factor.checked_div(&scale).unwrap_or_default();
             if let Some(denominator) = own.denominator()
@@ -92,7 +93,7 @@ impl Halfspace {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polyhedron {
     rows: Vec<Halfspace>,
-    /// For each row, whether it is known not to follow from the others.
+    /// For each row, `true` if it is known to be irredundant.
     is_needed: Vec<bool>,
     /// `true` if some row without coordinates cannot hold.
     is_absurd: bool,
@@ -104,7 +105,7 @@ impl Polyhedron {
     }
 
     pub(super) fn push(&mut self, row: Halfspace) {
-        // Any row may follow from the new one.
+        // The new row may make any row redundant.
         self.is_needed.fill(false);
         self.add(row);
     }
@@ -153,7 +154,7 @@ impl Polyhedron {
         !self.is_absurd && Program::new(&self.rows).is_feasible(|_| Some(false))
     }
 
-    /// The shadow without the coordinates below `count`.
+    /// Eliminates the coordinates below `count`.
     pub(super) fn without(
         mut self,
         count: usize,
@@ -174,7 +175,7 @@ impl Polyhedron {
         Ok(self)
     }
 
-    /// The coordinate below `count` whose elimination makes the fewest rows.
+    /// Returns the coordinate below `count` whose elimination creates the fewest rows.
     fn cheapest(&self, count: usize) -> Option<usize> {
         let mut uses: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
         for row in &self.rows {
@@ -198,8 +199,8 @@ impl Polyhedron {
         uses.iter().map(cost).min().map(|(_, index)| index)
     }
 
-    /// Two rows that say together that a sum with this coordinate is one number: that from above
-    /// and that from below.
+    /// Returns two rows that together fix a sum with this coordinate: the one from above and the
+    /// one from below.
     fn equality(&self, coordinate: usize) -> Option<(usize, usize)> {
         let uses = |row: &Halfspace| row.factors.contains_key(&coordinate) && !row.is_strict;
         self.rows.iter().enumerate().find_map(|(index, row)| {
@@ -226,7 +227,8 @@ impl Polyhedron {
             match row.factors.get(&coordinate) {
                 None => {
                     self.rows.push(row.clone());
-                    // A point that breaks this row only has a shadow that breaks this row only.
+                    // A point that violates only this row has a projection that violates only this
+                    // row.
                     self.is_needed.push(was_needed[index]);
                 }
                 Some(factor) if factor.is_positive() => above.push(index),
@@ -237,7 +239,7 @@ impl Polyhedron {
             for &lower in &below {
                 let is_needed = match equality {
                     None => true,
-                    // The others follow from those with one of the two.
+                    // The combinations with one of the two imply the others.
                     Some((up, down)) => (upper == up) != (lower == down),
                 };
                 if is_needed {
@@ -247,7 +249,7 @@ impl Polyhedron {
         }
     }
 
-    /// Drops rows that follow from others.
+    /// Drops redundant rows.
     pub(super) fn reduce(
         &mut self,
         flow: &mut dyn FnMut() -> ControlFlow<()>,

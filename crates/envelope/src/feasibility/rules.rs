@@ -23,8 +23,8 @@ use crate::reduction::{Edge, Reduction};
 const MOST_SPLITS: usize = 6;
 
 impl Feasibility {
-    /// Rules for all values in a box, which has a schedule for each of them; `None` if there are
-    /// too many cases, or an end whose two sides both matter is infinite.
+    /// Returns rules for all values in a box with a schedule for each value; `None` if there are
+    /// too many cases, or if an end is infinite and both ends of its parameter matter.
     pub(crate) fn rules(
         &self,
         reduction: &Reduction,
@@ -47,7 +47,8 @@ impl Feasibility {
         Some(cases)
     }
 
-    /// Appends the cases of the parameters that are still to be split; the position of the first.
+    /// Appends the cases of the parameters that are still to be split. Returns the position of the
+    /// first.
     fn split(
         &self,
         reduction: &Reduction,
@@ -74,14 +75,14 @@ impl Feasibility {
         Some(place)
     }
 
-    /// A rule for all values of the parameters that are not fixed.
+    /// Computes a rule for all values of the parameters that are not fixed.
     fn rule(
         &self,
         reduction: &Reduction,
         envelope: &DecoupledEnvelope,
         fixed: &BTreeMap<ParameterId, Rational>,
     ) -> Option<Vec<TimeRule>> {
-        // What the schedule that all others follow from is for, and which end moves times.
+        // The values of the base schedule, and the ends whose parameters move times.
         let mut base = fixed.clone();
         let mut moving = Vec::new();
         for (index, role) in self.roles.iter().enumerate() {
@@ -125,7 +126,7 @@ impl Feasibility {
         for (parameter, side) in moving {
             let moves = self.moved_by(parameter, side);
             for (class, rule) in classes.iter_mut().enumerate() {
-                // Times count from time zero.
+                // Times are relative to time zero.
                 let factor = i64::from(moves[class]) - i64::from(moves[0]);
                 if factor != 0 {
                     let factor = Rational::from(factor);
@@ -143,8 +144,8 @@ impl Feasibility {
         Some(rules.collect())
     }
 
-    /// Of each class whether it moves with a parameter that is a difference of times: as its value
-    /// moves away from that end.
+    /// Returns, for each class, `true` if it moves with a parameter that is a difference of times,
+    /// as its value moves away from that end.
     fn moved_by(&self, parameter: ParameterId, side: Side) -> Vec<bool> {
         let mut moves = vec![false; self.class_count];
         let is_own = |edge: &&Edge| edge.end.is_some_and(|end| end.parameter == parameter);
@@ -152,7 +153,7 @@ impl Feasibility {
             let mut own = self.edges().filter(is_own);
             own.find(|edge| edge.end.is_some_and(|end| end.side == wanted))
         };
-        // One that only bounds a difference from one side has nothing to move.
+        // A parameter that bounds a difference from one side only moves nothing.
         let (Some(most), Some(_)) = (own(Side::Upper), own(Side::Lower)) else {
             return moves;
         };

@@ -32,10 +32,10 @@ pub(super) struct Ahead<'a> {
     plan: Arc<ParametrizedPlan>,
     settings: &'a Settings,
     frontier: Frontier,
-    /// Known to be inside the envelope.
+    /// Box that is known to be inside the envelope.
     envelope: DecoupledEnvelope,
     known: Known,
-    /// The number of boxes decided about, the first one included.
+    /// The number of decided boxes, including the first one.
     checks: usize,
     /// Number of undecided boxes.
     undecided: usize,
@@ -51,7 +51,7 @@ pub(super) struct Ahead<'a> {
 struct Step {
     /// The end that was moved, if one was.
     moved: Option<(BoxEnd, Reach)>,
-    /// The number of boxes decided about by then.
+    /// The number of decided boxes so far.
     checks: usize,
 }
 
@@ -70,7 +70,7 @@ struct Leap {
 }
 
 impl<'a> Ahead<'a> {
-    /// From the box of the nominal values.
+    /// Creates a search from the box of the nominal values.
     pub(super) fn new(
         oracle: &'a mut Oracle,
         settings: &'a Settings,
@@ -78,8 +78,8 @@ impl<'a> Ahead<'a> {
         envelope: DecoupledEnvelope,
     ) -> Self {
         Self {
-            // Where little is in the way, a check for each power of two would be most of the work; where
-            // much is, what a long leap comes up against has to be found out anyway.
+            // If there are few obstacles, checks at each power of two would be most of the work. If
+            // there are many, the obstacles of a long leap have to be found anyway.
             length: oracle.plan().parameters.len().max(1),
             plan: Arc::clone(oracle.plan()),
             oracle,
@@ -99,8 +99,9 @@ impl<'a> Ahead<'a> {
         self.oracle.start(&self.envelope)
     }
 
-    /// Takes all steps that there are before anything is checked. That little is in the way is seen at
-    /// once so; where something is, nothing has happened. Whether anything is left to do.
+    /// Takes all steps before the first check. If there are few obstacles, that succeeds at once.
+    /// Otherwise the steps are discarded, and the result is `None`. Returns the reason why the
+    /// search ended.
     pub(super) fn run_at_once(
         &mut self,
         on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
@@ -122,7 +123,7 @@ impl<'a> Ahead<'a> {
         leap.end
     }
 
-    /// The number of boxes decided about.
+    /// Returns the number of decided boxes.
     pub(super) fn checks(&self) -> usize {
         self.checks
     }
@@ -279,7 +280,7 @@ impl<'a> Ahead<'a> {
         }
     }
 
-    /// Tells of the steps, which have been found right, one by one.
+    /// Reports the confirmed steps one by one.
     fn tell(
         &mut self,
         leap: &Leap,
@@ -307,7 +308,7 @@ impl<'a> Ahead<'a> {
         ControlFlow::Continue(())
     }
 
-    /// One step by one check.
+    /// Takes one step with a check of its own.
     fn step(
         &mut self,
         on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,

@@ -25,7 +25,7 @@ struct Chord {
     parts: Vec<Part>,
 }
 
-/// The bounds between nodes and the beginning, by way of no other node that the network leaves open.
+/// Bounds between nodes and the beginning, through no other node whose time is open.
 pub(super) struct Shortcuts {
     /// By node: the greatest distance after the beginning.
     after: Vec<Option<Chord>>,
@@ -81,8 +81,9 @@ impl Shortcuts {
         all
     }
 
-    /// The shortest cycles that are left when a conflict is cut at nodes that are bound to the beginning, as far as they
-    /// leave no schedule at all; none if it is one of these itself.
+    /// Returns the cuts of the shortest cycles that result from dividing a conflict at nodes that
+    /// are bound to the beginning, provided that they exclude all schedules; none if the conflict
+    /// is one of these itself.
     pub(super) fn of(
         &self,
         reader: &Reader<'_>,
@@ -94,7 +95,7 @@ impl Shortcuts {
         };
         let mut found = Vec::new();
         let mut ranges = Vec::new();
-        // Where the last one that was found begins: what begins there or before includes it.
+        // The beginning of the last range found; ranges that begin there or before include it.
         let mut beginning = 0;
         for end in 0..steps.len() {
             let Some(back) = &self.before[steps[end].to.index()] else {
@@ -178,7 +179,8 @@ fn keep_least(chords: &mut [Option<Chord>], node: NodeId, chord: Chord) {
     }
 }
 
-/// The nodes whose distance from the beginning is fixed: the bounds that fix it from both sides.
+/// Returns the nodes whose distance from the beginning is fixed, with the bounds that fix it from
+/// both sides.
 fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<(NodeId, Chord, Chord)> {
     let network = &reader.network.network;
     let requirements = network.requirements();
@@ -211,7 +213,7 @@ fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<(NodeId, Chord, Chord
     fixed.chain(links).collect()
 }
 
-/// The steps of a cycle one after the other; `None` if one of them is endless.
+/// Returns the steps of a cycle with their lengths; `None` if one of them is infinite.
 fn measured(reader: &Reader<'_>, cycle: &[Way], envelope: &DecoupledEnvelope) -> Option<Vec<Step>> {
     let network = &reader.network.network;
     let step = |part: &Part| {

@@ -17,7 +17,7 @@ impl<K> Default for Terms<K> {
 }
 
 impl<K: Copy + Ord> Terms<K> {
-    /// One coefficient, which is not zero.
+    /// Creates a single coefficient, which must not be zero.
     pub(crate) fn one(key: K, coefficient: Rational) -> Self {
         debug_assert!(!coefficient.is_zero(), "no coefficient is zero");
         Self(vec![(key, coefficient)])
@@ -43,7 +43,7 @@ impl<K: Copy + Ord> Terms<K> {
         self.0.iter().map(|(key, _)| *key)
     }
 
-    /// All, in order.
+    /// Returns all keys with their coefficients, in order.
     pub fn iter(&self) -> std::slice::Iter<'_, (K, Rational)> {
         self.0.iter()
     }
@@ -70,13 +70,13 @@ impl<K: Copy + Ord> Terms<K> {
         }
     }
 
-    /// Takes a coefficient out.
+    /// Removes a coefficient and returns it.
     pub(crate) fn remove(&mut self, key: K) -> Option<Rational> {
         let place = self.place(key).ok()?;
         Some(self.0.remove(place).1)
     }
 
-    /// Takes all out.
+    /// Removes all coefficients.
     pub(crate) fn clear(&mut self) {
         self.0.clear();
     }

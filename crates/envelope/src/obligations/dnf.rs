@@ -7,25 +7,25 @@ use super::timeline::Reading;
 use super::{Inequality, Refusal};
 use crate::linear::Linear;
 
-/// Alternatives, each a conjunction: none is never, an empty one is always.
+/// Disjunction of conjunctions: the empty disjunction is false, an empty conjunction is true.
 pub(crate) type Alternatives = Vec<Vec<Inequality>>;
 
 /// Limit on the alternatives of a condition.
 const MOST_ALTERNATIVES: usize = 4096;
 
-/// The truth value that is asked of a condition.
+/// Wanted truth value of a condition.
 ///
-/// A comparison with an undefined number says nothing: it is neither true nor false, and so are
-/// the conditions around it, unless their other parts decide.
+/// A comparison with an undefined number is neither true nor false (silent), and so are the
+/// conditions around it, unless their other parts decide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wanted {
     /// It is true.
     True,
     /// It is false.
     False,
-    /// It is false or says nothing: then it is broken where it is needed.
+    /// It is false or silent: a required condition is then violated.
     NotTrue,
-    /// It is true or says nothing.
+    /// It is true or silent.
     NotFalse,
 }
 
@@ -166,7 +166,7 @@ pub(crate) fn compared(
     alternatives.into_iter().filter_map(settled).collect()
 }
 
-/// Drops inequalities between constants that hold; `None` if one does not.
+/// Drops inequalities between constants that hold. Returns `None` if one does not.
 pub(crate) fn settled(mut conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
     let is_broken = |inequality: &Inequality| {
         let value = inequality.expression.as_constant();

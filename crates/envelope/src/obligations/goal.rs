@@ -1,4 +1,4 @@
-//! The goal holds after all actions and all timed initials.
+//! The goal, which must hold after all actions and all timed initials.
 
 use std::cell::OnceCell;
 
@@ -25,7 +25,7 @@ pub(super) fn goal_cases(
         task,
         timeline,
         cut: None,
-        // Nothing drifts any more, so the moment of reading does not matter.
+        // There are no drifts any more, so the moment of reading does not matter.
         moment: NodeId::ZERO,
         action: None,
         substitution,

@@ -11,7 +11,7 @@ use elbowroom_plan::{Bound, NodeId, ParametrizedPlan, Schedule};
 pub(super) struct Precedence {
     before: Vec<Vec<NodeId>>,
     after: Vec<Vec<NodeId>>,
-    /// The place of each node's time among all times of a schedule for values in the ranges, which keeps all
+    /// The rank of each node's time in a schedule for values in the ranges, which satisfies all
     /// these bounds.
     ranks: Vec<usize>,
 }
@@ -55,7 +55,7 @@ impl Precedence {
         precedence
     }
 
-    /// Nodes in the order of their times.
+    /// Sorts nodes by their times.
     pub(super) fn in_order(&self, nodes: BTreeSet<NodeId>) -> Vec<NodeId> {
         let mut nodes = Vec::from_iter(nodes);
         nodes.sort_by_key(|node| (self.ranks[node.index()], *node));
@@ -95,7 +95,7 @@ pub(super) struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// The side that the node is on in every schedule, if bounds say so.
+    /// Returns the side that the node is on in every schedule, if bounds imply one.
     pub(super) fn side(&mut self, node: NodeId) -> Option<Side> {
         let ranks = self.ranks;
         let rank = ranks[node.index()];
@@ -127,11 +127,11 @@ impl Around<'_> {
     }
 }
 
-/// The nodes that bounds lead to from one node, all in one direction of time.
+/// Nodes that are reachable by bounds from one node, in one direction of time.
 struct Cone<'a> {
     next: &'a [Vec<NodeId>],
     reached: BTreeSet<NodeId>,
-    /// Those reached that were not followed yet, by rank.
+    /// Reached nodes that have not been expanded yet, by rank.
     open: BTreeSet<(usize, NodeId)>,
 }
 

@@ -19,28 +19,28 @@ use fluent::FluentHistory;
 
 pub(crate) use fluent::FluentChange;
 
-/// The events of every fact and fluent so far, in nominal order.
+/// Events of every fact and fluent so far, in nominal order.
 ///
-/// A *cut* is a set of nodes taken to have happened; reading at a cut gives what the plan's state
-/// is after exactly these. During the symbolic run the cut is everything recorded so far.
+/// A *cut* is a set of nodes that are assumed to have happened. Reading at a cut returns the plan's
+/// state after exactly these. During the symbolic run the cut is everything recorded so far.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Timeline {
     facts: BTreeMap<FactId, FactHistory>,
-    /// Boxed, because most timelines are about one of them, and a map has room for eleven.
+    /// Boxed, because most timelines contain one fluent, and a B-tree allocates space for eleven.
     fluents: BTreeMap<FluentId, Box<FluentHistory>>,
-    /// Under which conditional effects' outcomes this timeline is the right one.
+    /// Outcomes of conditional effects that this timeline assumes.
     pub(crate) assumptions: Vec<Inequality>,
 }
 
-/// The changes of a fact along a plan.
+/// Changes of a fact along a plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FactHistory {
     pub(crate) initially: bool,
-    /// The node, and what the fact becomes there.
+    /// The nodes, each with the new value of the fact.
     pub(crate) events: Vec<(NodeId, bool)>,
 }
 
-/// A cut through a plan: whether a node has happened; `None` if all have that are recorded.
+/// Cut through a plan: `true` for nodes that have happened. `None` contains everything recorded.
 pub(crate) type Cut<'a> = Option<&'a dyn Fn(NodeId) -> bool>;
 
 /// Context for evaluating an expression: a cut, a moment, and the action it belongs to.
@@ -50,18 +50,18 @@ pub(crate) struct Reading<'a> {
     pub(crate) cut: Cut<'a>,
     /// The time at which values are read.
     pub(crate) moment: NodeId,
-    /// Start and end of the action whose `?duration` may be meant.
+    /// Start and end of the action that `?duration` refers to.
     pub(crate) action: Option<(NodeId, NodeId)>,
     /// Parameters that are differences of times.
     pub(crate) substitution: &'a Substitution,
-    /// For messages.
+    /// Location, for messages.
     pub(crate) place: &'a str,
-    /// The derived facts at the cut, once something has asked for one.
+    /// The derived facts at the cut, computed on first use.
     pub(crate) derived: OnceCell<Derived<Refusal>>,
 }
 
 impl Timeline {
-    /// Nothing has happened yet.
+    /// Creates a timeline of the initial state.
     pub(crate) fn initial(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -110,17 +110,17 @@ impl Timeline {
         snapshot
     }
 
-    /// Gives a fact its first truth value.
+    /// Sets the initial truth value of a fact.
     pub(crate) fn put_fact(&mut self, fact: FactId, truth: bool) {
         self.facts.entry(fact).or_default().initially = truth;
     }
 
-    /// Gives a fluent its first value.
+    /// Sets the initial value of a fluent.
     pub(crate) fn put_value(&mut self, fluent: FluentId, value: Option<Linear>) {
         self.fluents.entry(fluent).or_default().put(value);
     }
 
-    /// The continuous changes that have begun and not stopped.
+    /// Returns the active continuous changes.
     pub(crate) fn drifts(&self) -> Vec<(FluentId, Linear)> {
         let all = self.fluents.iter().flat_map(|(&fluent, history)| {
             let rates = history.last().rates();
@@ -232,7 +232,7 @@ impl FactHistory {
     }
 }
 
-/// The parameter, or the difference of times that it is.
+/// Returns the parameter, or the difference of times that replaces it.
 pub(crate) fn parameter_value(id: ParameterId, substitution: &Substitution) -> Linear {
     match substitution.get(&id) {
         Some(&(from, to)) => Linear::difference(from, to),
@@ -257,7 +257,7 @@ impl Reading<'_> {
         derivation.on_top_of(&basic, derived).fact(fact)
     }
 
-    /// The expression's value at the cut and moment; `None` where it is undefined.
+    /// Returns the expression's value at the cut and moment; `None` if it is undefined.
     pub(crate) fn linear(&self, expression: &Expression) -> Result<Option<Linear>, Refusal> {
         Ok(match expression {
             Expression::Constant(value) => Some(Linear::constant(value.clone())),
@@ -333,7 +333,7 @@ impl Moment<Refusal> for Basic<'_> {
         Ok(self.0.timeline.is_true(fact, self.0.cut))
     }
 
-    /// A comparison with an undefined number is false.
+    /// Evaluates a comparison, which is false with an undefined number.
     fn compare(
         &self,
         comparison: Comparison,

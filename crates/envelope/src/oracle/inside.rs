@@ -40,7 +40,7 @@ impl Oracle {
     }
 }
 
-/// Times that do for all values.
+/// Returns times that work for all values.
 fn fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Schedule> {
     let network = plan.uncertain_network(envelope).ok()?;
     let times = network.network.strong().ok()?.into_times();

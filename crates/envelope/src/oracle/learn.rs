@@ -32,7 +32,7 @@ impl Oracle {
         if !is_there && self.move_to(envelope)?.is_some() {
             return Ok(Learnt::Unknown);
         }
-        // What a condition says about other boxes counts where all values have a schedule.
+        // The cut of a condition is only valid if all values have a schedule.
         let learnt = self.controllability.learn(&self.plan, envelope, most)?;
         if learnt != Learnt::Nothing || self.asked == Asked::Times {
             self.proofs_hold_in_last = learnt == Learnt::Nothing;
@@ -118,18 +118,18 @@ impl Oracle {
         self.asked == Asked::Times
     }
 
-    /// Takes a box inside the accepted one for the accepted one.
+    /// Replaces the accepted box by a box inside it.
     pub(crate) fn narrow(&mut self, envelope: &DecoupledEnvelope) {
         self.remembers_accepted &= self.accepted.as_ref() == Some(envelope);
         self.accepted = Some(envelope.clone());
     }
 
-    /// Counts boxes as checked about which something was known already.
+    /// Sets the number of checks, which includes boxes whose outcome was known already.
     pub(crate) fn count_checks(&mut self, checks: usize) {
         self.checks = checks;
     }
 
-    /// Keeps what a search has found out about boxes.
+    /// Stores the reasons that a search has found.
     pub(crate) fn remember(&mut self, known: Known) {
         self.known = known;
     }
@@ -167,8 +167,8 @@ impl Oracle {
         Ok(reason?.map(|reason| self.objection_of(&candidate, reason)))
     }
 
-    /// Takes a box that many questions with one end further out will be about for the accepted one, if it is inside the
-    /// envelope. That is not counted as a check.
+    /// Makes a box the accepted one, if it is inside the envelope, in preparation of many queries
+    /// with one end further out. Not counted as a check.
     pub(crate) fn stand_at(&mut self, envelope: &DecoupledEnvelope) {
         let checks = self.checks;
         self.remembers_accepted = matches!(self.check_afresh(envelope), Ok(None));
@@ -178,8 +178,8 @@ impl Oracle {
         }
     }
 
-    /// The objection that a row is to a box with one end moved out so far; `None` if it has to be
-    /// worked out.
+    /// Returns the objection of a row to a box with one end moved out; `None` if it has to be
+    /// computed.
     fn objection_by(
         &self,
         (row, ground): (&Row, &Ground),
@@ -188,7 +188,7 @@ impl Oracle {
     ) -> Option<Objection> {
         match ground {
             Ground::Condition(broken) => Some(Objection::Broken(broken.clone())),
-            // One end of each parameter counts, and at these ends there is no schedule.
+            // The row contains one end of each parameter, and there is no schedule at these ends.
             Ground::Cycle(_) | Ground::Semireducible(_) => {
                 let mut values = envelope.nearest(&self.plan.nominal());
                 for end in row.factors.keys() {

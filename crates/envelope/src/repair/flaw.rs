@@ -15,19 +15,19 @@ use crate::obligations::{
     BadCase, Difference, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution,
 };
 
-/// `expression <= 0`, or `< 0` when strict, and what asks for it.
+/// `expression <= 0`, or `< 0` when strict, and the constraint that requires it.
 pub(super) type Alternative = (Linear, bool, Hindrance);
 
 /// Flaw of a schedule.
 pub(super) enum Flaw {
     /// All obligations are met.
     None,
-    /// This cannot be met while happenings keep their order.
+    /// This requirement cannot be met while happenings keep their order.
     Hopeless(Requirement),
     /// One of these holds in every valid schedule of the case.
     Cases {
         alternatives: Vec<Alternative>,
-        /// The pair whose order is the question, if it is one.
+        /// The pair whose order the case decides, if any.
         decides: Option<(NodeId, NodeId)>,
     },
 }
@@ -41,10 +41,10 @@ pub(super) struct Finder<'a> {
 }
 
 impl Finder<'_> {
-    /// A flaw of the schedule, in a case that decides the order of some happenings.
+    /// Returns a flaw of the schedule, in a case that decides the order of some happenings.
     ///
     /// # Errors
-    /// When something is beyond linear reasoning in the order of this schedule.
+    /// If something is beyond linear reasoning in the order of this schedule.
     pub(super) fn find(
         &self,
         values: &Valuation,
@@ -105,7 +105,7 @@ impl Finder<'_> {
         }
     }
 
-    /// The next question about the order of happenings that a requirement depends on.
+    /// Returns the next undecided order of happenings that a requirement depends on.
     fn order_of(
         &self,
         requirement: &Requirement,
@@ -129,8 +129,8 @@ impl Finder<'_> {
         })
     }
 
-    /// The facts that a requirement depends on, whether it depends on numbers, and the happenings
-    /// at which it reads them.
+    /// Returns the facts that a requirement depends on, `true` if it depends on numbers, and the
+    /// happenings at which it reads them.
     fn reads(&self, requirement: &Requirement) -> (BTreeSet<FactId>, bool, Vec<NodeId>) {
         let of = |condition: &Condition, anchors: Vec<NodeId>| {
             let (facts, numbers) = read_by(self.task, condition);
@@ -187,7 +187,7 @@ impl Finder<'_> {
     }
 }
 
-/// The bad case that holds in the schedule, if one does.
+/// Returns the bad case that holds in the schedule, if any.
 fn broken<'a>(
     obligation: &'a Obligation,
     values: &Valuation,

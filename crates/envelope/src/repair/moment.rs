@@ -63,7 +63,7 @@ pub(super) fn broken(
                 });
             let mut failing =
                 ends.filter(|(_, _, expression)| expression.value(schedule, values).is_negative());
-            // Where it is not below zero at either end, it is zero throughout, and must not be.
+            // If it is not below zero at either end, it is zero throughout, and must not be.
             let (Some((at, is_first, expression)), [_]) = (failing.next(), case.as_slice()) else {
                 return Err(several_parts(plan, over_all));
             };
@@ -85,8 +85,8 @@ fn several_parts(plan: &StnPlan, over_all: &OverAll) -> Refusal {
     }
 }
 
-/// That something else than `at` is the last event before the moment (`is_first`), or the first one
-/// after it, or that there is no moment between these events at all.
+/// Returns the alternatives that another event than `at` is the last one before the moment
+/// (`is_first`), or the first one after it, or that there is no moment between these events.
 fn others(
     over_all: &OverAll,
     is_before: impl Fn(NodeId) -> bool,
@@ -97,7 +97,7 @@ fn others(
     let nodes = events.iter().copied();
     let nodes = nodes.chain([over_all.start, over_all.end]);
     let others = nodes.filter(|&node| node != at).map(|node| {
-        // What falls together with `at` changes nothing.
+        // Events that coincide with `at` change nothing.
         if is_before(node) {
             (Linear::difference(node, at), is_first)
         } else {
@@ -107,7 +107,7 @@ fn others(
     others.collect()
 }
 
-/// The expression at a moment that falls together with a node.
+/// Returns the expression at a moment that coincides with a node.
 fn read_at(expression: &Linear, moment: NodeId, at: NodeId) -> Linear {
     let mut read = expression.clone();
     if let Some(factor) = read.times.remove(moment) {
@@ -137,7 +137,7 @@ fn holds_between(
     schedule: &Schedule,
 ) -> bool {
     let [since, until] = between.map(|node| &schedule[node]);
-    // The moments at which all of them hold, and whether the ends of that interval are left out.
+    // The interval of moments at which all of them hold, each end with `true` if it is excluded.
     let (mut least, mut most) = ((since.clone(), true), (until.clone(), true));
     for inequality in case {
         let at =

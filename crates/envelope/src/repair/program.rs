@@ -1,4 +1,4 @@
-//! The linear program: times and quantities, and what their changes cost.
+//! The linear program: times and quantities, and the costs of their changes.
 
 use std::collections::BTreeMap;
 
@@ -21,13 +21,13 @@ pub(super) struct Solved {
     pub(super) because: Vec<(Hindrance, Rational)>,
 }
 
-/// A parameter as `base + Σ term`.
+/// Parameter as `base + Σ term`.
 struct Value {
     base: Rational,
     terms: Vec<(VariableId, Rational)>,
 }
 
-/// A row that holds in some cases: `sum <= bound`, or a contradiction where there is no sum.
+/// Row that holds in some cases: `sum <= bound`, or a contradiction if there is no sum.
 struct CaseRow {
     sum: Option<VariableId>,
     bound: Delta,
@@ -38,24 +38,24 @@ pub(super) struct Program<'a> {
     plan: &'a ParametrizedPlan,
     changeable: &'a [Changeable],
     simplex: Simplex,
-    /// By node; the first is time zero and stays unused.
+    /// The times, by node; the first is time zero and unused.
     times: Vec<VariableId>,
     parameters: BTreeMap<ParameterId, Value>,
-    /// The values of those that do not change.
+    /// The values of parameters that do not change.
     fixed: BTreeMap<ParameterId, Rational>,
-    /// Minus the cost, and the sum of all times of actions, both to be made as great, or as small,
-    /// as can be.
+    /// The negated cost, which is maximised.
     gain: Vec<(VariableId, Rational)>,
-    /// Minus the cost as a variable, to hold it at its optimum.
+    /// The negated cost as a variable, to fix it at its optimum.
     gained: VariableId,
     earliness: Vec<(VariableId, Rational)>,
-    /// By tag, what asserts a bound.
+    /// By tag, the origin of a bound.
     hindrances: Vec<Hindrance>,
     rows: Vec<CaseRow>,
 }
 
 impl<'a> Program<'a> {
-    /// The program of the plan's bounds, and of these orders, each at least `epsilon` apart.
+    /// Creates the program of the plan's bounds, and of these orders, each at least `epsilon`
+    /// apart.
     pub(super) fn new(
         plan: &'a ParametrizedPlan,
         changeable: &'a [Changeable],
@@ -179,7 +179,8 @@ impl<'a> Program<'a> {
         self.hindrances.len() - 1
     }
 
-    /// The expression over the variables, with its constant apart; `None` if it has a product.
+    /// Returns the expression over the variables, and its constant; `None` if it contains a
+    /// product.
     fn combination(&self, expression: &Linear) -> Option<(Vec<(VariableId, Rational)>, Rational)> {
         let expression = expression.with_values(&self.fixed);
         if !expression.products.is_empty() {
@@ -197,7 +198,7 @@ impl<'a> Program<'a> {
         Some((row, constant))
     }
 
-    /// `expression <= 0`, in all cases.
+    /// Adds `expression <= 0`, in all cases.
     fn always(&mut self, expression: &Linear, hindrance: Hindrance) {
         let (row, constant) = self
             .combination(expression)
@@ -288,7 +289,7 @@ impl<'a> Program<'a> {
             }
         };
         let because = named(&self.hindrances, proof);
-        // At that cost, everything as early as can be.
+        // At that cost, everything as early as possible.
         let tag = self.tag(Hindrance::Beginning);
         self.simplex.assert_lower(self.gained, gain.clone(), tag);
         self.simplex

@@ -1,4 +1,4 @@
-//! Deciding whether a bad case is possible in a box.
+//! Feasibility of a bad case in a box.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ use crate::obligations::{BadCase, Difference, Inequality};
 use crate::reduction::Reduction;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, Side, Valuation};
 
-/// The schedules of a box: a network that can be tightened for a while.
+/// Schedules of a box: a network that can be tightened temporarily.
 pub(crate) struct Schedules<'a, S: Scale> {
     pub(crate) reduction: &'a Reduction,
     pub(crate) envelope: &'a DecoupledEnvelope,
@@ -40,7 +40,7 @@ pub(crate) struct Schedules<'a, S: Scale> {
     tells: bool,
 }
 
-/// A moment to come back to.
+/// State to return to.
 pub(crate) struct Before {
     checkpoint: Checkpoint,
     assumed: usize,
@@ -48,17 +48,17 @@ pub(crate) struct Before {
 
 /// The result of a feasibility check of a bad case.
 pub(crate) enum Outcome {
-    /// No; one proof for each combination of values of multiplied parameters.
+    /// Impossible; one proof for each combination of values of multiplied parameters.
     Impossible(Vec<Certificate>),
-    /// Yes.
+    /// Possible.
     Possible,
-    /// Nobody knows: a parameter multiplies something in several inequalities, or moves the times
-    /// as well, so the corners of the box do not decide.
+    /// Unknown: a parameter multiplies something in several inequalities, or also moves the times,
+    /// so the corners of the box do not decide.
     Unknown(ParameterId),
 }
 
 impl<'a, S: Scale> Schedules<'a, S> {
-    /// All schedules for values in the box, or `None` if there are none at all.
+    /// Creates the network of all schedules for values in the box; `None` if there are none.
     pub(crate) fn new(
         reduction: &'a Reduction,
         envelope: &'a DecoupledEnvelope,
@@ -122,10 +122,10 @@ impl<'a, S: Scale> Schedules<'a, S> {
         self.tells = true;
     }
 
-    /// Tightens by a difference.
+    /// Adds a difference to the network.
     ///
     /// # Errors
-    /// The proof that this leaves no schedule; the network is as before.
+    /// The proof that this leaves no schedule; the network does not change.
     pub(crate) fn assume(&mut self, difference: &Difference) -> Result<(), Certificate> {
         let constraint = constraint(self.reduction, difference);
         let weighted = Constraint {
@@ -142,7 +142,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         }
     }
 
-    /// The present moment, to come back to.
+    /// Returns the current state, for [`undo_to`](Self::undo_to).
     pub(crate) fn before(&self) -> Before {
         Before {
             checkpoint: self.network.checkpoint(),
@@ -168,7 +168,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
         self.network.add_node_at(time);
     }
 
-    /// The proof a negative cycle is; its first constraint, with bound `added`, was refused.
+    /// Returns the proof given by a negative cycle; its first constraint, with bound `added`, was
+    /// refused.
     fn certificate(&self, cycle: &NegativeCycle<S::Weight>, added: &Delta) -> Certificate {
         let mut certificate = Certificate::default();
         for id in &cycle.constraints {
@@ -256,7 +257,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         {
             return self.each_possible(case, parameter);
         }
-        // Mostly one, and there are as many as conditions.
+        // Usually one, and as many of these lists as conditions, so the capacity is exact.
         let mut certificates = Vec::with_capacity(corners.len());
         for corner in corners {
             let fixed: Vec<Inequality> = case
@@ -301,9 +302,10 @@ impl<'a, S: Scale> Schedules<'a, S> {
         Outcome::Unknown(parameter)
     }
 
-    /// A proof that the inequalities, free of products, cannot all hold; `None` if they can.
+    /// Returns a proof that the inequalities, free of products, cannot all hold; `None` if they
+    /// can.
     fn linear_possible(&mut self, inequalities: &[Inequality]) -> Option<Certificate> {
-        // Each inequality alone, without what couples parameters, is a problem of flows.
+        // Each inequality alone, without coupled parameters, is a flow problem.
         for (index, inequality) in inequalities.iter().enumerate() {
             if let Some(mut certificate) = self.flow_certificate(inequality) {
                 if self.tells {
@@ -313,8 +315,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
                 return Some(certificate);
             }
         }
-        // A parameter that is a difference of times has been replaced by it; one that only bounds a
-        // difference occurs twice.
+        // A parameter that is a difference of times has been replaced by it; a parameter that only
+        // bounds a difference occurs twice.
         let is_shared = inequalities
             .iter()
             .flat_map(|inequality| inequality.expression.parameters.keys())
@@ -325,7 +327,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         linear_program::refute(self.reduction, self.envelope, &self.assumed, inequalities)
     }
 
-    /// The proof that `expression <= 0` fails in all schedules, if it does.
+    /// Returns the proof that `expression <= 0` fails in all schedules, if it does.
     fn flow_certificate(&mut self, inequality: &Inequality) -> Option<Certificate> {
         // It can hold exactly if the greatest value of `-expression` is at least zero.
         let negated = inequality.expression.scaled(&Rational::from(-1));
@@ -395,7 +397,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
         gain > S::Weight::zero()
     }
 
-    /// The expression's constant and its coefficients for classes; times count from class 0.
+    /// Returns the expression's constant and its coefficients for classes; times are relative to
+    /// class 0.
     fn by_class(&self, expression: &Linear) -> (Rational, Demand) {
         let mut demand = Demand::new();
         let constant = spread(self.reduction, expression, |class: ClassId, coefficient| {
@@ -408,7 +411,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
     }
 }
 
-/// `to - from <= bound` over classes.
+/// Returns the constraint `to - from <= bound` over classes.
 fn constraint(reduction: &Reduction, difference: &Difference) -> Constraint<Delta> {
     let (from, from_offset) = reduction.place(difference.from);
     let (to, to_offset) = reduction.place(difference.to);
@@ -421,8 +424,8 @@ fn constraint(reduction: &Reduction, difference: &Difference) -> Constraint<Delt
     Constraint { from, to, bound }
 }
 
-/// Calls `add` with each class and its share of the expression's times, and returns the constant
-/// with the nodes' offsets in it.
+/// Calls `add` with each class and its share of the expression's times. Returns the constant, which
+/// includes the nodes' offsets.
 pub(crate) fn spread(
     reduction: &Reduction,
     expression: &Linear,
@@ -437,15 +440,15 @@ pub(crate) fn spread(
     constant
 }
 
-/// Values and a schedule in the box for which the case comes about. Among these, the ones that
-/// make `least` smallest, or, failing that, break the case's only inequality by most.
+/// Returns values and a schedule in the box for which the case holds. Among these, it chooses those
+/// that minimise `least` or, without it, violate the case's only inequality most.
 pub(crate) fn witness(
     reduction: &Reduction,
     envelope: &DecoupledEnvelope,
     case: &BadCase,
     least: Option<&Linear>,
 ) -> Option<Counterexample> {
-    // Without any schedule there is none to show.
+    // Without any schedule there is no witness.
     Schedules::new(reduction, envelope, Exactly)?;
     let assumed: Vec<_> = case
         .differences

@@ -1,4 +1,4 @@
-//! Proofs that a bad case cannot be, and how they depend on a box.
+//! Proofs that a bad case is impossible, and their dependence on a box.
 
 use elbowroom_num::{Delta, Rational, Total};
 
@@ -14,9 +14,9 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Certificate {
     base: Delta,
-    /// Positive factors. Once it is [complete](Self::complete), in the order of the ends.
+    /// Positive factors. Once it is [complete](Self::complete), sorted by end.
     ends: Vec<(BoxEnd, Rational)>,
-    /// Ends on which the factors themselves depend: once one moves, the proof is void.
+    /// Ends that the factors themselves depend on: once one moves, the proof is void.
     pub(crate) fixed: Vec<BoxEnd>,
     /// Constraints of the sum with their factors; empty unless they are
     /// [recorded](super::bad_case::Schedules::tell).
@@ -53,7 +53,7 @@ impl Certificate {
         self.ends.push((end, factor.clone()));
     }
 
-    /// The certificate, when all is added.
+    /// Completes the certificate after all additions.
     #[must_use]
     pub(crate) fn complete(mut self) -> Self {
         self.ends.sort_by_key(|(end, _)| *end);
@@ -74,7 +74,7 @@ impl Certificate {
         known.is_ok() || self.fixed.contains(&end)
     }
 
-    /// The value in the box; `None` for infinity.
+    /// Returns the value in the box; `None` for infinity.
     pub(crate) fn value(&self, envelope: &DecoupledEnvelope) -> Option<Delta> {
         let mut real = Total::default();
         real.add(&self.base.real);

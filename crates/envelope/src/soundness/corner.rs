@@ -45,18 +45,19 @@ pub(crate) fn corners(envelope: &DecoupledEnvelope, parameters: &[ParameterId]) 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Corner {
     pub(crate) values: BTreeMap<ParameterId, Rational>,
-    /// Parameters at an infinite end, and whether it is the upper one.
+    /// Parameters at an infinite end, with `true` if it is the upper one.
     infinite: Vec<(ParameterId, bool)>,
 }
 
 impl Corner {
-    /// The inequality with these values put in.
+    /// Substitutes these values in an inequality.
     pub(crate) fn apply(&self, inequality: &Inequality) -> Inequality {
         let mut expression = inequality.expression.with_values(&self.values);
         let mut is_strict = inequality.is_strict;
         for &(parameter, is_upper) in &self.infinite {
-            // As the parameter grows, its coefficient alone decides. The expression gets below
-            // zero if the coefficient can be negative (for a parameter that goes down: positive).
+            // As the parameter grows, its coefficient alone decides. The expression becomes
+            // negative if the coefficient can be negative (for a parameter that decreases:
+            // positive).
             let coefficient = coefficient_of(&expression, parameter);
             if coefficient == Linear::default() {
                 continue;

@@ -21,7 +21,7 @@ use crate::obligations::{BadCase, Difference};
 use crate::reduction::Reduction;
 use crate::row::Row;
 
-/// A time as a function of the parameters: `time of a root + offset + Σ factor · parameter`.
+/// Time as a function of the parameters: `time of a root + offset + Σ factor · parameter`.
 #[derive(Clone, Debug)]
 struct Place {
     root: usize,
@@ -75,7 +75,8 @@ impl Soundness {
                 events.dedup();
                 events.into_iter().find_map(|event| {
                     let expression = at(&inequality.expression, moment, event)?;
-                    // Only near the event, so that the bound itself need not be reached.
+                    // The moment is only close to the event, so the bound itself need not be
+                    // reached.
                     let row = row(&expression, true)?;
                     let is_possible = widest
                         .is_some_and(|network| self.is_there(network, case, moment, event))
@@ -111,7 +112,7 @@ impl Soundness {
             .is_some_and(|network| self.is_there(&network, case, moment, event))
     }
 
-    /// The network of all schedules for values in a box, if there are any.
+    /// Returns the network of all schedules for values in a box, if there are any.
     fn schedules_in(&self, envelope: &DecoupledEnvelope) -> Option<ConsistentNetwork<Delta>> {
         let network = self.reduction.network(envelope).network;
         // Relative to the nominal schedule, nodes that are far apart in time are also far apart in
@@ -133,7 +134,7 @@ impl Soundness {
         moment: NodeId,
         event: NodeId,
     ) -> bool {
-        // Just before the event all that comes before it has happened, just after it the same.
+        // Just before the event, and just after it, the same other events have happened.
         [true, false].into_iter().any(|is_before| {
             case.differences.iter().all(|difference| {
                 entails(
@@ -161,7 +162,7 @@ fn entails(
 ) -> bool {
     let place = |node: NodeId| if node == moment { event } else { node };
     let (from, to) = (place(difference.from), place(difference.to));
-    // `to - from <= bound`, where moving the moment may help or cost a little.
+    // `to - from <= bound`; moving the moment may help or cost an infinitesimal.
     let helps = (difference.to == moment && is_before) || (difference.from == moment && !is_before);
     let costs = (difference.to == moment && !is_before) || (difference.from == moment && is_before);
     let bound = Delta::from(difference.bound.clone());
@@ -187,7 +188,7 @@ fn entails(
     }
 }
 
-/// The expression with one node's time in place of another's; `None` if products are in it.
+/// Replaces the moment by the event in an expression; `None` if it contains products.
 fn at(expression: &Linear, moment: NodeId, event: NodeId) -> Option<Linear> {
     if !expression.products.is_empty() {
         return None;
@@ -199,7 +200,7 @@ fn at(expression: &Linear, moment: NodeId, event: NodeId) -> Option<Linear> {
     Some(placed)
 }
 
-/// That `expression <= 0`, or `< 0` when strict, is not so at the worst corner.
+/// Returns the row that `expression <= 0`, or `< 0` when strict, does not hold at the worst corner.
 fn half_space(
     reduction: &Reduction,
     places: &[Place],
@@ -234,7 +235,7 @@ fn half_space(
     }
     let factors = factors.into_iter().filter(|(_, factor)| !factor.is_zero());
     let factors = factors.map(|(parameter, factor)| {
-        // What lowers the expression makes it bad.
+        // The worst end is the one that lowers the expression.
         let side = if factor.is_positive() {
             Side::Lower
         } else {
@@ -249,8 +250,8 @@ fn half_space(
     })
 }
 
-/// Each class's time as a function of the parameters, as far as differences that are parameters
-/// lead; the first class has time zero.
+/// Returns each class's time as a function of the parameters, as far as differences that are
+/// parameters connect the classes; the first class has time zero.
 fn places(reduction: &Reduction) -> Vec<Place> {
     let count = reduction.class_count();
     let mut neighbours: Vec<Vec<(usize, ParameterId, Rational, Rational)>> =

@@ -38,7 +38,7 @@ impl Proof {
     }
 }
 
-/// Looks for a moment at which an over-all condition is false.
+/// Search for a moment at which an over-all condition is false.
 pub(crate) struct Prover<'a, 'b, S: Scale> {
     pub(crate) task: &'a Task,
     pub(crate) plan: &'a ParametrizedPlan,
@@ -52,7 +52,7 @@ pub(crate) struct Prover<'a, 'b, S: Scale> {
     places: usize,
 }
 
-/// A proof, or how the condition can be false.
+/// Proof, or a way for the condition to be false.
 pub(crate) type Attempt = Result<Proof, BadCase>;
 
 impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
@@ -183,7 +183,7 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
         }
     }
 
-    /// All events are placed: the condition's value is now an expression.
+    /// Decides the condition after all events are placed: its value is now an expression.
     fn settle(&mut self, happened: &[NodeId]) -> Result<Attempt, Refusal> {
         let cut = |node: NodeId| happened.contains(&node);
         let mut proofs = Vec::new();

@@ -1,4 +1,4 @@
-//! A box that grows as long as every schedule in it is valid.
+//! Box that grows as long as every schedule in it is valid.
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -19,10 +19,10 @@ pub struct SoundBox<'a> {
 }
 
 impl<'a> SoundBox<'a> {
-    /// The nominal values; `None` if not even with these every schedule is valid.
+    /// Creates a box with the nominal values; `None` if some schedule is invalid at these values.
     ///
     /// # Errors
-    /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
+    /// If the plan has no schedule at its nominal values, or contains something beyond exact linear
     /// reasoning.
     pub fn new(task: &'a Task, plan: &'a ParametrizedPlan) -> Result<Option<Self>, Refusal> {
         let nominal = plan.nominal();

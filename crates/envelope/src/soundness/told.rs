@@ -132,7 +132,8 @@ impl Teller<'_> {
         places
     }
 
-    /// The sum in terms of the plan's own constraints, for some values of multiplied parameters.
+    /// Returns the sum in terms of the plan's own constraints, for some values of multiplied
+    /// parameters.
     fn refutation(
         &self,
         proof: &Certificate,

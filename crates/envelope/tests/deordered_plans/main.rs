@@ -1,8 +1,8 @@
-//! Deordering against the judge, on problems made so that a random plan is valid.
+//! Deordering compared with the validator, on problems constructed so that a random plan is valid.
 //!
-//! A random plan of random effects comes first. Then conditions are added one at a time, each of
-//! which the judge finds to hold in that plan; so they are many, and tight. Whatever schedule the
-//! deordered plan has, the judge must find them to hold in it as well.
+//! The test begins with a random plan of random effects. Then it adds conditions one at a time that
+//! the validator confirms in that plan, so that they are many and tight. In every schedule of the
+//! deordered plan, the validator must confirm them as well.
 
 mod scenario;
 
@@ -23,7 +23,7 @@ use rand_chacha::ChaCha8Rng;
 
 use scenario::{scenario, time};
 
-/// A schedule whose nodes, in random order, take an end or a random point of their windows.
+/// Returns a schedule whose nodes, in random order, take an end or a random point of their windows.
 fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     let zero = network_node(NodeId::ZERO);
     let mut network = ConsistentNetwork::try_from(plan.network(&Valuation::default()))
@@ -95,7 +95,7 @@ fn assert_sound(seed: u64, task: &Task, plan: &StnPlan, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// A random scenario without an order, with its random numbers.
+/// Returns a random scenario, deordered, with its random number generator.
 fn deordered(seed: u64, is_timeless: bool) -> (ChaCha8Rng, Task, Deordered) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let scenario = scenario(&mut rng, is_timeless);

@@ -13,7 +13,7 @@ use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::parametrize::vary;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
-/// A problem over the facts `(p)`, `(q)`, `(r)` and the numbers `(x)`, `(y)`, and an STN plan.
+/// Problem over the facts `(p)`, `(q)`, `(r)` and the numbers `(x)`, `(y)`, with an STN plan.
 #[derive(Default)]
 pub(crate) struct Given<'a> {
     /// `:synth-parameters` and actions.
@@ -29,7 +29,7 @@ pub(crate) struct Given<'a> {
 }
 
 impl Given<'_> {
-    /// The task with ε = 1/4.
+    /// Returns the task with ε = 1/4, and the plan.
     pub(crate) fn task_and_plan(&self) -> (Arc<Task>, Arc<ParametrizedPlan>) {
         let domain = format!(
             "(define (domain d) (:predicates (p) (q) (r)) (:functions (x) (y) (z)) {})",
@@ -98,12 +98,12 @@ impl Given<'_> {
     }
 }
 
-/// The oracle of the weak guarantee.
+/// Creates the oracle of the weak guarantee.
 pub(crate) fn oracle(task: &Arc<Task>, plan: &Arc<ParametrizedPlan>) -> Result<Oracle, Refusal> {
     Oracle::new(task, plan, Guarantee::Weak)
 }
 
-/// `[1, 3/2] [-inf, 0]`: an interval for each parameter.
+/// Parses `[1, 3/2] [-inf, 0]`: an interval for each parameter.
 pub(crate) fn envelope(text: &str) -> DecoupledEnvelope {
     let end = |text: &str| match text.trim() {
         "inf" | "-inf" => End::Infinite,

@@ -1,4 +1,4 @@
-//! A small problem with an STN plan whose numbers are partly open.
+//! Small problem with an STN plan whose numbers are partly open.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -25,10 +25,10 @@ pub(crate) struct Gap {
     pub(crate) upper: Bound,
 }
 
-/// A problem, and a plan that does each of its actions once.
+/// Problem with a plan that executes each of its actions once.
 ///
-/// `Unknown::Domain(i)` in the problem is parameter `i`. Timed initials have one time per group,
-/// in ascending order. All predicates, functions and actions are without arguments.
+/// `Unknown::Domain(i)` in the problem is parameter `i`. Timed initials have one time per group, in
+/// ascending order. All predicates, functions and actions are without arguments.
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
     pub(crate) problem: Problem,
@@ -101,7 +101,7 @@ impl Case {
         (task, plan)
     }
 
-    /// The problem with these values in place of its parameters: what the judge knows.
+    /// Returns the problem with these values in place of its parameters, for the validator.
     pub(crate) fn task_at(&self, valuation: &Valuation) -> Task {
         let mut problem = self.problem.clone();
         numbers::fill(&mut problem, &|index| Some(valuation[index.into()].clone()));
@@ -140,7 +140,7 @@ impl Case {
         validate(&task, &plan, &Settings::default())
     }
 
-    /// Takes away the domain's duration constraints of an action whose duration is a parameter.
+    /// Removes the domain's duration constraints of an action whose duration is a parameter.
     fn free_duration(&self, action: &mut Action) {
         let is_free = self.parameters.iter().any(|parameter| {
             matches!(parameter.kind, ParameterKind::Duration(id) if id.index() == action.schema.index())
@@ -160,7 +160,7 @@ fn parameter_of(leaf: &Expression) -> Option<Expression> {
     }
 }
 
-/// The plan's node of that meaning.
+/// Returns the plan's node with that meaning.
 pub(crate) fn node_of(plan: &StnPlan, node: Node) -> NodeId {
     let found = plan.nodes().find(|&(_, other)| other == node);
     found.expect("the plan has all its nodes").0
@@ -174,7 +174,7 @@ pub(crate) fn instance_of(node: Node) -> Option<InstanceId> {
     }
 }
 
-/// For error messages: all of the case, in PDDL's words and the STN plan's.
+/// Formats the whole case in PDDL and as an STN plan, for error messages.
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (task, plan) = self.build();
@@ -253,7 +253,7 @@ fn write_action(f: &mut fmt::Formatter<'_>, task: &Task, instance: &Instance) ->
     }
 }
 
-/// For error messages.
+/// Formats a box, for error messages.
 pub(crate) fn show(envelope: &DecoupledEnvelope) -> String {
     let parts: Vec<_> = envelope
         .intervals()

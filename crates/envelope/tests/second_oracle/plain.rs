@@ -28,7 +28,7 @@ pub(crate) enum Answer {
     Inside,
     /// For these values the plan has no schedule.
     NoSchedule(Valuation),
-    /// This schedule for these values breaks something.
+    /// This schedule for these values violates something.
     Broken(Break),
 }
 
@@ -38,11 +38,12 @@ pub(crate) struct Break {
     pub(crate) what: String,
     pub(crate) valuation: Valuation,
     pub(crate) schedule: Schedule,
-    /// It is only that a timed initial is too near to another one. The judge does not mind.
+    /// `true` if the violation is only a timed initial too close to another one, which the
+    /// validator accepts.
     pub(crate) is_only_timed: bool,
 }
 
-/// No answer.
+/// Reason for having no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum GaveUp {
     TooManyOrders,
@@ -81,11 +82,11 @@ pub(crate) fn check(
     })
 }
 
-/// Values in the box for which the plan's network has no schedule.
+/// Returns values in the box for which the plan's network has no schedule.
 ///
 /// The values that have one are a projection of the polyhedron of values and schedules, so they
-/// form a convex set, and a box lies in it exactly if all its corners do. An infinite end is taken
-/// to be farther away than any number in a small case can reach.
+/// form a convex set, and a box lies in it exactly if all its corners do. An infinite end is
+/// replaced by a number that is larger than any sum in a small case.
 pub(crate) fn without_schedule(
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,
@@ -126,7 +127,7 @@ fn combinations(
     combinations.into_iter().map(Valuation::new).collect()
 }
 
-/// Farther than any sum of the numbers in a case.
+/// Returns a number that is larger than any sum of the numbers in a case.
 fn far() -> Rational {
     Rational::from(i64::MAX) * Rational::from(1_000_000)
 }
@@ -147,7 +148,7 @@ fn upper(interval: &Interval) -> Rational {
     }
 }
 
-/// Both ends and some values in between.
+/// Returns both ends and some values in between.
 fn samples(interval: &Interval) -> Vec<Rational> {
     let (lower, upper) = (lower(interval), upper(interval));
     let at = |part: Rational| &lower + (&upper - &lower) * part;

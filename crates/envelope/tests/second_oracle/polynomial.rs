@@ -28,7 +28,7 @@ impl Polynomial {
         Self::default().plus_term(vec![symbol], &Rational::ONE)
     }
 
-    /// `to - from`.
+    /// Returns `to - from`.
     pub(crate) fn difference(from: Symbol, to: Symbol) -> Self {
         Self::symbol(to).minus(&Self::symbol(from))
     }
@@ -64,7 +64,7 @@ impl Polynomial {
         product
     }
 
-    /// The number, if nothing else is in it.
+    /// Returns the number, if the polynomial is constant.
     pub(crate) fn as_constant(&self) -> Option<Rational> {
         match self.0.iter().next() {
             None => Some(Rational::ZERO),

@@ -1,9 +1,9 @@
 //! The authors' encoding of a plan as SMT-LIB text: one position for each time point, one copy of
 //! each fact and fluent for each position.
 //!
-//! As in their tool, simultaneous time points are tried in every order. Where the judge is more
-//! precise, the text follows the judge: over-all conditions are read at every moment between two
-//! positions of different times.
+//! As in their tool, simultaneous time points are tried in every order. If the validator is more
+//! precise, the encoding follows the validator: over-all conditions are read at every moment
+//! between two positions of different times.
 
 mod causes;
 mod effects;
@@ -24,7 +24,7 @@ use crate::z3::{Found, Z3};
 pub(crate) use places::Places;
 use text::{and, apply, not, number, or, sum};
 
-/// The plan has something that is not encoded here.
+/// Error for a plan with features that are not encoded.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NotEncoded;
 
@@ -36,7 +36,7 @@ pub(crate) struct Encoding {
 }
 
 impl Encoding {
-    /// Each time point may be at one of its `places`.
+    /// Encodes a plan; each time point may be at one of its `places`.
     pub(crate) fn new(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -63,7 +63,8 @@ impl Encoding {
         })
     }
 
-    /// Satisfiable if some schedule for some values in the box breaks something.
+    /// Returns a text that is satisfiable if some schedule for some values in the box violates
+    /// something.
     pub(crate) fn broken(&self, envelope: &DecoupledEnvelope) -> String {
         let violation = or(&self.violations);
         format!("{}(assert {violation})\n", self.lives(envelope))
@@ -74,7 +75,7 @@ impl Encoding {
         format!("{}{}{}", self.schedules, in_box(envelope), self.effects)
     }
 
-    /// Satisfiable if there is a schedule for some values in the box.
+    /// Returns a text that is satisfiable if there is a schedule for some values in the box.
     pub(crate) fn scheduled(&self, envelope: &DecoupledEnvelope) -> String {
         format!("{}{}", self.schedules, in_box(envelope))
     }
@@ -105,7 +106,8 @@ pub(crate) fn contained(
         Found::NoModel => Some(true),
         Found::Unknown => None,
     };
-    // All at once is quick where it is quick at all; one by one takes longer, and goes further.
+    // One query for all violations is fast if it succeeds; single queries take longer, but succeed
+    // more often.
     ask(&or(&violations)).or_else(|| {
         let mut is_inside = Some(true);
         for violation in &violations {
@@ -242,7 +244,7 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// Each node has a position, each position a node, and times follow positions.
+    /// Each node has a position, each position a node, and times are ordered by position.
     fn positions(&mut self) {
         let count = self.count();
         self.line("(define-fun tau0 () Real 0.0)");
@@ -275,7 +277,7 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// The node's position is `k`.
+    /// Returns the formula that the node's position is `k`.
     fn at(&self, node: usize, k: usize) -> String {
         let places = self.places.of(node);
         if !places.contains(&k) {
@@ -287,7 +289,7 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// The node's position is less than `k`.
+    /// Returns the formula that the node's position is less than `k`.
     fn before(&self, node: usize, k: usize) -> String {
         let places = self.places.of(node);
         if *places.end() < k {

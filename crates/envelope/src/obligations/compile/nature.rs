@@ -37,13 +37,13 @@ pub(super) struct Nature {
     facts: BTreeSet<FactId>,
     /// The fluents that processes and events change.
     fluents: BTreeSet<FluentId>,
-    /// The schedule whose course is followed.
+    /// The nominal schedule, whose course is followed.
     times: Schedule,
-    /// The values of parameters in it.
+    /// The nominal values of the parameters.
     values: Valuation,
 }
 
-/// An event that has happened.
+/// Event that has happened.
 #[derive(Clone)]
 pub(super) struct Occurrence {
     event: usize,
@@ -53,7 +53,8 @@ pub(super) struct Occurrence {
 }
 
 impl Nature {
-    /// `None` if nothing happens without a plan.
+    /// Collects the behaviour; `None` if there are no processes, events or constraints on all
+    /// states.
     pub(super) fn of(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -109,7 +110,8 @@ impl Nature {
         Ok(Some(nature))
     }
 
-    /// Rates of actions are read at their starts.
+    /// Refuses rates of actions that nature changes, because they are read at the start of the
+    /// action.
     fn refuse_changing_rates(&self, task: &Task, plan: &ParametrizedPlan) -> Result<(), Refusal> {
         for instance in &plan.plan.instances {
             let Some(body) = instance.action.durative() else {
@@ -175,7 +177,8 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// A happening of the plan keeps ε away from the events before it that it interferes with.
+    /// Adds the obligation that a happening of the plan is ε away from earlier events that it
+    /// interferes with.
     fn keep_from_events(
         &self,
         nature: &Nature,
@@ -194,7 +197,7 @@ impl Compiler<'_> {
             if !nature.footprints[*event].interferes_with(&own) {
                 continue;
             }
-            // The distance, less ε, is negative.
+            // Violated if the distance minus ε is negative.
             let mut distance = Linear::difference(NodeId::ZERO, node).minus(at);
             distance.constant -= self.task.epsilon();
             let name = &self.task.autonomous().events[*event].name;
@@ -216,7 +219,8 @@ impl Compiler<'_> {
         }
     }
 
-    /// Conditional effects that may come about or not are not followed together with nature.
+    /// Returns the refusal of conditional effects with open outcomes, which are not supported
+    /// together with nature.
     pub(super) fn guard_depends(&self, node: NodeId) -> Refusal {
         Refusal::Nature {
             place: self.plan.plan.node_words(self.task, node),
@@ -263,7 +267,7 @@ fn oblige_nature(
     }
 }
 
-/// `to - from + constant <= 0` as a bound on a difference.
+/// Converts `to - from + constant <= 0` to a bound on a difference.
 fn as_difference(inequality: &Inequality) -> Option<Difference> {
     let Linear {
         constant,

@@ -1,10 +1,10 @@
-//! The nearest interfering pairs, beside the plain way to find them.
+//! The nearest interfering pairs, compared with a direct search.
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// Some things done to a few facts and fluents.
+/// Generates footprints over a few facts and fluents.
 fn footprints() -> impl Strategy<Value = Vec<Footprint>> {
     let uses = prop::collection::vec((0..6, 0..3_u32), 0..4);
     let footprint = uses.prop_map(|uses| {

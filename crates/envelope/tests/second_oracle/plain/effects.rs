@@ -76,7 +76,7 @@ impl<'a> Search<'a> {
         Ok(guards)
     }
 
-    /// Goes on with each combination of the guards' outcomes.
+    /// Continues with each combination of the guards' outcomes.
     pub(super) fn decide(
         &mut self,
         world: &World,
@@ -225,7 +225,7 @@ impl<'a> Search<'a> {
             Node::Start(id) => &self.durative(id).start.effects,
             Node::End(id) => &self.durative(id).end.effects,
         };
-        // Of an action that takes no time, the guards read at the start are in the same group.
+        // For an action with duration 0, the guards read at the start are in the same group.
         let is_off = |index: usize| match self.node(node) {
             Node::End(id) => {
                 let start = self.plan.plan.start(id).index();

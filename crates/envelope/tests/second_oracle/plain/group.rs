@@ -11,7 +11,7 @@ use crate::polynomial::{Polynomial, Symbol};
 use crate::system::Relation;
 
 impl Search<'_> {
-    /// The conditions of a group, and its distance from others.
+    /// Checks the conditions of a group, and its distance from others.
     pub(super) fn arrive(&mut self, world: &World, group: &[usize]) -> Step {
         for &node in group {
             let context = self.context(world, node);
@@ -62,8 +62,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Interfering happenings are at least epsilon apart. Of two timed initials that is asked only
-    /// if the time of one is open.
+    /// Checks that interfering happenings are at least epsilon apart. For two timed initials, that
+    /// is only required if the time of one is open.
     fn separate(&mut self, world: &World, group: &[usize]) -> Step {
         for (position, &node) in group.iter().enumerate() {
             for &other in world.placed.iter().chain(&group[..position]) {

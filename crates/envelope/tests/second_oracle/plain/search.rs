@@ -1,4 +1,4 @@
-//! From group to group of simultaneous happenings.
+//! Enumeration of the orders of happenings, by groups of simultaneous ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +14,7 @@ use crate::system::{Relation, System};
 /// Reason why the search ended without an answer.
 pub(super) enum Trouble {
     GaveUp(GaveUp),
-    /// This is not linear.
+    /// This polynomial is not linear.
     Product(Polynomial),
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Search<'a> {
     pub(super) plan: &'a ParametrizedPlan,
     pub(super) epsilon: &'a Rational,
     pub(super) system: System,
-    /// Values of parameters that multiply something.
+    /// Values of the multiplied parameters.
     pub(super) fixed: BTreeMap<usize, Rational>,
     /// Number of further groups that may be examined.
     pub(super) left: usize,
@@ -105,7 +105,7 @@ impl<'a> Search<'a> {
     }
 
     pub(super) fn report(&mut self, what: String) {
-        // The last check may have been about something narrower that was not feasible.
+        // The last check may have been about a narrower system that was not feasible.
         if !self.system.is_feasible() {
             return;
         }
@@ -149,7 +149,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// The group comes next, everything else after it.
+    /// Makes the group the next one, with everything else after it.
     fn close(&mut self, world: &World, group: &[usize]) -> Step {
         if self.found.is_some() {
             return Ok(());
@@ -174,7 +174,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// The time between the last group and the node.
+    /// Advances the time from the last group to the node.
     fn pass(&mut self, world: &mut World, node: usize) -> Step {
         let Some(&last) = world.last.first() else {
             return Ok(());
@@ -200,8 +200,8 @@ impl<'a> Search<'a> {
         let since = Polynomial::difference(Symbol::Moment, Symbol::Time(last));
         let until = Polynomial::difference(Symbol::Time(node), Symbol::Moment);
         for (&id, running) in &world.running {
-            // The over-all interval is open; at a group within it, the state after the group
-            // counts.
+            // The over-all interval is open; at a group within it, the state after the group is
+            // relevant.
             let since_relation = if running.is_new {
                 Relation::Below
             } else {
@@ -226,7 +226,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// The rates of the continuous effects at work.
+    /// Returns the rates of the active continuous effects.
     fn rates(&self, world: &World) -> Result<Vec<(FluentId, Option<Polynomial>)>, Trouble> {
         let mut rates = Vec::new();
         let mut moving = BTreeSet::new();

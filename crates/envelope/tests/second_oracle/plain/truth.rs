@@ -121,7 +121,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The value; `None` where it is undefined.
+    /// Returns the value; `None` if it is undefined.
     pub(super) fn value(
         &self,
         expression: &Expression,

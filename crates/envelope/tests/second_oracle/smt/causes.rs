@@ -12,7 +12,7 @@ use elbowroom_plan::{DecoupledEnvelope, Node};
 use super::text::{and, not, number, or};
 use super::{Encoder, NotEncoded, in_box};
 
-/// When a condition is read.
+/// Moment at which a condition is read.
 #[derive(Clone, Copy)]
 enum Moment {
     /// On arrival at a time point.
@@ -53,7 +53,7 @@ impl Encoder<'_> {
         Ok(format!("{}{}", self.text, in_box(envelope)))
     }
 
-    /// It must hold right after the start, and after each time point before the end.
+    /// Requires a condition right after the start, and after each time point before the end.
     fn never_broken(
         &mut self,
         condition: &Condition,
@@ -102,7 +102,8 @@ impl Encoder<'_> {
         if are_plain { Ok(()) } else { Err(NotEncoded) }
     }
 
-    /// The truth that a time point gives to a fact, if any. Additions come after deletions.
+    /// Returns the truth value that a time point assigns to a fact, if any. Additions come after
+    /// deletions.
     fn sets(&self, node: usize, fact: FactId) -> Option<bool> {
         let changes: Vec<&Change> = if let Node::Timed(group) = self.node(node) {
             self.task.timed()[group].changes.iter().collect()

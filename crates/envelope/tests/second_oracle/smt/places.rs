@@ -5,15 +5,15 @@ use std::ops::RangeInclusive;
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan};
 
-/// For each time point but zero, the positions it may have; the first is 1.
+/// Possible positions of each time point but zero; the first is 1.
 pub(crate) struct Places {
     ranges: Vec<RangeInclusive<usize>>,
-    /// `[i][j]`: the most that time point `j` can come after `i`.
+    /// `[i][j]`: the greatest time from time point `i` to `j`.
     farthest: Vec<Vec<Option<Rational>>>,
 }
 
 impl Places {
-    /// Any order is possible.
+    /// Allows any order.
     pub(crate) fn any(plan: &ParametrizedPlan) -> Self {
         let count = plan.plan.nodes.len() - 1;
         Self {
@@ -50,7 +50,7 @@ impl Places {
         Some(Self { ranges, farthest })
     }
 
-    /// `t_first < t_second` as text; less than that, where the network knows.
+    /// Returns `t_first < t_second` as text, simplified if the network decides it.
     pub(super) fn is_before(&self, first: usize, second: usize) -> String {
         if self
             .least_gap(first, second)
@@ -77,7 +77,8 @@ impl Places {
     }
 }
 
-/// `[i][j]`: the most that time point `j` can come after `i`, by Floyd and Warshall's algorithm.
+/// Computes `[i][j]`, the greatest time from time point `i` to `j`, by Floyd and Warshall's
+/// algorithm.
 fn farthest(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Vec<Vec<Option<Rational>>> {
     let count = plan.plan.nodes.len();
     let mut most = vec![vec![None; count]; count];
