@@ -28,7 +28,7 @@ pub struct Share {
 pub struct Balance {
     /// All upwards.
     pub more: Share,
-    /// All downwards; a parameter that cannot be negative stops at 1.
+    /// All downwards; a parameter that cannot be negative stops at a share of 1.
     pub less: Share,
     /// Each in any direction.
     pub either: Share,

@@ -182,7 +182,7 @@ fn links_of(plan: &ParametrizedPlan, network: &PlanNetwork) -> Vec<Option<LinkId
     links
 }
 
-/// The reason why no fixed schedule works for all values.
+/// Returns the reason why no fixed schedule works for all values.
 pub(crate) fn strong_conflict(
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,

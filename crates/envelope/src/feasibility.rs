@@ -97,7 +97,7 @@ impl Feasibility {
         }
     }
 
-    /// The edges that are not limits of a parameter.
+    /// Returns the edges that are not limits of a parameter.
     fn edges(&self) -> impl Iterator<Item = &Edge> + Clone {
         self.left
             .iter()
@@ -280,7 +280,7 @@ impl Feasibility {
         None
     }
 
-    /// The network at a corner, if it is consistent.
+    /// Returns the network at a corner, if it is consistent.
     fn network(
         &self,
         sides: &BTreeMap<ParameterId, Side>,
@@ -289,7 +289,7 @@ impl Feasibility {
         self.network_where(self.edges(), |edge| self.bound(edge, sides, envelope))
     }
 
-    /// The network with these bounds, if it is consistent; `None` is no bound.
+    /// Returns the network with these bounds, if it is consistent; `None` is no bound.
     fn network_where<'a>(
         &self,
         edges: impl Iterator<Item = &'a Edge>,

@@ -188,7 +188,7 @@ impl Controllability {
         }
     }
 
-    /// The objection, with values that show it.
+    /// Returns the objection, with values that show it.
     pub(crate) fn objection(
         &self,
         envelope: &DecoupledEnvelope,

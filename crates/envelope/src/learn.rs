@@ -284,12 +284,12 @@ impl Reader<'_> {
         })
     }
 
-    /// The constraint that leaves a link's duration open.
+    /// Returns the constraint that leaves a link's duration open.
     fn constraint(&self, link: LinkId) -> &Constraint {
         &self.plan.plan.constraints[self.network.links[link.index()]]
     }
 
-    /// The lower bound of a link, or minus its upper one.
+    /// Returns the lower bound of a link, or minus its upper one.
     fn link(&self, link: LinkId, side: Side) -> Length {
         let constraint = self.constraint(link);
         let (bound, sign) = match side {

@@ -178,7 +178,7 @@ impl Linear {
         fixed
     }
 
-    /// The value for these times (by node) and parameters.
+    /// Returns the value for these times (by node) and parameters.
     pub fn value(&self, times: &Schedule, parameters: &Valuation) -> Rational {
         let mut value = self.constant.clone();
         for (node, coefficient) in &self.times {

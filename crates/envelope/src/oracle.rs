@@ -140,12 +140,12 @@ impl Oracle {
         })
     }
 
-    /// The plan it was made for.
+    /// Returns the plan that it was created for.
     pub fn plan(&self) -> &Arc<ParametrizedPlan> {
         &self.plan
     }
 
-    /// The guarantee that it checks.
+    /// Returns the guarantee that it checks.
     pub fn guarantee(&self) -> Guarantee {
         self.guarantee
     }
@@ -162,7 +162,7 @@ impl Oracle {
         known.map(Soundness::conditions).unwrap_or_default()
     }
 
-    /// The number of boxes checked.
+    /// Returns the number of boxes checked.
     pub fn checks(&self) -> usize {
         self.checks
     }
@@ -172,7 +172,7 @@ impl Oracle {
         self.without_schedule
     }
 
-    /// The number of bad cases refuted from scratch: a measure of work.
+    /// Returns the number of bad cases refuted from scratch: a measure of work.
     pub fn refutations(&self) -> usize {
         let now = self.soundness.as_ref().map_or(0, Soundness::refutations);
         self.refuted_before + now

@@ -238,12 +238,12 @@ impl Reduction {
         self.places.iter().map(|(_, offset)| offset)
     }
 
-    /// The class of the moment at which an over-all condition is read.
+    /// Returns the class of the moment at which an over-all condition is read.
     pub fn moment(&self) -> ClassId {
         ClassId(u32::try_from(self.class_count).expect("fewer classes than nodes"))
     }
 
-    /// The constraints.
+    /// Returns the constraints.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
     }
@@ -253,12 +253,12 @@ impl Reduction {
         Arc::clone(&self.edges)
     }
 
-    /// The number of classes.
+    /// Returns the number of classes.
     pub fn class_count(&self) -> usize {
         self.class_count
     }
 
-    /// The number of nodes of the plan.
+    /// Returns the number of nodes of the plan.
     pub fn node_count(&self) -> usize {
         self.places.len()
     }
@@ -301,7 +301,7 @@ impl Reduction {
 }
 
 impl Edge {
-    /// The bound in a box; `None` if there is none.
+    /// Returns the bound in a box; `None` if there is none.
     pub fn bound(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
         match self.end {
             None => Some(self.constant.clone()),

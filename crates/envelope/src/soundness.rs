@@ -193,7 +193,7 @@ impl Soundness {
         &self.reduction
     }
 
-    /// The number of bad cases refuted from scratch so far: a measure of work.
+    /// Returns the number of bad cases refuted from scratch so far: a measure of work.
     pub(crate) fn refutations(&self) -> usize {
         self.refutations
     }
@@ -218,7 +218,8 @@ impl Soundness {
         Ok(found.pop())
     }
 
-    /// The same for at most `most` obligations: if possible, those that give better reasons.
+    /// Like [`broken`](Self::broken), but returns at most `most` obligations: if possible, those
+    /// that give better reasons.
     ///
     /// # Errors
     /// If there are too many cases to decide, and no violation is known.
@@ -417,8 +418,8 @@ fn check_products(
     }
 }
 
-/// The same for an over-all condition, read at any place of its moment among the events of the
-/// nominal schedule. Other places are checked for each box.
+/// Checks the products of an over-all condition, read at any place of its moment among the events
+/// of the nominal schedule. Other places are checked for each box.
 fn check_over_all(
     (task, plan): (&Task, &ParametrizedPlan),
     reduction: &Reduction,

@@ -84,7 +84,7 @@ impl Dice {
     }
 }
 
-/// All boxes with whole ends around the nominal values.
+/// Returns all boxes with whole ends around the nominal values.
 fn boxes(plan: &ParametrizedPlan) -> Vec<DecoupledEnvelope> {
     let mut boxes = vec![DecoupledEnvelope::point(&plan.nominal())];
     for index in 0..plan.parameters.len() {
@@ -104,7 +104,7 @@ fn boxes(plan: &ParametrizedPlan) -> Vec<DecoupledEnvelope> {
     boxes
 }
 
-/// The sum of widths.
+/// Returns the sum of widths.
 fn widths(envelope: &DecoupledEnvelope) -> Rational {
     let widths = envelope.intervals().iter();
     widths.filter_map(Interval::width).sum()
@@ -223,7 +223,8 @@ fn no_box_on_a_grid_is_better_than_the_best_one() {
     assert!(unproved * 10 < proved, "{proved} {unproved}");
 }
 
-/// Two sequential actions with a deadline after ten units; the unit is a parameter of the test.
+/// Returns a plan of two sequential actions with a deadline after ten units; the unit is a
+/// parameter of the test.
 fn relay(unit: &Rational) -> String {
     let limit = &Rational::from(10) * unit;
     format!(

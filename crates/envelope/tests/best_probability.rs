@@ -109,7 +109,7 @@ fn families() -> Vec<[Option<Chance>; 3]> {
     ]
 }
 
-/// All boxes with whole ends around the nominal values.
+/// Returns all boxes with whole ends around the nominal values.
 fn boxes(plan: &ParametrizedPlan) -> Vec<DecoupledEnvelope> {
     let mut boxes = vec![DecoupledEnvelope::point(&plan.nominal())];
     for index in 0..plan.parameters.len() {
@@ -133,7 +133,7 @@ fn boxes(plan: &ParametrizedPlan) -> Vec<DecoupledEnvelope> {
 /// The logarithm of the probability of each interval, by parameter; `None` if that is 0.
 type Known = BTreeMap<(usize, Rational, Rational), Option<f64>>;
 
-/// The logarithm of the probability that all durations are inside; `None` if that is 0.
+/// Returns the logarithm of the probability that all durations are inside; `None` if that is 0.
 fn logarithm(
     envelope: &DecoupledEnvelope,
     chances: &[Option<Chance>],

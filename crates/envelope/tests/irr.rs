@@ -134,7 +134,7 @@ impl Progress {
     }
 }
 
-/// Algorithm 1, box by box. It ends after `most` steps.
+/// Runs algorithm 1, box by box. It ends after `most` steps.
 fn one_by_one(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,

@@ -186,12 +186,12 @@ impl Builder {
         Some(id)
     }
 
-    /// All time points so far, by node.
+    /// Returns all time points so far, by node.
     pub(crate) fn nodes(&self) -> impl Iterator<Item = NodeId> + use<> {
         self.requirements.nodes()
     }
 
-    /// The link that ends at a node.
+    /// Returns the link that ends at a node.
     pub(crate) fn link_ending_at(&self, node: NodeId) -> Option<LinkId> {
         self.ending.get(&node).copied()
     }
@@ -206,7 +206,7 @@ impl Builder {
         self.durations[id.index()].as_ref()
     }
 
-    /// The network, unless there were mistakes.
+    /// Returns the network, unless there were mistakes.
     pub(crate) fn finish(self, report: &mut Report) -> Option<NetworkFile> {
         if report.is_failed() {
             return None;

@@ -44,7 +44,7 @@ impl NetworkFile {
         Ok(self.with(tight, Vec::new()))
     }
 
-    /// The network's dispatchable form, waits included.
+    /// Returns the network's dispatchable form, waits included.
     #[must_use]
     pub fn dispatchable(&self, form: &Dispatchable<Rational>) -> Self {
         let mut network = Network::with_nodes(self.points.len());

@@ -118,7 +118,7 @@ pub struct NetworkFile {
 }
 
 impl NetworkFile {
-    /// The name of a time point.
+    /// Returns the name of a time point.
     pub fn point(&self, node: NodeId) -> &str {
         &self.points[node.index()]
     }

@@ -29,7 +29,7 @@ pub(crate) enum Value<'a> {
 }
 
 impl<'a> Json<'a> {
-    /// The member of that name; the last one, if there are several.
+    /// Returns the member of that name; the last one, if there are several.
     pub(crate) fn member(&self, name: &str) -> Option<&Json<'a>> {
         match &self.value {
             Value::Object(members) => {
@@ -61,7 +61,7 @@ impl<'a> Json<'a> {
         }
     }
 
-    /// The kind of the value, for a message.
+    /// Returns the kind of the value, for a message.
     pub(crate) fn kind(&self) -> &'static str {
         match &self.value {
             Value::Null => "null",
@@ -119,7 +119,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The text at this place, for a message.
+    /// Returns the text at this place, for a message.
     fn here(&self) -> String {
         match self.text[self.at..].chars().next() {
             Some(letter) => format!("`{letter}`"),

@@ -92,7 +92,7 @@ fn any(name: &str, text: &str, report: &mut Report) -> Option<NetworkFile> {
     }
 }
 
-/// The extension of a file's name, in lower case.
+/// Returns the extension of a file's name, in lower case.
 fn ending(name: &str) -> String {
     let base = name.rsplit(['/', '\\']).next().unwrap_or_default();
     match base.rsplit_once('.') {

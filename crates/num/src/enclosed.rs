@@ -68,7 +68,7 @@ pub fn billionths_below(number: &Rational) -> Rational {
     (number * &billion).floor() / billion
 }
 
-/// The least multiple of a billionth that is not below this number.
+/// Returns the least multiple of a billionth that is not below this number.
 pub fn billionths_above(number: &Rational) -> Rational {
     let billion = Rational::from(1_000_000_000);
     (number * &billion).ceil() / billion

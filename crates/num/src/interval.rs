@@ -106,7 +106,7 @@ impl Interval {
         Some(self.upper.value()? - self.lower.value()?)
     }
 
-    /// The intersection of both intervals.
+    /// Returns the intersection of both intervals.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
         Self {

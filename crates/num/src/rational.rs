@@ -178,7 +178,7 @@ impl Rational {
         }
     }
 
-    /// The largest whole number not above this.
+    /// Returns the largest whole number not above this.
     #[must_use]
     pub fn floor(&self) -> Self {
         match &self.0 {
@@ -187,7 +187,7 @@ impl Rational {
         }
     }
 
-    /// The smallest whole number not below this.
+    /// Returns the smallest whole number not below this.
     #[must_use]
     pub fn ceil(&self) -> Self {
         -((-self).floor())
@@ -224,7 +224,7 @@ impl Rational {
         }
     }
 
-    /// The denominator of the fraction in lowest terms, when it fits an `i64`.
+    /// Returns the denominator of the fraction in lowest terms, when it fits an `i64`.
     pub fn denominator(&self) -> Option<i64> {
         match &self.0 {
             Small(_, denominator) => Some(*denominator),
@@ -259,7 +259,7 @@ impl Rational {
     }
 }
 
-/// The greatest common divisor; `gcd(0, b) = b`.
+/// Returns the greatest common divisor; `gcd(0, b) = b`.
 pub(crate) fn gcd(a: u128, b: u128) -> u128 {
     // Nearly all operands fit 64 bits, where a division is several times cheaper.
     if let (Ok(a), Ok(b)) = (u64::try_from(a), u64::try_from(b)) {

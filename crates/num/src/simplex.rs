@@ -69,7 +69,7 @@ pub struct Infeasible {
 }
 
 impl Infeasible {
-    /// The tags of the bounds that contradict each other.
+    /// Returns the tags of the bounds that contradict each other.
     pub fn tags(&self) -> impl Iterator<Item = usize> {
         self.certificate.iter().map(|(tag, _)| *tag)
     }
@@ -140,7 +140,7 @@ impl Simplex {
         variable
     }
 
-    /// The number of variables.
+    /// Returns the number of variables.
     pub fn variable_count(&self) -> usize {
         self.variables.len()
     }

@@ -76,7 +76,7 @@ impl Total {
         Some(())
     }
 
-    /// The sum.
+    /// Returns the sum.
     pub fn value(&self) -> Rational {
         &self.large + &Rational::reduced(self.numerator, i128::from(self.denominator))
     }

@@ -59,7 +59,7 @@ impl Stop {
         STOP.set(Some(self.clone()));
     }
 
-    /// The request that computations of this thread obey.
+    /// Returns the request that computations of this thread obey.
     pub fn of_this_thread() -> Option<Self> {
         STOP.with_borrow(Clone::clone)
     }

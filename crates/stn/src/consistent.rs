@@ -249,7 +249,7 @@ impl<W: Weight> Repair<W> {
         outcome
     }
 
-    /// Dijkstra's algorithm over the slack of the constraints, from the new constraint's `to`.
+    /// Runs Dijkstra's algorithm over the slack of the constraints, from the new constraint's `to`.
     ///
     /// If the new constraint's `from` has to move, there is a negative cycle.
     fn propose(
@@ -303,7 +303,7 @@ impl<W: Weight> Repair<W> {
         Ok(())
     }
 
-    /// The proposed time, or the present one.
+    /// Returns the proposed time, or the present one.
     fn time<'a>(&'a self, node: NodeId, schedule: &'a Schedule<W>) -> &'a W {
         match &self.proposed[node.index()] {
             Some((time, _)) => time,

@@ -51,8 +51,8 @@ impl<W: Weight> ConsistentNetwork<W> {
         gone.filter(|id| search.is_gone[id.index()]).collect()
     }
 
-    /// The nodes whose differences are fixed, group by group: the strongly connected components
-    /// of the edges without slack (Kosaraju's algorithm).
+    /// Returns the nodes whose differences are fixed, group by group: the strongly connected
+    /// components of the edges without slack (Kosaraju's algorithm).
     fn rigid_groups(&self, slack: &[W]) -> Rigid {
         let network = self.network();
         let is_tight = |id: ConstraintId| slack[id.index()] == W::zero();
@@ -301,7 +301,7 @@ impl<W: Weight> Hub<W> {
         })
     }
 
-    /// The length of the shortest path between two other groups that leads through the hub.
+    /// Returns the length of the shortest path between two other groups that leads through the hub.
     fn between(&self, source: usize, target: usize) -> Option<W> {
         if self.group == source || self.group == target {
             return None;
@@ -333,7 +333,7 @@ impl<W: Weight> Reach<W> {
         }
     }
 
-    /// Dijkstra's algorithm from `source`, until all of its edges with a detour are known. The
+    /// Runs Dijkstra's algorithm from `source`, until all of its edges with a detour are known. The
     /// lengths of detours through the hub are known beforehand.
     fn look_for_detours(
         &mut self,

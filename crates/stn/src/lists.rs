@@ -63,12 +63,12 @@ impl Lists {
         self.ends.truncate(node_count);
     }
 
-    /// The first constraint of a node's list.
+    /// Returns the first constraint of a node's list.
     pub(crate) fn first(&self, node: NodeId) -> Option<ConstraintId> {
         self.ends[node.index()].map(|(first, _)| first)
     }
 
-    /// The next constraint in the same list.
+    /// Returns the next constraint in the same list.
     pub(crate) fn after(&self, id: ConstraintId) -> Option<ConstraintId> {
         self.neighbours[id.index()].1
     }

@@ -14,12 +14,12 @@ pub struct Minimal<W = Rational> {
 }
 
 impl<W: Weight> Minimal<W> {
-    /// The least `d` with `to - from <= d` in every schedule; `None` when there is none.
+    /// Returns the least `d` with `to - from <= d` in every schedule; `None` when there is none.
     pub fn distance(&self, from: NodeId, to: NodeId) -> Option<&W> {
         self.distances[from.index() * self.node_count + to.index()].as_ref()
     }
 
-    /// The number of nodes.
+    /// Returns the number of nodes.
     pub fn node_count(&self) -> usize {
         self.node_count
     }

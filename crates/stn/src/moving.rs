@@ -112,7 +112,7 @@ impl<W: Weight> MovingWindows<W> {
         &self.network
     }
 
-    /// The node that times are relative to.
+    /// Returns the node that times are relative to.
     pub fn origin(&self) -> NodeId {
         self.origin
     }
@@ -246,7 +246,7 @@ impl<W: Weight> MovingWindows<W> {
         self.is_lifted[id.index()]
     }
 
-    /// The latest time, or the earliest one negated: the length of a shortest path.
+    /// Returns the latest time, or the earliest one negated: the length of a shortest path.
     fn distance(&self, direction: Direction, node: NodeId) -> Option<W> {
         let window = &self.windows[node.index()];
         match direction {

@@ -117,7 +117,7 @@ impl<W: Weight> Network<W> {
         self.leaving.node_count()
     }
 
-    /// All nodes.
+    /// Returns all nodes.
     pub fn nodes(&self) -> impl ExactSizeIterator<Item = NodeId> + use<W> {
         (0..self.node_count()).map(NodeId::from_index)
     }
@@ -137,22 +137,22 @@ impl<W: Weight> Network<W> {
         (0..self.constraints.len()).map(ConstraintId::from_index)
     }
 
-    /// The constraints whose `from` is `node`, in the order they were added.
+    /// Returns the constraints whose `from` is `node`, in the order they were added.
     pub fn leaving(&self, node: NodeId) -> impl Iterator<Item = ConstraintId> + '_ {
         self.leaving.of(node)
     }
 
-    /// The constraints whose `to` is `node`, in the order they were added.
+    /// Returns the constraints whose `to` is `node`, in the order they were added.
     pub fn entering(&self, node: NodeId) -> impl Iterator<Item = ConstraintId> + '_ {
         self.entering.of(node)
     }
 
-    /// The first constraint to follow from `node` in that direction.
+    /// Returns the first constraint to follow from `node` in that direction.
     pub(crate) fn first(&self, node: NodeId, direction: Direction) -> Option<ConstraintId> {
         self.lists(direction).first(node)
     }
 
-    /// The next one after `id`.
+    /// Returns the next constraint after `id`.
     pub(crate) fn after(&self, id: ConstraintId, direction: Direction) -> Option<ConstraintId> {
         self.lists(direction).after(id)
     }
@@ -164,7 +164,7 @@ impl<W: Weight> Network<W> {
         }
     }
 
-    /// The network without the constraints `left_out`; the others keep their order.
+    /// Returns the network without the constraints `left_out`; the others keep their order.
     ///
     /// `left_out` is sorted, as [`implied`](crate::ConsistentNetwork::implied) returns it.
     #[must_use]

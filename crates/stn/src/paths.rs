@@ -20,7 +20,7 @@ pub struct ShortestPaths<W = Rational> {
 }
 
 impl<W: Weight> ShortestPaths<W> {
-    /// The node where all paths begin or end.
+    /// Returns the node where all paths begin or end.
     pub fn root(&self) -> NodeId {
         self.root
     }
@@ -30,13 +30,13 @@ impl<W: Weight> ShortestPaths<W> {
         self.direction
     }
 
-    /// The least `d` with `node - root <= d` (or `root - node <= d`, by direction) in every
+    /// Returns the least `d` with `node - root <= d` (or `root - node <= d`, by direction) in every
     /// schedule; `None` when there is none.
     pub fn distance(&self, node: NodeId) -> Option<&W> {
         self.distances[node.index()].as_ref()
     }
 
-    /// The constraint next to the node on its path.
+    /// Returns the constraint next to the node on its path.
     pub(crate) fn step(&self, node: NodeId) -> Option<ConstraintId> {
         self.steps[node.index()].map(|(id, _)| id)
     }
@@ -59,12 +59,12 @@ impl<W: Weight> ShortestPaths<W> {
 }
 
 impl<W: Weight> ConsistentNetwork<W> {
-    /// The tightest bounds on `node - root`, for each node.
+    /// Returns the tightest bounds on `node - root`, for each node.
     pub fn shortest_paths_from(&self, root: NodeId) -> ShortestPaths<W> {
         self.shortest_paths(root, Direction::FromRoot, None)
     }
 
-    /// The tightest bounds on `root - node`, for each node.
+    /// Returns the tightest bounds on `root - node`, for each node.
     pub fn shortest_paths_to(&self, root: NodeId) -> ShortestPaths<W> {
         self.shortest_paths(root, Direction::ToRoot, None)
     }
@@ -106,7 +106,7 @@ impl<W: Weight> ConsistentNetwork<W> {
             .path(to)
     }
 
-    /// Dijkstra's algorithm. Distances are final for all nodes, or only for `goal`.
+    /// Runs Dijkstra's algorithm. Distances are final for all nodes, or only for `goal`.
     ///
     /// The queue is ordered by path lengths in slacks ([`Constraint::slack_in`]) of the network's
     /// schedule, without the constant share of the root.

@@ -18,12 +18,12 @@ impl<W: Weight> Schedule<W> {
         Self { times }
     }
 
-    /// The times, by node.
+    /// Returns the times, by node.
     pub fn times(&self) -> &[W] {
         &self.times
     }
 
-    /// The times, by node.
+    /// Returns the times, by node.
     pub fn into_times(self) -> Vec<W> {
         self.times
     }

@@ -194,7 +194,7 @@ impl<W: Weight> UncertainNetwork<W> {
         (0..self.links.len()).map(LinkId::from_index)
     }
 
-    /// The link that ends at a node; `None` if the executor chooses when the node happens.
+    /// Returns the link that ends at a node; `None` if the executor chooses when the node happens.
     pub fn ending_at(&self, node: NodeId) -> Option<LinkId> {
         self.ending[node.index()]
     }

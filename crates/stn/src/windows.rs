@@ -23,12 +23,12 @@ pub struct Windows<W = Rational> {
 }
 
 impl<W: Weight> Windows<W> {
-    /// The node that times are relative to.
+    /// Returns the node that times are relative to.
     pub fn origin(&self) -> NodeId {
         self.origin
     }
 
-    /// All windows, by node.
+    /// Returns all windows, by node.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (NodeId, &Window<W>)> {
         let numbered = self.windows.iter().enumerate();
         numbered.map(|(index, window)| (NodeId::from_index(index), window))

@@ -25,8 +25,7 @@ fn limits() -> impl Strategy<Value = Vec<(Limit, Index, i64)>> {
     prop::collection::vec((limit, any::<Index>(), -25..25_i64), 1..20)
 }
 
-/// Reference implementation: the limit as one or two constraints, and everything computed from
-/// scratch.
+/// Computes the result from scratch, with the limit as one or two constraints.
 fn plainly(
     network: &ConsistentNetwork,
     limit: Limit,
@@ -146,7 +145,8 @@ proptest! {
     }
 }
 
-/// The bounds of the explanation's constraints add up from the root's own end to the node's.
+/// Checks that the bounds of the explanation's constraints add up from the root's own end to the
+/// node's.
 fn every_end_has_its_grounds(moving: &MovingWindows) -> Result<(), TestCaseError> {
     let bound = |id: &ConstraintId| moving.network().constraint(*id).bound.clone();
     for node in moving.network().nodes() {

@@ -86,7 +86,7 @@ pub(super) fn guess(
     rounded.collect()
 }
 
-/// The least and the greatest value of each variable.
+/// Returns the least and the greatest value of each variable.
 fn spans(variables: &Variables, spans: &[Span]) -> (Vec<Rational>, Vec<Rational>) {
     if spans.is_empty() {
         let least = vec![Rational::ZERO; variables.count()];

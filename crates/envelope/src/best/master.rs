@@ -120,7 +120,7 @@ impl Master {
         }
     }
 
-    /// The rows that hold in a case.
+    /// Returns the rows that hold in a case.
     pub(super) fn rows<'a>(
         &'a self,
         chosen: &'a [(usize, usize)],

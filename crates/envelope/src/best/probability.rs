@@ -368,7 +368,7 @@ fn middle_jump(
     Some(((most.to_f64() / least).ln(), side, place.clone()))
 }
 
-/// The cell of a parameter's intervals in a case.
+/// Returns the cell of a parameter's intervals in a case.
 fn cell(term: &Term, spans: &[Span]) -> Cell {
     let [below, above] = term.ends.map(|variable| &spans[variable]);
     Cell {

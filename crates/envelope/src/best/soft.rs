@@ -68,7 +68,7 @@ impl Soft {
         }
     }
 
-    /// For a list of values: returns approximately the share that an interval contains, and the
+    /// Returns approximately the share of a list of values that an interval contains, and the
     /// derivatives of its logarithm by the ends. `None` without such a list.
     pub(super) fn hull_at(&self, at: &Reach) -> Option<(Rational, Reach)> {
         let Kind::Values { center, hulls } = &self.kind else {

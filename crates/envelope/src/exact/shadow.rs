@@ -179,7 +179,7 @@ mod tests {
         Rational::from(value)
     }
 
-    /// `x + y <= 10`, `2 x - y < 4`, `z <= x`.
+    /// Returns the region `x + y <= 10`, `2 x - y < 4`, `z <= x`.
     fn region() -> Region {
         let row = |factors: &[(usize, i64)], bound: i64, is_strict| RegionRow {
             factors: factors

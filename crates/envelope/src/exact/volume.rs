@@ -57,7 +57,7 @@ impl Region {
     }
 }
 
-/// The smallest interval around two.
+/// Returns the smallest interval around two.
 fn around(one: &Interval, two: &Interval) -> Interval {
     let lower = match (one.lower.value(), two.lower.value()) {
         (Some(a), Some(b)) => End::Closed(a.min(b).clone()),

@@ -164,7 +164,7 @@ impl Shortcuts {
     }
 }
 
-/// The node at which a step of a cycle begins.
+/// Returns the node at which a step of a cycle begins.
 fn node_before(steps: &[Step], index: usize) -> NodeId {
     steps[index.checked_sub(1).unwrap_or(steps.len() - 1)].to
 }

@@ -33,7 +33,7 @@ impl<K: Copy + Ord> Terms<K> {
         self.0.is_empty()
     }
 
-    /// The coefficient, if there is one.
+    /// Returns the coefficient, if there is one.
     pub fn get(&self, key: K) -> Option<&Rational> {
         self.place(key).ok().map(|place| &self.0[place].1)
     }

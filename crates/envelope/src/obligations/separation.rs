@@ -33,7 +33,7 @@ pub(super) fn separations(task: &Task, plan: &StnPlan, order: &[NodeId]) -> Vec<
         .collect()
 }
 
-/// The groups of timed initials at times that depend on no parameter.
+/// Returns the groups of timed initials at times that depend on no parameter.
 fn fixed(plan: &StnPlan) -> BTreeSet<NodeId> {
     let at_fixed_times = plan.constraints.iter().filter(|constraint| {
         constraint.from == NodeId::ZERO

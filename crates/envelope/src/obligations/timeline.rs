@@ -152,12 +152,12 @@ impl Timeline {
         (near, open)
     }
 
-    /// The history of a fact.
+    /// Returns the history of a fact.
     pub(crate) fn fact_history(&self, fact: FactId) -> FactHistory {
         self.facts.get(&fact).cloned().unwrap_or_default()
     }
 
-    /// The nodes at which the fact may change.
+    /// Returns the nodes at which the fact may change.
     pub(crate) fn fact_nodes(&self, fact: FactId) -> impl Iterator<Item = NodeId> + '_ {
         self.facts
             .get(&fact)
@@ -165,7 +165,7 @@ impl Timeline {
             .flat_map(|h| h.events.iter().map(|&(node, _)| node))
     }
 
-    /// The nodes at which the fluent's value or rate may change.
+    /// Returns the nodes at which the fluent's value or rate may change.
     pub(crate) fn fluent_nodes(&self, fluent: FluentId) -> impl Iterator<Item = NodeId> + '_ {
         self.fluents
             .get(&fluent)

@@ -43,7 +43,8 @@ pub(super) struct Program<'a> {
     parameters: BTreeMap<ParameterId, Value>,
     /// The values of parameters that do not change.
     fixed: BTreeMap<ParameterId, Rational>,
-    /// The negated cost, which is maximised.
+    /// The negated cost, which is maximised. `earliness`, the negated sum of all times of actions,
+    /// is maximised after that.
     gain: Vec<(VariableId, Rational)>,
     /// The negated cost as a variable, to fix it at its optimum.
     gained: VariableId,

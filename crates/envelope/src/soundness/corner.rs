@@ -101,7 +101,7 @@ impl Corner {
 /// Limit on doublings of values in the search for values that are large enough.
 const MOST_DOUBLINGS: usize = 256;
 
-/// The factor of a parameter in an expression.
+/// Returns the factor of a parameter in an expression.
 fn coefficient_of(expression: &Linear, parameter: ParameterId) -> Linear {
     let mut coefficient = Linear::default();
     if let Some(constant) = expression.parameters.get(parameter) {

@@ -38,7 +38,7 @@ impl<'a> SoundBox<'a> {
         }))
     }
 
-    /// The box.
+    /// Returns the box.
     pub fn envelope(&self) -> &DecoupledEnvelope {
         &self.envelope
     }

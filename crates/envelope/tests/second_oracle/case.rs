@@ -42,7 +42,7 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// The times of the groups of timed initials.
+    /// Returns the times of the groups of timed initials.
     pub(crate) fn timed_times(&self) -> Vec<Rational> {
         let mut times: Vec<_> = self.problem.timed.iter().map(|t| t.time.clone()).collect();
         times.sort();
@@ -166,7 +166,7 @@ pub(crate) fn node_of(plan: &StnPlan, node: Node) -> NodeId {
     found.expect("the plan has all its nodes").0
 }
 
-/// The instance that a node belongs to.
+/// Returns the instance that a node belongs to.
 pub(crate) fn instance_of(node: Node) -> Option<InstanceId> {
     match node {
         Node::Start(id) | Node::End(id) | Node::Instant(id) => Some(id),
@@ -263,7 +263,7 @@ pub(crate) fn show(envelope: &DecoupledEnvelope) -> String {
     parts.join(" x ")
 }
 
-/// The box with these intervals.
+/// Returns the box with these intervals.
 pub(crate) fn box_of(intervals: Vec<Interval>) -> DecoupledEnvelope {
     let zeros = intervals.iter().map(|_| Rational::ZERO).collect();
     let given = intervals.into_iter().enumerate();

@@ -464,7 +464,7 @@ impl Contest<'_> {
         Ok(())
     }
 
-    /// The same without enumerating corners and impossible orders, as for large plans.
+    /// Compares the verdicts without enumerating corners and impossible orders, as for large plans.
     fn compare_with_shortcuts(
         &mut self,
         envelope: &DecoupledEnvelope,

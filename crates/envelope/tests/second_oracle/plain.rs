@@ -97,7 +97,7 @@ pub(crate) fn without_schedule(
     })
 }
 
-/// All combinations of ends.
+/// Returns all combinations of ends.
 pub(crate) fn corners(envelope: &DecoupledEnvelope) -> Vec<Valuation> {
     combinations(envelope.intervals(), &|interval| {
         let mut ends = vec![lower(interval), upper(interval)];
@@ -164,7 +164,7 @@ fn samples(interval: &Interval) -> Vec<Rational> {
     samples
 }
 
-/// The parameters in products.
+/// Returns the parameters in products.
 fn factors(polynomial: &Polynomial) -> BTreeSet<usize> {
     let products = polynomial.products();
     let symbols = products.flat_map(|factors| factors.iter());

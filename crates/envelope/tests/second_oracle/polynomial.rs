@@ -75,13 +75,13 @@ impl Polynomial {
         }
     }
 
-    /// The products of two or more factors.
+    /// Returns the products of two or more factors.
     pub(crate) fn products(&self) -> impl Iterator<Item = &[Symbol]> {
         let products = self.0.keys().map(Vec::as_slice);
         products.filter(|factors| factors.len() > 1)
     }
 
-    /// The constant and the coefficient of each symbol; `None` if there is a product.
+    /// Returns the constant and the coefficient of each symbol; `None` if there is a product.
     pub(crate) fn linear(&self) -> Option<(Rational, Vec<(Symbol, Rational)>)> {
         let mut constant = Rational::ZERO;
         let mut terms = Vec::new();

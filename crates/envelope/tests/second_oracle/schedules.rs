@@ -114,7 +114,7 @@ fn edges(plan: &ParametrizedPlan) -> Vec<Edge> {
     edges
 }
 
-/// The least of `multiple` times a value in the interval.
+/// Returns the least of `multiple` times a value in the interval.
 fn least(interval: &Interval, multiple: i64) -> Extended {
     let end = |end: &End, infinite: i64| match end.value() {
         Some(value) => (0, value.clone()),

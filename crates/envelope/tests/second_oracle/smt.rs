@@ -244,7 +244,8 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// Each node has a position, each position a node, and times are ordered by position.
+    /// Requires that each node has a position, each position a node, and that times are ordered by
+    /// position.
     fn positions(&mut self) {
         let count = self.count();
         self.line("(define-fun tau0 () Real 0.0)");

@@ -192,7 +192,7 @@ impl System {
     }
 }
 
-/// The bound as a polynomial, if there is one.
+/// Returns the bound as a polynomial, if there is one.
 fn bound(bound: &Bound) -> Option<Polynomial> {
     match bound {
         Bound::Infinite => None,

@@ -136,7 +136,7 @@ impl Named {
         ))
     }
 
-    /// The distribution with its times multiplied by `unit`.
+    /// Returns the distribution with its times multiplied by `unit`.
     fn scaled(&self, unit: &Rational) -> Duration {
         let per = |rate: &Rational| rate.reciprocal().unwrap_or_default() * unit;
         match self.kind {

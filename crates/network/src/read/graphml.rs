@@ -87,7 +87,7 @@ fn graph<'e>(elements: &'e [Element], report: &mut Report) -> Option<&'e Element
     }
 }
 
-/// The value under a key.
+/// Returns the value under a key.
 fn data<'e>(element: &'e Element, key: &str) -> Option<&'e Element> {
     let found = element
         .named("data")
@@ -187,7 +187,7 @@ impl Edge {
         })
     }
 
-    /// The value in one of the two cases of a link that ends at a node.
+    /// Returns the value in one of the two cases of a link that ends at a node.
     fn in_case(&self, case: Case) -> Option<&Rational> {
         let (own, _, value) = self.labelled.as_ref()?;
         (*own == case).then_some(value)

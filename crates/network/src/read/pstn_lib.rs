@@ -216,7 +216,7 @@ fn read_correlation(
     }
 }
 
-/// The link from one point to another, if its duration is normally distributed.
+/// Returns the link from one point to another, if its duration is normally distributed.
 fn normal_link(builder: &Builder, source: NodeId, sink: NodeId) -> Option<LinkId> {
     let link = builder.link_ending_at(sink)?;
     let is_normal = matches!(builder.duration_of(link), Some(Duration::Normal { .. }));

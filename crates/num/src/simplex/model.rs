@@ -4,8 +4,8 @@ use super::{Simplex, VariableId};
 use crate::{Delta, Rational};
 
 impl Simplex {
-    /// The variable's value in the assignment. After a successful [`Simplex::check`] all bounds
-    /// hold in the assignment.
+    /// Returns the variable's value in the assignment. After a successful [`Simplex::check`] all
+    /// bounds hold in the assignment.
     pub fn value(&self, variable: VariableId) -> &Delta {
         &self.variables[variable.index()].value
     }

@@ -52,12 +52,12 @@ impl Tableau {
         self.rows[variable.index()].is_some()
     }
 
-    /// All basic variables, in ascending order.
+    /// Returns all basic variables, in ascending order.
     pub(super) fn basic(&self) -> impl Iterator<Item = VariableId> {
         self.basic.iter().copied()
     }
 
-    /// The row of a basic variable.
+    /// Returns the row of a basic variable.
     pub(super) fn row(&self, basic: VariableId) -> &Row {
         self.rows[basic.index()]
             .as_ref()
@@ -139,14 +139,14 @@ impl Tableau {
     }
 }
 
-/// `row += factor · other`.
+/// Computes `row += factor · other`.
 fn add_multiple(row: &mut Row, other: &Row, factor: &Rational) {
     for (term, coefficient) in other {
         add_term(row, *term, &(coefficient * factor));
     }
 }
 
-/// `row += coefficient · term`.
+/// Computes `row += coefficient · term`.
 fn add_term(row: &mut Row, term: VariableId, coefficient: &Rational) {
     let sum = match row.get(&term) {
         Some(old) => old + coefficient,

@@ -16,7 +16,7 @@ struct Inequality {
 }
 
 impl Inequality {
-    /// `factor · self + other_factor · other`.
+    /// Returns `factor · self + other_factor · other`.
     fn combined(&self, factor: &Rational, other: &Self, other_factor: &Rational) -> Self {
         let pairs = self.coefficients.iter().zip(&other.coefficients);
         Self {
@@ -37,7 +37,7 @@ impl Inequality {
     }
 }
 
-/// The inequalities that remain when `variable` is eliminated.
+/// Returns the inequalities that remain when `variable` is eliminated.
 fn eliminated(system: &[Inequality], variable: usize) -> Vec<Inequality> {
     let mut rest = Vec::new();
     for upper in system {
@@ -84,7 +84,7 @@ fn is_feasible(system: &[Inequality], variable_count: usize) -> bool {
     rest.iter().all(|left| left.bound >= Delta::ZERO)
 }
 
-/// The supremum of `Σ objective[i] · x_i`, of a system that has a solution.
+/// Returns the supremum of `Σ objective[i] · x_i`, of a system that has a solution.
 fn supremum(system: &[Inequality], objective: &[Rational]) -> Optimum {
     let count = objective.len();
     let widened = |coefficients: &[Rational], last: i64| {

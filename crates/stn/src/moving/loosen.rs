@@ -79,7 +79,7 @@ impl<W: Weight> MovingWindows<W> {
         self.sources[node.index()][end(direction) as usize]
     }
 
-    /// The node's own limit as a distance.
+    /// Returns the node's own limit as a distance.
     fn limit(&self, direction: Direction, node: NodeId) -> Option<W> {
         let limit = self.limits[node.index()][end(direction) as usize].as_ref()?;
         Some(match direction {

@@ -241,7 +241,7 @@ impl<W: Weight> Dispatchable<W> {
         edges.into_iter().map(|id| self.graph.step(id)).collect()
     }
 
-    /// The requirements among steps, in order.
+    /// Returns the requirements among steps, in order.
     pub fn requirements_of(steps: &[Step<W>]) -> impl Iterator<Item = crate::ConstraintId> {
         steps.iter().filter_map(|step| match step.ground {
             Ground::Requirement(id) => Some(id),

@@ -101,12 +101,12 @@ impl<W: Weight> Dispatcher<W> {
         }
     }
 
-    /// The dispatchable network that it executes.
+    /// Returns the dispatchable network that it executes.
     pub fn form(&self) -> &Dispatchable<W> {
         &self.form
     }
 
-    /// The time at which a node happened.
+    /// Returns the time at which a node happened.
     pub fn happened(&self, node: NodeId) -> Option<&W> {
         self.happened[node.index()].as_ref()
     }

@@ -136,7 +136,7 @@ struct Frame<W> {
 }
 
 impl<W: Weight> Frame<W> {
-    /// The way from a node that has been reached.
+    /// Returns the way from a node that has been reached.
     fn at(&self, node: NodeId) -> &Reached<W> {
         self.reached.get(node).expect("it has been reached")
     }

@@ -161,7 +161,7 @@ impl<W: Weight> Graph<W> {
         graph
     }
 
-    /// The lower-case and the upper-case edge of a link.
+    /// Returns the lower-case and the upper-case edge of a link.
     pub(super) fn edges_of(&self, network: &UncertainNetwork<W>, link: LinkId) -> [EdgeId; 2] {
         let first = self.given - 2 * (network.links.len() - link.index());
         [first, first + 1]

@@ -48,7 +48,8 @@ impl Order {
         order
     }
 
-    /// Appends a node to a chain whose last node precedes it, if there is one.
+    /// Appends a node to a chain whose last node precedes it, or begins a new chain if the limit
+    /// allows.
     fn place(
         &mut self,
         node: usize,

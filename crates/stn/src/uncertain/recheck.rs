@@ -55,7 +55,7 @@ impl<W: Weight> Recheck<W> {
         })
     }
 
-    /// The network, with the bounds accepted last.
+    /// Returns the network, with the bounds accepted last.
     pub fn network(&self) -> &UncertainNetwork<W> {
         &self.network
     }

@@ -149,7 +149,7 @@ impl Told {
         })
     }
 
-    /// The parts of a way.
+    /// Returns the parts of a way.
     fn spelt_out<W: Weight>(
         &mut self,
         graph: &Graph<W>,

@@ -28,7 +28,7 @@ impl Spoiler {
         Self { network, origin }
     }
 
-    /// The network.
+    /// Returns the network.
     pub fn network(&self) -> &UncertainNetwork {
         &self.network
     }
@@ -111,7 +111,8 @@ impl Spoiler {
             .unwrap_or(true)
     }
 
-    /// The same with another number type; `None` if some number cannot be represented in it.
+    /// Computes [`is_lost`](Self::is_lost) with another number type; `None` if some number cannot
+    /// be represented in it.
     fn is_lost_in<W: Weight>(
         &self,
         now: &Rational,

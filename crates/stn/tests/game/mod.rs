@@ -2,7 +2,7 @@
 //!
 //! At each time the world first decides which links end, then the executor executes points one
 //! after the other. Links that these activate can end at once if they may have duration 0. The
-//! executor wins if all points happen before the horizon and every requirement holds.
+//! executor wins if all points happen by the horizon and every requirement holds.
 
 use std::collections::BTreeMap;
 
@@ -115,7 +115,7 @@ impl Game<'_> {
             .collect()
     }
 
-    /// Tries the world's choices of which of these links end now.
+    /// Returns `true` if the executor wins for every choice of which of these links end now.
     fn world_moves(&mut self, now: i64, times: &[Option<i64>], links: &[usize]) -> bool {
         let Some((&first, rest)) = links.split_first() else {
             return self.executor_moves(now, times);

@@ -67,7 +67,7 @@ impl Compiler<'_> {
         Ok(None)
     }
 
-    /// The non-trivial guards read on arrival at a node.
+    /// Returns the non-trivial guards read on arrival at a node.
     pub(super) fn guards_read_at(
         &self,
         node: NodeId,

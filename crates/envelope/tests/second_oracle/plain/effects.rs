@@ -28,7 +28,7 @@ pub(super) struct Guard<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// The guards read at a node.
+    /// Returns the guards read at a node.
     pub(super) fn guards(&self, world: &World, node: usize) -> Result<Vec<Guard<'a>>, Trouble> {
         let mut guards = Vec::new();
         let duration = self.context(world, node).duration;

@@ -135,7 +135,7 @@ impl Encoder<'_> {
         })
     }
 
-    /// The value of an expression of fluents that nothing changes.
+    /// Returns the value of an expression of fluents that nothing changes.
     fn constant(&self, expression: &Expression) -> Result<Rational, NotEncoded> {
         let initial = &self.task.initial().values;
         let value = expression.evaluate(&mut |leaf| match leaf {

@@ -126,7 +126,7 @@ impl<'a> Encoder<'a> {
         Ok(format!("(ite {runs} (* {rate} (- {until} tau{from})) 0.0)"))
     }
 
-    /// The effects of a node with the formula for whether they happen at position `k`.
+    /// Returns the effects of a node, each with the formula that it happens at position `k`.
     fn changes(&self, node: usize, k: usize) -> Result<Vec<(String, &'a Change)>, NotEncoded> {
         if self.at(node, k) == "false" {
             return Ok(Vec::new());

@@ -269,8 +269,8 @@ impl<'a> Course<'a> {
         oblige_nature(self.obligations, requirement, assumptions, broken);
     }
 
-    /// [`demand`](Self::demand) for the nominal course, which must stay the same. Refused if the
-    /// order of coinciding turns is unknown.
+    /// Adds the requirement ([`demand`](Self::demand)) that the course stays as in the nominal
+    /// schedule. Refused if the order of coinciding turns is unknown.
     fn expect(&mut self, course: &str, broken: Alternatives) -> Result<(), Refusal> {
         if self.is_nominally(&broken) {
             return Err(self.obstacle(

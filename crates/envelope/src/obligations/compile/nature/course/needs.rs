@@ -30,9 +30,9 @@ impl Course<'_> {
         self.demand_conditions(&begins)
     }
 
-    /// The same before anything happens at this moment. With `is_next`, the moment is the next
-    /// happening, and an action that ends there needs nothing any more. Conditions on all states
-    /// are only required after everything has happened.
+    /// Requires the conditions at this moment before anything happens. With `is_next`, the moment
+    /// is the next happening, and an action that ends there needs nothing any more. Conditions on
+    /// all states are only required after everything has happened.
     pub(super) fn demand_conditions_on_arrival(&mut self, is_next: bool) -> Result<(), Refusal> {
         let plan = &self.compiler.plan.plan;
         let next = self.next;
