@@ -380,7 +380,7 @@ impl Oracle {
         moved: Option<BoxEnd>,
         trusted: Option<BoxEnd>,
     ) -> Result<Option<Reason>, Refusal> {
-        // Soundness comes first. If a sound box were rejected as infeasible afterwards, the
+        // Soundness comes first. If a feasible box were rejected as unsound afterwards, the
         // networks of the feasibility check would be ahead of the accepted box.
         if self.asked == Asked::All
             && let Some(reason) = self.unsound(envelope, trusted)?
