@@ -1,4 +1,4 @@
-//! By how much everything may deviate at once.
+//! Greatest deviation that all parameters tolerate at once.
 
 use std::ops::ControlFlow;
 
@@ -9,36 +9,36 @@ use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 use crate::ray::Ray;
 
-/// Deviations are looked for up to ten times the nominal value.
+/// Greatest deviation that is searched, as a multiple of the nominal value.
 const MOST: i64 = 10;
 
-/// A share of the nominal values by which all of them may deviate at once.
+/// Share of the nominal values by which all parameters may deviate at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Share {
-    /// By so much they may.
+    /// Deviation that is guaranteed to work.
     pub inside: Rational,
-    /// By more than this they may not; the same as `inside` where that is known exactly. `None` if
-    /// they may by as much as was asked.
+    /// Upper bound on the deviation; the same as `inside` if that is exact. `None` if the greatest
+    /// searched deviation works.
     pub outside: Option<Rational>,
 }
 
-/// By how much all parameters may deviate from their nominal values at once, in relation to these,
-/// each within its natural range. A parameter whose nominal value is 0 does not move.
+/// Deviations that all parameters tolerate at once, relative to their nominal values, each within
+/// its natural range. A parameter with nominal value 0 does not move.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Balance {
     /// All upwards.
     pub more: Share,
-    /// All downwards; `None` above 1 for what cannot be negative.
+    /// All downwards; a parameter that cannot be negative stops at a share of 1.
     pub less: Share,
     /// Each in any direction.
     pub either: Share,
 }
 
-/// By how much everything may deviate at once; `None` if the plan does not even work at its nominal
-/// values, if nothing is left open, or if `flow` ended it.
+/// Computes the deviation that all parameters tolerate at once. Returns `None` if the plan does not
+/// work at its nominal values, if no parameter is left open, or if `flow` ended the search.
 ///
 /// # Errors
-/// When there are too many cases to tell apart.
+/// If there are too many cases to decide.
 pub fn balance(
     oracle: &mut Oracle,
     flow: &mut dyn FnMut() -> ControlFlow<()>,

@@ -1,19 +1,18 @@
 //! The largest box inside an envelope, with a proof that there is no larger one.
 //!
-//! The boxes inside an envelope are found from outside. What the oracle has against a box that it
-//! refuses is a [`Cut`]: one linear inequality in the ends of all boxes, or several of which one
-//! holds. The best box that satisfies all cuts known so far is at least as good as the best one
-//! inside the envelope; the first such box that the oracle accepts is the best one, and the cuts
-//! prove it.
+//! The search approaches the envelope from outside. If the oracle refuses a box, the reason is a
+//! [`Cut`]: a linear inequality in the ends of all boxes, or several inequalities, at least one of which
+//! holds. The best box that satisfies all known cuts is at least as good as the best one inside the
+//! envelope. The first such box that the oracle accepts is the best one, and the cuts prove it.
 //!
-//! - [`Objective::LeastSlack`]: all ends move out together, in relation to their nominal values,
-//!   until one is stopped; then the others go on. No linear program is needed ([`fill`]).
+//! - [`Objective::LeastSlack`]: all ends move out together, relative to their nominal values, until
+//!   one is stopped; the others continue. No linear program is needed ([`fill`]).
 //! - [`Objective::Widths`]: a linear program over the cuts, with branch and bound where a cut has
 //!   alternatives ([`branch`]).
-//! - [`Objective::Volume`]: the same, where each linear program is about tangents of the logarithm
+//! - [`Objective::Volume`]: the same, with linear programs over tangents of the logarithm
 //!   ([`volume`]).
-//! - [`Objective::Probability`]: the same with the logarithm of a probability, and with cases for what
-//!   has a probability of its own ([`probability`]).
+//! - [`Objective::Probability`]: the same with the logarithm of a probability, and with cases for
+//!   values that have a probability of their own ([`probability`]).
 
 mod approach;
 mod barrier;
@@ -55,28 +54,28 @@ pub use volume::foot as volume_foot;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Objective {
-    /// The least deviation, in relation to the nominal value, for which any end has room; of the
-    /// boxes in which that is greatest, the second least, and so on.
+    /// The least slack of any end (its deviation relative to the nominal value); of the boxes with
+    /// the greatest least slack, the second least slack, and so on.
     #[default]
     LeastSlack,
     /// The sum of the widths of all intervals, each times its parameter's weight.
     Widths,
-    /// The product of the widths of all intervals, each in relation to its nominal value and raised
-    /// to its parameter's weight. To each a millionth is added first, so that the product is not 0
-    /// wherever one duration cannot deviate at all. The value is the logarithm of the product, and
-    /// a box is the best one if no other has more than a millionth more.
+    /// The product of the widths of all intervals, each relative to its nominal value and raised to
+    /// its parameter's weight. A millionth is added to each width first, so that the product is not
+    /// 0 if one duration cannot deviate at all. The value is the logarithm of the product. A box
+    /// counts as best if no other is better by more than a millionth.
     Volume,
     /// The probability that independent durations, each with its distribution
-    /// ([`BestSettings::chances`]), all stay inside. The value is the logarithm; [`NEVER`] stands for a
-    /// probability of 0. A box is the best one if no other has more than a millionth more.
+    /// ([`BestSettings::chances`]), all stay inside. The value is the logarithm; [`NEVER`] replaces
+    /// the logarithm of 0. A box counts as best if no other is better by more than a millionth.
     Probability,
 }
 
-/// What a box without any probability counts, in place of the logarithm.
+/// Value of a box with probability 0, in place of the logarithm.
 pub const NEVER: i64 = -1_000_000;
 
 impl Objective {
-    /// Its name in documents and on the command line.
+    /// Returns its name in documents and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::LeastSlack => "least-slack",
@@ -93,22 +92,22 @@ impl fmt::Display for Objective {
     }
 }
 
-/// Which box is wanted.
+/// Settings of [`best()`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BestSettings {
     /// The objective.
     pub objective: Objective,
-    /// Whether both ends of an interval are equally far from the nominal value.
+    /// `true` if both ends of an interval are equally far from the nominal value.
     pub symmetric: bool,
-    /// Ends count up to a deviation of so many times the nominal value.
+    /// Greatest deviation that counts, as a multiple of the nominal value.
     pub most: Rational,
-    /// For [`Objective::Probability`]: how each parameter is distributed, in their order. One without
-    /// a distribution, as are all that are missing, always has its nominal value.
+    /// For [`Objective::Probability`]: the distribution of each parameter, in their order. A
+    /// parameter without a distribution, or missing in the list, always has its nominal value.
     pub chances: Vec<Option<Chance>>,
 }
 
 impl Default for BestSettings {
-    /// Least slack, ends counted up to nine times the nominal value away from it.
+    /// Least slack, with deviations up to nine times the nominal value.
     fn default() -> Self {
         Self {
             objective: Objective::default(),
@@ -119,8 +118,8 @@ impl Default for BestSettings {
     }
 }
 
-/// A box is the best one by an objective that is a logarithm if no other is worth more than so much
-/// more: a millionth.
+/// Returns the tolerance of objectives that are logarithms: a box counts as best if no other is
+/// better by more than a millionth.
 pub(crate) fn tolerance() -> Rational {
     Rational::new(1, 1_000_000)
 }
@@ -128,54 +127,54 @@ pub(crate) fn tolerance() -> Rational {
 /// The result of [`best`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct BestRun {
-    /// The box; `Err` if the plan does not even work at the nominal values.
+    /// The box; `Err` if the plan does not work at the nominal values.
     pub envelope: Result<DecoupledEnvelope, Objection>,
     /// The value of the objective: the least slack, the sum of widths, or the logarithm of the
     /// volume, which is rounded down to a billionth.
     pub value: Rational,
     /// An upper bound on the objective of all boxes; equal to `value` if the box is proved to be
-    /// the largest, but for at most a millionth where the objective is a logarithm.
+    /// the largest, except for at most a millionth if the objective is a logarithm.
     pub bound: Rational,
-    /// Whether there is no better box. With [`Objective::LeastSlack`] that also says that the
-    /// second least slack is the greatest there can be, and so on.
+    /// `true` if there is no better box. With [`Objective::LeastSlack`], the second least slack is
+    /// also proven to be the greatest possible, and so on.
     pub is_proved: bool,
     /// The number of boxes checked.
     pub checks: usize,
-    /// Whether the caller ended the search.
+    /// `true` if the caller ended the search.
     pub is_cancelled: bool,
-    /// Why there is no better box.
+    /// Proof that there is no better box.
     pub proof: BestProof,
 }
 
-/// Why no box is better.
+/// Proof that no box is better.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BestProof {
     /// Cuts: inequalities that all boxes inside the envelope satisfy.
     pub cuts: Vec<Cut>,
-    /// How the best value follows.
+    /// Derivation of the best value from the cuts.
     pub reasons: Reasons,
-    /// What can be moved, and how far it is in the best box; none without a box.
+    /// Variables with their values in the best box; empty if there is no box.
     pub variables: Vec<Moved>,
 }
 
-/// What moves one end, or both ends of an interval if boxes are symmetric.
+/// Variable that moves one end, or both ends of an interval if boxes are symmetric.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Moved {
     /// The ends.
     pub ends: Vec<BoxEnd>,
-    /// The size by which its slack is measured.
+    /// Size that its slack is relative to.
     pub scale: Rational,
-    /// How far from the nominal value it can move the ends at most.
+    /// Greatest distance from the nominal value to which it can move the ends.
     pub most: Rational,
-    /// How far it moves them in the best box. An end that reaches as far as counts, and that
-    /// nothing stops, is infinite in the box of the answer.
+    /// Distance from the nominal value in the best box. An end at the limit that nothing stops is
+    /// infinite in the returned box.
     pub value: Rational,
 }
 
-/// How the best value follows from the cuts.
+/// Derivation of the best value from the cuts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reasons {
-    /// For each variable, in which order they were stopped, and by what.
+    /// The variables in the order in which they were stopped, each with the cut that stopped it.
     Levels(Vec<Stopped>),
     /// A tree of cases, the first its root.
     Tree(Vec<Case>),
@@ -187,21 +186,21 @@ impl Default for Reasons {
     }
 }
 
-/// A variable that can have no more slack unless another one with no more slack gets less.
+/// Variable that can only gain slack if another one with no more slack loses some.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stopped {
     /// The ends that the variable moves.
     pub ends: Vec<BoxEnd>,
-    /// How far, in relation to the nominal value.
+    /// Deviation relative to the nominal value.
     pub slack: Rational,
-    /// The cut that stops it, by position; `None` if its own range or the limit on counting does.
+    /// The cut that stops it, by position; `None` if its own range or the greatest deviation does.
     pub cut: Option<usize>,
 }
 
-/// One case of a tree: how a bound on the objective follows, or the cases of which one is true.
+/// One case of a tree: a bound on the objective, or a distinction of cases.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Case {
-    /// One row of the cut at this position holds: for each, the position of the case in the tree.
+    /// One row of the cut at this position holds: one case for each row.
     Either {
         /// The cut.
         cut: usize,
@@ -213,15 +212,15 @@ pub enum Case {
     Bounded {
         /// The bounds.
         multipliers: Vec<(Source, Rational)>,
-        /// For an objective that is no sum, of each parameter the slope of the tangent that stands
-        /// for it; for a probability, that for its lower end and that for its upper one.
+        /// For an objective that is not linear, the slope of the tangent of each parameter; for a
+        /// probability, those of its lower end and of its upper one.
         slopes: Vec<Rational>,
-        /// For a probability, of each parameter where that tangent touches.
+        /// For a probability, the point of contact of each parameter's tangent.
         touches: Vec<Touch>,
-        /// Whether there is no box in this case.
+        /// `true` if there is no box in this case.
         is_impossible: bool,
     },
-    /// The variable is less than this, or not: for each, the position of the case in the tree.
+    /// The variable is less than this, or not: one case for each.
     Split {
         /// The variable.
         variable: usize,
@@ -237,9 +236,9 @@ pub enum Case {
 pub enum Source {
     /// A row of a cut: position of the cut, position of the row.
     Row(usize, usize),
-    /// The most that a variable can be.
+    /// The upper bound of a variable.
     Most(usize),
-    /// That a variable is not negative.
+    /// The lower bound 0 of a variable.
     Least(usize),
 }
 
@@ -252,14 +251,14 @@ pub struct BestStep<'a> {
     pub checks: usize,
 }
 
-/// How ends move: each variable moves one end, or, if boxes are symmetric, both of a parameter.
+/// Variables of the search: each moves one end, or both ends of a parameter if boxes are symmetric.
 #[derive(Clone, Debug)]
 pub(crate) struct Variables {
-    /// The ends that each moves.
+    /// The ends moved by each variable.
     pub(crate) ends: Vec<Vec<BoxEnd>>,
-    /// The size of the nominal value by which its slack is measured.
+    /// Size of the nominal value that its slack is relative to.
     pub(crate) scales: Vec<Rational>,
-    /// How far it can move the ends at most.
+    /// Greatest distance to which it can move the ends.
     pub(crate) most: Vec<Rational>,
 }
 
@@ -299,7 +298,7 @@ impl Variables {
         variables
     }
 
-    /// What moves in a box.
+    /// Returns the variables with their values in a box.
     fn moved(&self, nominal: &DecoupledEnvelope, envelope: &DecoupledEnvelope) -> Vec<Moved> {
         let all = self.ends.iter().zip(&self.scales).zip(&self.most);
         all.map(|((ends, scale), most)| {
@@ -314,7 +313,7 @@ impl Variables {
         .collect()
     }
 
-    /// The least slack of a box, up to what counts.
+    /// Returns the least slack of a box, up to the greatest deviation.
     fn least_slack(
         &self,
         nominal: &DecoupledEnvelope,
@@ -332,7 +331,7 @@ impl Variables {
         self.ends.len()
     }
 
-    /// The box in which the variables have these values.
+    /// Returns the box for these values of the variables.
     pub(crate) fn envelope(
         &self,
         plan: &ParametrizedPlan,
@@ -348,7 +347,7 @@ impl Variables {
         envelope
     }
 
-    /// A row as `Σ factor · variable <= bound`.
+    /// Converts a row to `Σ factor · variable <= bound`.
     pub(crate) fn row(
         &self,
         plan: &ParametrizedPlan,
@@ -368,14 +367,14 @@ impl Variables {
     }
 }
 
-/// The best box, as the settings say.
+/// Searches for the best box by these settings.
 ///
-/// `on_step` is called at every box checked, and can end the search at any moment: then the box is
-/// the best one found by then, and `bound` says how much better another could be. `start` is a box
-/// inside the envelope to begin with, if one is known.
+/// `on_step` is called at every box checked, and can end the search at any moment. The result is
+/// then the best box found so far, and `bound` limits how much better another could be. `start` is
+/// a box inside the envelope to begin with, if one is known.
 ///
 /// # Errors
-/// When nothing can be told of the nominal values.
+/// If nothing can be decided about the nominal values.
 pub fn best(
     oracle: &mut Oracle,
     settings: &BestSettings,
@@ -414,7 +413,7 @@ pub fn best(
         }
     };
     if run.is_cancelled && settings.objective == Objective::LeastSlack && !settings.symmetric {
-        // A search that ends early may know less than it began with.
+        // A search that ends early may be worse than the start.
         if let (Some(start), Ok(envelope)) = (start, &mut run.envelope)
             && let Some(slack) = variables.least_slack(&nominal, start)
             && slack >= run.value
@@ -432,7 +431,7 @@ pub fn best(
     Ok(run)
 }
 
-/// The box with those ends infinite that are as far out as counts, if nothing stops them.
+/// Makes the ends at the greatest deviation infinite, if nothing stops them.
 fn let_go(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,
@@ -457,7 +456,7 @@ fn let_go(
             }
         }
         if let [end] = ends[..] {
-            // What cannot be told stays as it is.
+            // An undecided end stays where it is.
             let _ = oracle.try_reach(end, None);
         }
     }

@@ -1,9 +1,9 @@
 //! Dynamic and strong controllability of a plan in a box.
 //!
-//! The plan's network with contingent links for what the world decides on
-//! ([`ParametrizedPlan::uncertain_network`]), asked by `elbowroom-stn`. That each schedule is valid
-//! is the business of [`Soundness`](crate::soundness::Soundness), as with every guarantee; a plan
-//! that is controllable too is dispatched along one of them, whatever happens inside the box.
+//! `elbowroom-stn` checks the plan's network with contingent links for the durations that the world
+//! decides on ([`ParametrizedPlan::uncertain_network`]). As with every guarantee,
+//! [`Soundness`](crate::soundness::Soundness) checks that each schedule is valid. A controllable
+//! plan is dispatched along one of these schedules, whatever happens inside the box.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, ParameterId, Parametrized
 use elbowroom_stn::Weight;
 use elbowroom_stn::uncertain::{Conflict, Ground, LinkId, Recheck, StrongConflict, Unit};
 
-/// A conflict that makes a network not dynamically controllable: no executor can satisfy it without
+/// Conflict that makes a network not dynamically controllable: no executor can satisfy it without
 /// knowing values before they are observed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ControlConflict {
@@ -33,7 +33,7 @@ pub enum ControlGround {
 }
 
 impl ControlConflict {
-    /// The ends of the box that are taken into account, in order and without repetition.
+    /// Returns the ends of the box that are in the conflict, in order and without repetition.
     pub fn ends(&self) -> Vec<BoxEnd> {
         let end = |ground: &ControlGround| match *ground {
             ControlGround::Constraint(_) => None,
@@ -59,8 +59,8 @@ impl fmt::Display for ControlConflict {
     }
 }
 
-/// Decides on dynamic controllability. It keeps the network of the last box that was found
-/// controllable, and checks a box that differs from it in one parameter only where that matters.
+/// Check of dynamic controllability. It keeps the network of the last controllable box, and checks
+/// a box that differs from it in one parameter incrementally.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DynamicControl {
     kept: Option<Kept>,
@@ -73,13 +73,13 @@ struct Kept {
     network: PlanNetwork,
     unit: Unit,
     check: Recheck<i64>,
-    /// For each parameter, the link whose bounds are its interval; `None` if it has to do with
-    /// anything else too.
+    /// For each parameter, the link whose bounds are its interval; `None` if the parameter is also
+    /// used elsewhere.
     links: Vec<Option<LinkId>>,
 }
 
 impl DynamicControl {
-    /// Why the plan cannot be executed by one who learns each value only as it comes about.
+    /// Returns the reason why the plan is not dynamically controllable in the box; `None` if it is.
     pub(crate) fn conflict(
         &mut self,
         plan: &ParametrizedPlan,
@@ -119,8 +119,8 @@ impl DynamicControl {
 }
 
 impl Kept {
-    /// Checks a box that differs from the kept one in the interval of one link alone; if nothing
-    /// stands against it, it is the kept one from now on.
+    /// Checks a box that differs from the kept one in the interval of one link only. If it is
+    /// controllable, it becomes the kept one.
     fn recheck(&mut self, envelope: &DecoupledEnvelope) -> Rechecked {
         let pairs = self.envelope.intervals().iter().zip(envelope.intervals());
         let mut moved = pairs.enumerate().filter(|(_, (old, new))| old != new);
@@ -140,7 +140,7 @@ impl Kept {
         }
     }
 
-    /// The bounds of a link in whole numbers, if it can have these.
+    /// Returns the bounds of a link in whole numbers, if they can be represented.
     fn bounds(&self, interval: &Interval) -> Option<(i64, Option<i64>)> {
         let lower = self.unit.whole(interval.lower.value()?)?;
         let upper = match interval.upper.value() {
@@ -154,13 +154,14 @@ impl Kept {
 
 /// The result of an incremental controllability check.
 enum Rechecked {
-    /// Nothing: the box differs in more than one link.
+    /// Unknown: the box differs in more than one link.
     Unknown,
     Controllable,
     Refused(Vec<Ground>),
 }
 
-/// For each parameter, the link whose bounds are its interval and that has all to do with it.
+/// Returns, for each parameter, the link whose bounds are its interval, provided that the parameter
+/// is not used elsewhere.
 fn links_of(plan: &ParametrizedPlan, network: &PlanNetwork) -> Vec<Option<LinkId>> {
     let mut uses = vec![0; plan.parameters.len()];
     for constraint in &plan.plan.constraints {
@@ -181,7 +182,7 @@ fn links_of(plan: &ParametrizedPlan, network: &PlanNetwork) -> Vec<Option<LinkId
     links
 }
 
-/// The reason why no fixed schedule works for all values.
+/// Returns the reason why no fixed schedule works for all values.
 pub(crate) fn strong_conflict(
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,
@@ -194,8 +195,8 @@ pub(crate) fn strong_conflict(
     Some(in_the_plan(plan, &network, &grounds))
 }
 
-/// A number greater than the finite bounds on any cycle of the network for times fixed in advance
-/// add up to. `None` if nothing satisfies the network.
+/// Returns a number that is greater than the sum of the finite bounds on any cycle of the network
+/// for fixed times. `None` if nothing satisfies the network.
 pub(crate) fn beyond_all_bounds(
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,
@@ -207,7 +208,7 @@ pub(crate) fn beyond_all_bounds(
         link.lower.abs() + upper.unwrap_or_default()
     });
     let links: Rational = links.fold(Rational::ZERO, |sum, own| sum + own);
-    // Each requirement occurs on a simple cycle at most once, with each link at most once.
+    // Each requirement occurs on a simple cycle at most once, and each link at most once with it.
     let bounds = network.requirements().constraints().iter();
     let all = bounds.fold(Rational::ONE, |sum, own| {
         sum + own.bound.abs() + links.clone()

@@ -1,4 +1,4 @@
-//! What a refused box says about other boxes: [`Cut`].
+//! Linear inequalities on all boxes, learnt from a refused box: [`Cut`].
 
 use std::collections::BTreeMap;
 
@@ -8,82 +8,80 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Origin, Side};
 use crate::row::Row;
 use crate::soundness::Broken;
 
-/// At least one of these rows holds in every box inside the envelope, and none of them in the box
-/// that was refused.
+/// Rows, at least one of which holds in every box inside the envelope, and none in the refused box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cut {
-    /// The alternatives; mostly one.
+    /// The alternatives; usually one.
     pub rows: Vec<Row>,
-    /// Why every box inside the envelope satisfies one of them.
+    /// Proof that every box inside the envelope satisfies one of them.
     pub ground: Ground,
 }
 
-/// Why one of the rows of a [`Cut`] holds in every box inside the envelope.
+/// Proof that one of the rows of a [`Cut`] holds in every box inside the envelope.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ground {
-    /// The bounds of these constraints, which follow each other in a circle, add up to less than
-    /// nothing for some values in a box that breaks the row: these have no schedule.
+    /// The bounds of these constraints form a cycle with a negative sum for some values in a box
+    /// that violates the row, so these values have no schedule.
     Cycle(Vec<Origin>),
-    /// The same, of bounds that a schedule fixed in advance has to satisfy for the worst values:
-    /// each constraint with the constraints of the durations that end early or late before it.
+    /// Like `Cycle`, for bounds that a fixed schedule has to satisfy for the worst values: each
+    /// constraint with the constraints of the durations that end early or late before it.
     Fixed(Vec<ProofPart>),
-    /// A semi-reducible cycle: rule by rule, why no strategy exists in a box that breaks all rows.
+    /// A semi-reducible cycle: the proof that no strategy exists in a box that violates all rows.
     Semireducible(Vec<ProofWay>),
-    /// A condition that some schedule breaks for some values in a box that breaks the row.
+    /// A condition that some schedule violates for some values in a box that violates the row.
     Condition(Broken),
-    /// A box that breaks all rows includes this one, which the oracle refuses.
+    /// A box that violates all rows includes this one, which the oracle refuses.
     Box(DecoupledEnvelope),
 }
 
-/// Parts of a way one after the other: [`elbowroom_stn::uncertain::Way`], in terms of a plan.
+/// Sequence of parts: [`elbowroom_stn::uncertain::Way`], in terms of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProofWay {
-    /// Each begins where the one before ends.
+    /// The parts; each begins where the previous one ends.
     pub parts: Vec<ProofPart>,
-    /// The way counts for at least minus the lower end of the duration that this constraint leaves
-    /// open, by position in the plan.
+    /// The constraint (by position in the plan) with the duration whose negated lower end is a
+    /// lower bound on the length of the way.
     pub unlabelled: Option<usize>,
 }
 
 /// One part of a way.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ProofPart {
-    /// A bound that has to be kept.
+    /// A bound that has to be satisfied.
     Bound(Origin),
     /// The duration that this constraint leaves open, at its lower end.
     Early(usize),
-    /// The same at its upper end, walked backwards.
+    /// The same duration at its upper end, in the backward direction.
     Late(usize),
     /// A way that counts as one bound.
     Way(ProofWay),
 }
 
 impl Cut {
-    /// Whether one of the rows holds in a box.
+    /// Returns `true` if one of the rows holds in a box.
     pub fn holds_in(&self, envelope: &DecoupledEnvelope) -> bool {
         self.rows.iter().any(|row| row.holds_in(envelope))
     }
 }
 
-/// `constant + Σ factor · end`, where an end is the number itself: what a cycle of bounds adds up
-/// to.
+/// `constant + Σ factor · end`, where an end is the number itself: the length of a cycle of bounds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Ends {
     pub(crate) constant: Rational,
     factors: BTreeMap<BoxEnd, Rational>,
 }
 
-/// What one step of a cycle is as long as.
+/// Length of one step of a cycle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Length {
-    /// Whatever the box.
+    /// The same length in every box.
     Fixed(Rational),
-    /// So often an end.
+    /// A factor times an end.
     End(BoxEnd, Rational),
 }
 
 impl Length {
-    /// In a box; `None` if it is infinite.
+    /// Returns the length in a box; `None` if it is infinite.
     pub(crate) fn value(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
         match self {
             Self::Fixed(length) => Some(length.clone()),
@@ -147,7 +145,7 @@ impl Ends {
         }
     }
 
-    /// The sum in a box; `None` if an infinite end counts.
+    /// Returns the sum in a box; `None` if it contains an infinite end.
     pub(crate) fn value(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
         let mut sum = self.constant.clone();
         for (end, factor) in &self.factors {
@@ -157,14 +155,14 @@ impl Ends {
         Some(sum)
     }
 
-    /// Whether a parameter occurs at both of its ends.
+    /// Returns `true` if a parameter occurs with both of its ends.
     pub(crate) fn tears(&self) -> bool {
         let ends: Vec<&BoxEnd> = self.factors.keys().collect();
         ends.windows(2)
             .any(|pair| pair[0].parameter == pair[1].parameter)
     }
 
-    /// That it is not negative.
+    /// Returns the row that it is not negative.
     pub(crate) fn not_negative(self) -> Row {
         let factors = self
             .factors

@@ -1,4 +1,4 @@
-//! On which cycles of constraints parameters lie.
+//! Cycles of constraints that parameters lie on.
 
 use std::collections::BTreeMap;
 
@@ -7,27 +7,27 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, ParameterId, Side};
 use elbowroom_stn::{Constraint, Network, NodeId as ClassId};
 
-/// Through which of its ends a parameter can make the network inconsistent.
+/// The ends through which a parameter can make the network inconsistent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     /// It is on no cycle.
     None,
-    /// Small values break things: it is only used as an upper bound.
+    /// Small values can: it is only used as an upper bound.
     Lower,
-    /// Large values break things: it is only used as a lower bound.
+    /// Large values can: it is only used as a lower bound.
     Upper,
     /// Both can.
     Both,
 }
 
-/// How far out the ends of parameters may lie that are differences of times, by bounds on these
-/// same differences; and the positions of the edges that are left then.
+/// Returns limits on the reach of ends of parameters that are differences of times, from bounds on
+/// the same differences, and the positions of the remaining edges.
 ///
 /// Let `p` be the difference `d - s`: there is an edge `s -> d` with bound `c + p` and one `d -> s`
 /// with `-c - p`. A bound `k` from `d` to `s` closes a cycle of length `c + p + k` with the former,
-/// so `p >= -k - c` is needed; but for such `p` the latter is at least as tight as `k`, which can
-/// be left out. Likewise with `s` and `d` changed. Left in, such bounds would put the parameter on
-/// cycles both ways.
+/// so `p >= -k - c` is required. For such `p`, the latter edge is at least as tight as `k`, which
+/// can be left out. The case with `s` and `d` exchanged is analogous. If such bounds were kept, the
+/// parameter would lie on cycles in both directions.
 pub(crate) fn own_limits(
     edges: &[Edge],
     coupled: &[ParameterId],
@@ -53,7 +53,7 @@ pub(crate) fn own_limits(
             continue;
         };
         for (end, constant) in opposite {
-            // The way there must not be shorter than the way back, at the end that shortens it.
+            // The path there must not be shorter than the path back, at the end that shortens it.
             let inner = BoxEnd {
                 side: end.side.opposite(),
                 ..*end
@@ -68,7 +68,7 @@ pub(crate) fn own_limits(
     (limits, left)
 }
 
-/// For each parameter, the positions of its edges.
+/// Returns the positions of each parameter's edges.
 fn own_edges<'a>(edges: impl Iterator<Item = &'a Edge>) -> BTreeMap<ParameterId, Vec<usize>> {
     let mut own: BTreeMap<ParameterId, Vec<usize>> = BTreeMap::new();
     for (index, edge) in edges.enumerate() {
@@ -79,8 +79,8 @@ fn own_edges<'a>(edges: impl Iterator<Item = &'a Edge>) -> BTreeMap<ParameterId,
     own
 }
 
-/// Whether a parameter with these edges is the difference of two times: an edge there and one back, and no
-/// more.
+/// Returns `true` if a parameter with these edges is the difference of two times: it has exactly
+/// one edge in each direction.
 fn is_difference(edges: &[Edge], own: &[usize]) -> bool {
     match *own {
         [there, back] => {
@@ -93,14 +93,14 @@ fn is_difference(edges: &[Edge], own: &[usize]) -> bool {
     }
 }
 
-/// On which cycles the parameters are.
+/// Analysis of the cycles that parameters lie on.
 pub(crate) struct Cycles<'a> {
     edges: Vec<&'a Edge>,
     /// For each parameter, the positions of its edges.
     own: BTreeMap<ParameterId, Vec<usize>>,
-    /// For each class, those with the same number reach each other.
+    /// The strongly connected component of each class.
     component: Vec<usize>,
-    /// For each edge, whether there is no way around it between classes that reach each other.
+    /// For each edge, `true` if it is a strong bridge.
     is_bridge: Vec<bool>,
 }
 
@@ -108,7 +108,7 @@ impl<'a> Cycles<'a> {
     pub(crate) fn new(edges: Vec<&'a Edge>, class_count: usize) -> Self {
         let mut graph: Network<i128> = Network::with_nodes(class_count);
         for edge in &edges {
-            // Only where it leads counts.
+            // Only the ends of the edge matter, not its bound.
             graph.add(Constraint::at_most(edge.from, edge.to, 0));
         }
         Self {
@@ -119,8 +119,9 @@ impl<'a> Cycles<'a> {
         }
     }
 
-    /// How an uncoupled parameter lies on cycles. Its edges are one `s -> d` ("at most") and one
-    /// `d -> s` ("at least"), or only one of them; going there and back along both says nothing.
+    /// Returns the role of an uncoupled parameter in cycles. It has an edge `s -> d` ("at most")
+    /// and an edge `d -> s` ("at least"), or only one of them. The cycle of both edges is no
+    /// constraint.
     pub(crate) fn role(&self, parameter: ParameterId) -> Role {
         let own = self.own.get(&parameter).map_or(&[][..], Vec::as_slice);
         let on_cycle = |side: Side| {
@@ -137,7 +138,8 @@ impl<'a> Cycles<'a> {
         }
     }
 
-    /// Whether edges lead back from the end of this one to its beginning that are not among these.
+    /// Returns `true` if edges lead back from the end of this edge to its beginning, without the
+    /// parameter's own edges.
     fn is_closed(&self, index: usize, own: &[usize]) -> bool {
         let edge = self.edges[index];
         let (from, to) = (edge.from, edge.to);
@@ -159,7 +161,7 @@ mod tests {
 
     use super::*;
 
-    /// Whether edges lead from one class to another that are not the parameter's own.
+    /// Returns `true` if edges other than the parameter's own lead from one class to another.
     fn leads(edges: &[Edge], (from, to): (ClassId, ClassId), parameter: ParameterId) -> bool {
         let (mut seen, mut stack) = (Vec::new(), vec![from]);
         while let Some(class) = stack.pop() {

@@ -1,4 +1,4 @@
-//! Obligations that a dispatcher can see to.
+//! Obligations that a dispatcher can enforce.
 
 use elbowroom_model::Task;
 use elbowroom_plan::{Bound, Constraint, DecoupledEnvelope, ParametrizedPlan, Reason};
@@ -8,15 +8,15 @@ use crate::obligations::{BadCase, Difference, Obligations, Refusal};
 use crate::reduction::Reduction;
 use crate::soundness::earliest_schedule;
 
-/// The plan with constraints for all obligations that are bounds on the difference of two times,
-/// and how many there are that its network does not imply anyway.
+/// Adds constraints to the plan for all obligations that are bounds on the difference of two times.
+/// Also returns the number of these that the plan's network does not already imply.
 ///
-/// Paper 1 asks that *every* schedule of the plan be valid, also those that a dispatcher would
-/// never choose. Where what makes a schedule valid is a bound on the difference of two times, the
-/// dispatcher can be told to keep to it; what is left to ask is that it can.
+/// Paper 1 requires that *every* schedule of the plan is valid, including those that a dispatcher
+/// would never choose. If validity depends on a bound on the difference of two times, the
+/// dispatcher can enforce the bound. The remaining question is whether it is able to.
 ///
 /// # Errors
-/// When the plan has no schedule at its nominal values, or holds something beyond exact linear
+/// If the plan has no schedule at its nominal values, or contains something beyond exact linear
 /// reasoning.
 pub fn enforced(
     task: &Task,
@@ -66,7 +66,7 @@ pub fn enforced(
     Ok((enforced, added))
 }
 
-/// The difference that is too small in a bad case, if nothing else is wrong in it.
+/// Returns the difference that is too small in a bad case, if the case has no other constraints.
 fn avoidable(case: &BadCase) -> Option<&Difference> {
     match (case.differences.as_slice(), case.inequalities.as_slice()) {
         ([difference], []) if difference.is_strict => Some(difference),

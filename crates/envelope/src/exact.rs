@@ -1,11 +1,11 @@
 //! The whole region of values for which a plan works, as a union of polyhedra.
 //!
-//! Values have a schedule exactly if they satisfy what is left of the network's bounds when the
-//! times are eliminated (Fourier and Motzkin). They have one that breaks a requirement exactly if
-//! they satisfy what is left of these bounds together with one of the requirement's bad cases. The
-//! region is the first polyhedron without the others. What is strict stays so.
+//! Eliminating the times from the network's bounds (Fourier and Motzkin) gives the polyhedron of
+//! the values that have a schedule. Eliminating them from these bounds and one of a requirement's
+//! bad cases gives the values that have a schedule with this violation. The region is the first
+//! polyhedron minus the others. Strict inequalities stay strict.
 //!
-//! The polyhedra of the union have no point in common.
+//! The polyhedra of the union are disjoint.
 
 mod polyhedron;
 mod shadow;
@@ -27,19 +27,19 @@ pub use volume::{Body, Component};
 /// The limit on polyhedra of the union.
 const MOST_PIECES: usize = 256;
 
-/// All values for which a plan works: those that are in one of the pieces.
+/// All values for which a plan works: the union of the pieces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Region {
-    /// No two of them have a point in common. None if there are no such values.
+    /// Disjoint polyhedra; empty if there are no such values.
     pub pieces: Vec<Piece>,
-    /// Why there may be more such values than those in the pieces; `None` if there are not.
+    /// Reason why the pieces may not cover the whole region; `None` if they do.
     pub missing: Option<ExactError>,
 }
 
-/// A polyhedron of values, without rows that follow from others.
+/// Polyhedron of values, without redundant rows.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Piece {
-    /// What the values satisfy.
+    /// Inequalities that the values satisfy.
     pub rows: Vec<RegionRow>,
 }
 
@@ -51,9 +51,9 @@ pub struct RegionRow {
     pub factors: BTreeMap<ParameterId, Rational>,
     /// The upper bound of the sum.
     pub bound: Rational,
-    /// Whether the bound itself is excluded.
+    /// `true` if the bound itself is excluded.
     pub is_strict: bool,
-    /// Where it comes from.
+    /// Origins of the row.
     pub sources: BTreeSet<RegionSource>,
 }
 
@@ -68,7 +68,7 @@ pub enum RegionSource {
     Requirement(usize),
 }
 
-/// The region cannot be written as a union of polyhedra, or is too large for that.
+/// Error for a region that is not a union of polyhedra, or that is too large.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ExactError {
     /// A condition is not linear.
@@ -80,25 +80,25 @@ pub enum ExactError {
         /// The position of the requirement; `None` if it is a bound of the network.
         requirement: Option<usize>,
     },
-    /// Too many inequalities on the way.
+    /// The elimination takes too many inequalities.
     #[error("the region takes more than {limit} inequalities at once; leave less open")]
     TooManyRows {
-        /// How many are kept.
+        /// Limit on the number kept.
         limit: usize,
     },
     /// Too many polyhedra.
     #[error("the region falls into more than {limit} pieces; leave less open")]
     TooManyPieces {
-        /// How many are kept.
+        /// Limit on the number kept.
         limit: usize,
     },
-    /// The caller wanted no more.
+    /// The caller ended the computation.
     #[error("the region was not done when there was no more time")]
     Ended,
 }
 
 impl RegionRow {
-    /// Whether it holds for these values, by parameter.
+    /// Returns `true` if the row holds for these values, by parameter.
     pub fn holds(&self, value: &dyn Fn(ParameterId) -> Rational) -> bool {
         let terms = self.factors.iter();
         let sum: Rational = terms.map(|(id, factor)| factor * &value(*id)).sum();
@@ -107,22 +107,23 @@ impl RegionRow {
 }
 
 impl Region {
-    /// Whether a plan works with these values, by parameter.
+    /// Returns `true` if the plan works with these values, by parameter.
     pub fn contains(&self, value: &dyn Fn(ParameterId) -> Rational) -> bool {
         let has = |piece: &Piece| piece.rows.iter().all(|row| row.holds(value));
         self.pieces.iter().any(has)
     }
 }
 
-/// The region of a plan, as far as happenings keep the order that the requirements assume: all
-/// values for which `network` has a schedule, and no bad case of `obligations` holds in any. Bad
-/// cases may use the node after the plan's last, a moment inside an action.
+/// Computes the region of a plan, provided that happenings keep the order that the requirements
+/// assume: all values for which `network` has a schedule, and no bad case of `obligations` holds in
+/// any schedule. Bad cases may use the node after the plan's last, which is a moment inside an
+/// action.
 ///
-/// `flow` is asked often whether to go on. If it says no, or a limit is reached, the pieces found
-/// until then are the answer, with what is [missing](Region::missing): they are a part of the region.
+/// `flow` is polled often. If it breaks, or a limit is reached, the pieces found so far are
+/// returned with the [missing](Region::missing) part's reason. They are a part of the region.
 ///
 /// # Errors
-/// When something is not linear, or nothing was found before a limit or the end.
+/// If something is not linear, or if no piece was found before a limit or the end.
 pub fn exact(
     plan: &ParametrizedPlan,
     network: &[Inequality],
@@ -149,7 +150,8 @@ pub fn exact(
     if !scheduled.is_feasible() {
         return Ok(Region::default());
     }
-    // What breaks a requirement, with how many of its rows the schedules do not imply.
+    // The polyhedra of violations, each with the number of its rows that the schedules do not
+    // imply.
     let mut bad: Vec<(usize, Polyhedron)> = Vec::new();
     for (index, obligation) in obligations.iter().enumerate() {
         let source = RegionSource::Requirement(index);
@@ -173,7 +175,7 @@ pub fn exact(
             bad.push((broken.rows().len(), broken));
         }
     }
-    // Those that cut off a half-space first, which makes no new pieces.
+    // Those that cut off a half-space come first, because they do not split a piece.
     bad.sort_by_key(|(count, _)| *count);
     let bad: Vec<Polyhedron> = bad.into_iter().map(|(_, broken)| broken).collect();
     let (pieces, missing) = without_all(scheduled, &bad, flow);
@@ -186,8 +188,8 @@ pub fn exact(
     }
 }
 
-/// What is left of a polyhedron without others, in parts without a common point: one part after
-/// the other to its end, so that those that are done when a limit is reached are right.
+/// Subtracts polyhedra from another one, and returns disjoint parts. Each part is completed before
+/// the next one, so that the completed parts are correct when a limit is reached.
 fn without_all(
     whole: Polyhedron,
     bad: &[Polyhedron],
@@ -219,7 +221,7 @@ fn without_all(
     (done, None)
 }
 
-/// `to - from <= bound` as an inequality.
+/// Converts `to - from <= bound` to an inequality.
 fn difference(difference: &crate::obligations::Difference) -> Inequality {
     let mut expression = Linear::difference(difference.from, difference.to);
     expression.constant = -&difference.bound;
@@ -229,13 +231,13 @@ fn difference(difference: &crate::obligations::Difference) -> Inequality {
     }
 }
 
-/// How times and parameters are numbered: the times first, by node.
+/// Numbering of times and parameters: the times first, by node.
 struct Coordinates {
     times: usize,
 }
 
 impl Coordinates {
-    /// `None` if it is not linear.
+    /// Converts an inequality; `None` if it is not linear.
     fn row(&self, inequality: &Inequality, source: RegionSource) -> Option<Halfspace> {
         let expression = &inequality.expression;
         if !expression.products.is_empty() {
@@ -253,7 +255,7 @@ impl Coordinates {
         })
     }
 
-    /// The natural range of a parameter.
+    /// Returns the half-spaces of the natural range of a parameter.
     fn range(&self, id: ParameterId, parameter: &elbowroom_plan::Parameter) -> Vec<Halfspace> {
         let range = &parameter.range;
         let sides = [(&range.lower, -1), (&range.upper, 1)];

@@ -1,4 +1,4 @@
-//! The first half of the box check: for every value in the box there is a schedule.
+//! The first half of the box check: there is a schedule for every value in the box.
 
 mod rules;
 
@@ -13,39 +13,40 @@ use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
 use crate::cycles::{Cycles, Role, own_limits};
 
-/// How many corners are kept from one box to the next; if there are more, [`Branching`] looks for
-/// those that matter.
+/// Limit on corners that are kept from one box to the next. If there are more, [`Branching`]
+/// searches for the relevant ones.
 const MOST_CORNERS: usize = 1 << 8;
 
-/// How many branches [`Branching`] looks at before the question is given up.
+/// Limit on branches that [`Branching`] examines before the check is undecided.
 pub(crate) const MOST_BRANCHES: usize = 1 << 14;
 
-/// The feasibility check: a plan's network has a schedule for every value in a box (weak
+/// Feasibility check: a plan's network has a schedule for every value in a box (weak
 /// controllability).
 ///
-/// The values for which it has one form a convex set, so the corners of the box decide. Few of
-/// them need looking at: a parameter matters only through cycles of constraints. If all cycles
-/// through it walk its constraint one way, only one of its ends counts, and that end is known
-/// beforehand. In deordered plans almost every parameter is like that. Where an end is infinite,
-/// it is asked whether the values with a schedule go on for ever on that side.
+/// The values that have a schedule form a convex set, so it is enough to check the corners of the
+/// box. Few corners are needed: a parameter matters only through cycles of constraints. If all
+/// cycles through it traverse its constraint in one direction, only one of its ends matters, and
+/// that end is known beforehand. In deordered plans almost every parameter is of this kind. For an
+/// infinite end, the check is whether the set of values with a schedule is unbounded on that side.
 ///
-/// A parameter that *is* a difference of times may have bounds on that very difference beside it
-/// (an action whose start and end interfere takes at least ε). These bound the parameter, whatever
-/// the others do, and say nothing else: they are looked at by themselves ([`own_limits`]).
+/// A parameter that *is* a difference of times may have further bounds on the same difference (an
+/// action whose start and end interfere takes at least ε). These bounds limit the parameter,
+/// independently of the others, and have no other effect. They are checked separately
+/// ([`own_limits`]).
 #[derive(Clone, Debug)]
 pub(crate) struct Feasibility {
     /// The reduced network's edges.
     all_edges: Arc<Vec<Edge>>,
-    /// The positions of those that are not limits of a parameter.
+    /// The positions of the edges that are not limits of a parameter.
     left: Vec<u32>,
-    /// How far out single ends may lie ([`BoxEnd::reach`]).
+    /// Limits on the reach of single ends ([`BoxEnd::reach`]).
     own_limits: BTreeMap<BoxEnd, Rational>,
     class_count: usize,
-    /// Each parameter's role in the cycles of the edges that are left.
+    /// Each parameter's role in the cycles of these edges.
     roles: Vec<Role>,
     /// Parameters that bound several differences.
     coupled: Vec<ParameterId>,
-    /// Whether there are too many corners to keep.
+    /// `true` if there are too many corners to keep.
     branches: bool,
     corners: Vec<Corner>,
 }
@@ -60,9 +61,9 @@ struct Corner {
 /// Values in the box for which there is no schedule.
 #[derive(Clone, Debug)]
 pub(crate) enum Infeasible {
-    /// These.
+    /// These values.
     At(Valuation),
-    /// Some far out on that side, wherever the other parameters are.
+    /// Some values far out on that side, whatever the other parameters are.
     FarOut(BoxEnd),
 }
 
@@ -96,17 +97,17 @@ impl Feasibility {
         }
     }
 
-    /// The edges that are not limits of a parameter.
+    /// Returns the edges that are not limits of a parameter.
     fn edges(&self) -> impl Iterator<Item = &Edge> + Clone {
         self.left
             .iter()
             .map(|&index| &self.all_edges[index as usize])
     }
 
-    /// Values in the box without a schedule, if any.
+    /// Returns values in the box without a schedule, if any.
     ///
-    /// `moved` says that the box differs only in that end, further out, from the last one that was
-    /// found feasible.
+    /// If `moved` is given, the box differs from the last feasible one only in that end, which is
+    /// further out.
     pub(crate) fn infeasible(
         &mut self,
         envelope: &DecoupledEnvelope,
@@ -138,8 +139,8 @@ impl Feasibility {
         })
     }
 
-    /// Whether some values have no schedule in every box with this end so far out, wherever its other
-    /// ends are. `None` is infinitely far.
+    /// Returns `true` if every box with this end at that reach contains values without a schedule,
+    /// whatever its other ends. `None` is infinitely far.
     pub(crate) fn is_too_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
         match reach {
             None => !self.goes_on_for_ever(end),
@@ -147,7 +148,7 @@ impl Feasibility {
         }
     }
 
-    /// A corner without a schedule.
+    /// Returns a corner without a schedule.
     fn branching(
         &self,
         envelope: &DecoupledEnvelope,
@@ -169,8 +170,8 @@ impl Feasibility {
         network.corner_without_schedule()
     }
 
-    /// Whether an edge lies on a cycle. One that says "at most the parameter" lies on cycles that
-    /// small values break.
+    /// Returns `true` if an edge lies on a cycle. An edge "at most the parameter" lies on cycles
+    /// that small values violate.
     fn matters(&self, edge: &Edge) -> bool {
         edge.end.is_none_or(|end| {
             matches!(
@@ -180,11 +181,11 @@ impl Feasibility {
         })
     }
 
-    /// Whether the parameter can move out on that side without limit, from any values that have a
-    /// schedule.
+    /// Returns `true` if the parameter can move out on that side without limit, from any values
+    /// that have a schedule.
     ///
-    /// The values that have one form a polyhedron; it goes on for ever in a direction exactly if
-    /// the network has a schedule when only what the direction adds to each bound is kept.
+    /// The values that have a schedule form a polyhedron. It is unbounded in a direction exactly if
+    /// the network has a schedule when each bound is replaced by the change in that direction.
     fn goes_on_for_ever(&self, end: BoxEnd) -> bool {
         if self.own_limits.contains_key(&end) {
             return false;
@@ -199,7 +200,7 @@ impl Feasibility {
         }
         let mut network = Network::with_nodes(self.class_count);
         for edge in self.edges() {
-            // An upper bound follows the parameter, a lower bound holds against it.
+            // An upper bound increases with the parameter, a lower bound decreases the edge.
             let bound = match edge.end {
                 Some(other) if other.parameter == end.parameter && other.side == end.side => 1,
                 Some(other) if other.parameter == end.parameter => -1,
@@ -214,7 +215,7 @@ impl Feasibility {
         ConsistentNetwork::try_from(network).is_ok()
     }
 
-    /// The values that were meant.
+    /// Converts the finding to values.
     pub(crate) fn values(&self, envelope: &DecoupledEnvelope, found: Infeasible) -> Valuation {
         match found {
             Infeasible::At(values) => values,
@@ -222,7 +223,7 @@ impl Feasibility {
         }
     }
 
-    /// Values without a schedule, with the parameter so far out on that side as it takes.
+    /// Returns values without a schedule, with the parameter as far out on that side as necessary.
     fn far_out(&self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Valuation {
         let mut values: Valuation = envelope
             .intervals()
@@ -279,7 +280,7 @@ impl Feasibility {
         None
     }
 
-    /// The network at a corner, if it is consistent.
+    /// Returns the network at a corner, if it is consistent.
     fn network(
         &self,
         sides: &BTreeMap<ParameterId, Side>,
@@ -288,7 +289,7 @@ impl Feasibility {
         self.network_where(self.edges(), |edge| self.bound(edge, sides, envelope))
     }
 
-    /// The network with these bounds, if it is consistent; `None` is no bound.
+    /// Returns the network with these bounds, if it is consistent; `None` is no bound.
     fn network_where<'a>(
         &self,
         edges: impl Iterator<Item = &'a Edge>,
@@ -307,7 +308,7 @@ impl Feasibility {
         ConsistentNetwork::try_from(network).ok()
     }
 
-    /// The bound of an edge at a corner of the box; `None` if it does not matter.
+    /// Returns the bound of an edge at a corner of the box; `None` if the edge does not matter.
     fn bound(
         &self,
         edge: &Edge,
@@ -334,7 +335,8 @@ impl Feasibility {
             Role::None => return None,
             Role::Lower if end.side == Side::Upper => return None,
             Role::Upper if end.side == Side::Lower => return None,
-            // Both of a parameter's edges move, one of them to looser: start afresh.
+            // Both of a parameter's edges move, and one of them becomes looser, so the networks are
+            // rebuilt.
             Role::Both => return self.rebuild_corners(envelope, end),
             Role::Lower | Role::Upper => {}
         }
@@ -374,7 +376,7 @@ impl Feasibility {
         None
     }
 
-    /// The networks of the corners that use the end, made anew; all of them or none.
+    /// Rebuilds the networks of the corners that use the end; all of them or none.
     fn rebuild_corners(&mut self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Option<Infeasible> {
         let mut rebuilt = Vec::new();
         for (index, corner) in self.corners.iter().enumerate() {
@@ -392,7 +394,7 @@ impl Feasibility {
     }
 }
 
-/// The values at a corner; parameters that do not matter at some value.
+/// Returns the values at a corner; parameters that do not matter have any value.
 fn valuation(sides: &BTreeMap<ParameterId, Side>, envelope: &DecoupledEnvelope) -> Valuation {
     envelope
         .intervals()
@@ -405,8 +407,8 @@ fn valuation(sides: &BTreeMap<ParameterId, Side>, envelope: &DecoupledEnvelope) 
         .collect()
 }
 
-/// That end of the interval, or, if it is infinite, some value in it: that the plan has schedules
-/// in that direction for ever is asked apart.
+/// Returns that end of the interval or, if it is infinite, some value in it. Whether the plan has
+/// schedules arbitrarily far in that direction is checked separately.
 fn any_value(interval: &Interval, side: Side) -> Rational {
     let (wanted, other) = (side.of(interval), side.opposite().of(interval));
     let value = wanted.value().or(other.value());

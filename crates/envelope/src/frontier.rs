@@ -1,32 +1,32 @@
-//! Which end moves next, and how far.
+//! Selection of the next end to move, and of the step size.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, Parameter, ParameterId, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
 
-/// The step size after a successful widening.
+/// Change of the step size after a successful widening.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Growth {
-    /// They double until both directions of the parameter have been refused for the first time,
-    /// as in the authors' code.
+    /// Steps double until both directions of the parameter have been refused for the first time, as
+    /// in the authors' code.
     #[default]
     Doubling,
-    /// They stay, as in the paper.
+    /// Steps stay constant, as in the paper.
     Constant,
 }
 
-/// The open directions and step sizes (Θ and Δ of Algorithm 1).
+/// Open directions and step sizes (Θ and Δ of Algorithm 1).
 ///
-/// One function both decides to go on and picks the end, so lines 6 and 7 of the algorithm, which
-/// test different bounds, cannot disagree.
+/// One function both decides whether to continue and picks the end, so lines 6 and 7 of the
+/// algorithm, which test different bounds, cannot disagree.
 #[derive(Clone, Debug)]
 pub(crate) struct Frontier {
     growth: Growth,
     parameters: Vec<Progress>,
-    /// How many parameters have a step worth taking: those for whose sake the search goes on.
+    /// Number of parameters with a step worth taking; the search continues while there are any.
     going: usize,
-    /// Where the round robin stands.
+    /// Position of the round robin.
     next: usize,
 }
 
@@ -38,15 +38,16 @@ struct Progress {
     precision: Rational,
     /// Open directions with the present step: lower, upper.
     is_open: [bool; 2],
-    /// Directions in which nothing is left to gain: lower, upper.
+    /// Directions without further gain: lower, upper.
     is_done: [bool; 2],
-    /// Whether both directions have been refused at least once.
+    /// `true` if both directions have been refused at least once.
     has_halved: bool,
 }
 
 impl Frontier {
-    /// All directions open; steps as in the authors' code, `max(nominal, 1) · weight`, or `scale ·
-    /// weight` if there are scales, but at least the precision.
+    /// Creates the frontier with all directions open. Steps are as in the authors' code,
+    /// `max(nominal, 1) · weight`, or `scale · weight` if there are scales, but at least the
+    /// precision.
     pub(crate) fn new(
         plan: &ParametrizedPlan,
         precisions: Vec<Rational>,
@@ -78,10 +79,11 @@ impl Frontier {
         }
     }
 
-    /// The next end to move and by how much; `None` when every step is below the precision.
+    /// Returns the next end to move, and the step; `None` when every step is below the precision.
     ///
     /// Round robin over the parameters, the upper end first. While some step is at least the
-    /// precision, those down to half of it take part as well, as in the authors' code.
+    /// precision, parameters with at least half the precision also take part, as in the authors'
+    /// code.
     pub(crate) fn next_end(&mut self) -> Option<(BoxEnd, Rational)> {
         if self.going == 0 {
             return None;
@@ -109,7 +111,7 @@ impl Frontier {
         None
     }
 
-    /// The end was moved.
+    /// Records that the end was moved.
     pub(crate) fn accept(&mut self, end: BoxEnd) {
         let growth = self.growth;
         self.change(end, |progress, _| {
@@ -119,8 +121,8 @@ impl Frontier {
         });
     }
 
-    /// The end could not be moved: the direction closes; when both have, the step is halved and
-    /// they open again.
+    /// Records that the end could not be moved: the direction closes. When both directions are
+    /// closed, the step is halved and they open again.
     pub(crate) fn reject(&mut self, end: BoxEnd) {
         self.change(end, |progress, place| {
             progress.is_open[place] = false;
@@ -128,7 +130,7 @@ impl Frontier {
         });
     }
 
-    /// The end can go no further whatever the step: it is infinite, or at the border of its range.
+    /// Records that the end cannot move any further: it is infinite, or at the border of its range.
     pub(crate) fn finish(&mut self, end: BoxEnd) {
         self.change(end, |progress, place| {
             progress.is_done[place] = true;
@@ -145,7 +147,7 @@ impl Frontier {
 }
 
 impl Progress {
-    /// Whether the search goes on for this parameter's sake.
+    /// Returns `true` if this parameter has a step worth taking.
     fn goes_on(&self) -> bool {
         self.is_done != [true; 2] && self.step >= self.precision
     }

@@ -1,4 +1,4 @@
-//! What is guaranteed inside a box, and the half of the box check that depends on it.
+//! Guarantees inside a box, and the part of the box check that depends on them.
 
 use std::fmt;
 use std::sync::{Arc, OnceLock};
@@ -16,36 +16,36 @@ use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::reduction::Reduction;
 
-/// In a plan with more parameters than these, what is remembered of a box takes more memory than the time it saves is worth
-/// when another box is looked at.
+/// Number of parameters above which data about a box is not kept for the next one: the memory would
+/// cost more than the time saved.
 const MANY: usize = 10_000;
 
-/// What is guaranteed inside an envelope.
+/// Guarantee that holds inside an envelope.
 ///
-/// Whichever it is, every schedule that the plan's network allows is valid. They differ in what
-/// whoever executes the plan has to know to have such a schedule.
+/// With each of them, every schedule that the plan's network allows is valid. They differ in what
+/// the executor has to know about the parameters to find such a schedule.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Guarantee {
-    /// For all values there is a schedule, for an executor that knows them in advance (weak
-    /// controllability). What the papers compute.
+    /// There is a schedule for all values, for an executor that knows them in advance (weak
+    /// controllability). The papers compute this guarantee.
     Weak,
-    /// The plan can be executed by one who learns each value only as it comes about (dynamic
-    /// controllability).
+    /// The plan can be executed by an executor that observes each value only when it is realised
+    /// (dynamic controllability).
     #[default]
     Dynamic,
-    /// One schedule does for all values (strong controllability).
+    /// One schedule works for all values (strong controllability).
     Strong,
 }
 
 impl Guarantee {
-    /// All of them, the weakest first.
+    /// All guarantees, the weakest first.
     pub const ALL: [Self; 3] = [Self::Weak, Self::Dynamic, Self::Strong];
 
-    /// Its name in documents and on the command line.
+    /// Returns its name in documents and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Weak => "weak",
@@ -61,11 +61,11 @@ impl fmt::Display for Guarantee {
     }
 }
 
-/// Decides whether a plan can be scheduled for the values in a box, as a guarantee demands.
+/// Decides whether a plan can be scheduled for the values in a box, by a guarantee.
 ///
-/// One variant for each guarantee that there is an answer for. All of them remember what they
-/// found for the last box accepted, so that moving one end of it costs little; which box that is,
-/// and that nothing else has moved, is the [`Oracle`](crate::Oracle)'s business.
+/// One variant for each guarantee. All of them keep their result for the last box accepted, so that
+/// moving one end of it costs little. The [`Oracle`](crate::Oracle) keeps track of that box, and
+/// ensures that nothing else has moved.
 #[derive(Clone, Debug)]
 pub(crate) enum Controllability {
     Weak(Feasibility),
@@ -77,7 +77,8 @@ pub(crate) enum Controllability {
 #[derive(Clone, Debug)]
 pub(crate) struct Control {
     pub(crate) plan: Arc<ParametrizedPlan>,
-    /// That there is no schedule at all is the better reason, where it is one. Of many plans it is never asked.
+    /// Feasibility check, computed on first use. Values without any schedule are a better
+    /// explanation of a refusal than a conflict. For many plans it is never needed.
     feasibility: OnceLock<Feasibility>,
 }
 
@@ -88,7 +89,8 @@ impl Control {
     }
 }
 
-/// Why a plan cannot be scheduled as demanded; [`Controllability::objection`] works out the values.
+/// Reason why a plan cannot be scheduled as required; [`Controllability::objection`] computes the
+/// values.
 #[derive(Clone, Debug)]
 pub(crate) enum Uncontrollable {
     Weak(Infeasible),
@@ -96,7 +98,7 @@ pub(crate) enum Uncontrollable {
 }
 
 impl Controllability {
-    /// For this plan, whose reduced network may be known already.
+    /// Creates the check for this plan, whose reduced network may be known already.
     pub(crate) fn new(
         guarantee: Guarantee,
         plan: &Arc<ParametrizedPlan>,
@@ -116,13 +118,13 @@ impl Controllability {
         }
     }
 
-    /// Why the box is refused, if it is.
+    /// Returns the reason why the box is refused, if it is.
     ///
-    /// `moved` says that the box differs only in that end, further out, from the last one that was
-    /// accepted.
+    /// If `moved` is given, the box differs from the last accepted one only in that end, which is
+    /// further out.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub(crate) fn refuses(
         &mut self,
         envelope: &DecoupledEnvelope,
@@ -145,8 +147,8 @@ impl Controllability {
         }
     }
 
-    /// Whether some values have no schedule in every box with this end so far out; `None` is
-    /// infinitely far. Only what can be told from the end alone.
+    /// Returns `true` if every box with this end at that reach contains values without a schedule,
+    /// judging by the end alone; `None` is infinitely far.
     pub(crate) fn is_too_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
         self.feasibility().is_too_far(end, reach)
     }
@@ -158,10 +160,10 @@ impl Controllability {
         }
     }
 
-    /// What stands against the box, in terms of other boxes: `most` cuts at most.
+    /// Returns at most `most` cuts that refuse the box, and possibly others.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub(crate) fn learn(
         &mut self,
         plan: &ParametrizedPlan,
@@ -186,7 +188,7 @@ impl Controllability {
         }
     }
 
-    /// The objection, with values that show it.
+    /// Returns the objection, with values that show it.
     pub(crate) fn objection(
         &self,
         envelope: &DecoupledEnvelope,

@@ -20,19 +20,19 @@ use ahead::Ahead;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The search ends when all steps are below this (β of Algorithm 1); positive. A step is halved
-    /// when both ends of its parameter have refused it, so an end may still have room for almost
-    /// twice as much: [`sharpen`](crate::sharpen()) moves each end onto its limit.
+    /// when both ends of its parameter have been refused, so an end may still have a slack of
+    /// almost twice as much: [`sharpen`](crate::sharpen()) moves each end to its limit.
     pub precision: Rational,
-    /// If there is one, each parameter's precision is this share of its nominal value instead, and
-    /// its first step the nominal value, so that units of time do not matter.
+    /// If present, each parameter's precision is this share of its nominal value instead, and its
+    /// first step is the nominal value, so that the result does not depend on the unit of time.
     pub relative: Option<Rational>,
-    /// How steps change after a success.
+    /// Change of the step size after a success.
     pub growth: Growth,
     /// The limit on box checks.
     pub most_checks: Option<usize>,
-    /// If it is there: once looks at boxes that are refused for conflicts of many ends have gone through so many parameters,
-    /// such conflicts are divided into conditions from one window to the next. The box of a long plan may become a
-    /// little smaller so, and is found far sooner.
+    /// Work limit after which long conflicts (of many ends) are divided into conditions from one
+    /// window to the next, counted in parameters over all checks with such conflicts; `None` never
+    /// divides. The box of a long plan may become a little smaller, and is found far sooner.
     pub divide_after: Option<usize>,
 }
 
@@ -49,8 +49,8 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The precision of each of a plan's parameters. A nominal value of 0 has no shares; there the
-    /// smallest one of the plan's that is not counts.
+    /// Returns the precision of each of a plan's parameters. For a nominal value of 0, the share
+    /// refers to the smallest nominal value of the plan that is not 0.
     pub fn precisions(&self, plan: &ParametrizedPlan) -> Vec<Rational> {
         match &self.relative {
             None => vec![self.precision.clone(); plan.parameters.len()],
@@ -59,8 +59,8 @@ impl Settings {
     }
 }
 
-/// The size of each parameter: that of its nominal value, or of the smallest one of the plan's that
-/// is not 0.
+/// Returns the scale of each parameter: the size of its nominal value or, if that is 0, of the
+/// smallest one of the plan that is not 0.
 pub(crate) fn scales(plan: &ParametrizedPlan) -> Vec<Rational> {
     let sizes = plan.parameters.iter().map(|own| own.nominal.abs());
     let sizes: Vec<Rational> = sizes.collect();
@@ -72,36 +72,36 @@ pub(crate) fn scales(plan: &ParametrizedPlan) -> Vec<Rational> {
         .collect()
 }
 
-/// A larger box was found.
+/// Step of the search that enlarged the box.
 #[derive(Clone, Debug)]
 pub struct Widening<'a> {
     /// The box.
     pub envelope: &'a DecoupledEnvelope,
-    /// Which end moved.
+    /// End that was moved.
     pub end: BoxEnd,
-    /// The number of boxes checked by then.
+    /// The number of boxes checked so far.
     pub checks: usize,
 }
 
-/// Why a search for an envelope ended. The envelope is sound in every case.
+/// Reason why a search for an envelope ended. The envelope is sound in every case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
-    /// All steps are below the precision, or no end can move at all.
+    /// All steps are below the precision, or no end can move.
     Converged,
     /// The limit on box checks was reached.
     CheckLimit,
-    /// The caller wanted no more.
+    /// The caller cancelled the search.
     Cancelled,
-    /// Of some wider boxes it cannot be told whether they are inside: there are too many cases to
-    /// tell apart. The ends in question stay where they were.
+    /// Some wider boxes are undecided, because there are too many cases. The ends in question stay
+    /// where they were.
     Undecided,
 }
 
-/// The number of boxes that may be undecided before a search ends: each took long.
+/// The number of undecided boxes after which a search ends, because each of them takes long.
 const MOST_UNDECIDED: usize = 4;
 
-/// How far out an end is moved at most that could go on for ever without being infinite: a thousand
-/// million times the nominal value, or 1.
+/// Returns the greatest reach of an end that could move out without limit and is not infinite: a
+/// thousand million times the nominal value, or 1.
 pub(crate) fn farthest(parameter: &Parameter) -> Rational {
     &Rational::from(1_000_000_000) * &parameter.nominal.abs().max(Rational::ONE)
 }
@@ -111,43 +111,43 @@ pub(crate) fn farthest(parameter: &Parameter) -> Rational {
 pub enum Limit {
     /// Nothing: the end is infinite.
     Unbounded,
-    /// Nothing limits finite values, but no schedule fixed in advance works for all of them.
+    /// All finite values are possible, but no fixed schedule works for all of them.
     AnyFinite,
     /// The parameter's natural range.
     Range,
-    /// The box with this end moved out is not inside the envelope, because of this.
+    /// The box with this end moved out is not inside the envelope, for this reason.
     Objection(Objection),
-    /// Whether the box with this end moved out is inside the envelope cannot be told.
+    /// The box with this end moved out is undecided.
     Undecided,
 }
 
 /// The result of [`irr`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct IrrRun {
-    /// The box; `Err` if the plan does not even work at the nominal values.
+    /// The box; `Err` if the plan does not work at the nominal values.
     pub envelope: Result<DecoupledEnvelope, Objection>,
-    /// How many times the box grew.
+    /// Number of widenings.
     pub widenings: usize,
     /// The number of boxes checked.
     pub checks: usize,
-    /// Why the search ended.
+    /// Reason why the search ended.
     pub stop: StopReason,
 }
 
 /// Incremental Rectangular Robustification: Algorithm 1 of Cashmore et al. (2020).
 ///
-/// Invariant: the box lies inside the robustness envelope at every iteration, the first included:
-/// the start point is checked like any other box. `on_step` is called each time the box has
-/// grown, and once more at every refusal with `None`, so that it can end the search at any moment.
-/// What was found stays found: a wider box of which nothing can be told is treated as refused.
+/// Invariant: the box lies inside the robustness envelope at every iteration, including the first:
+/// the start point is checked like any other box. `on_step` is called with each wider box, and with
+/// `None` at every refusal, so that it can end the search at any moment. The result found so far is
+/// kept. An undecided wider box is treated as refused.
 ///
-/// The steps, their outcomes and their number are those of one check after the other, but where
-/// something is known about a box beforehand, it is not checked: many boxes are found inside by
-/// checking the last of them, and many are refused for a reason that refused another one before.
-/// Where long conflicts are divided ([`Settings::divide_after`]), some steps are refused that a check would not refuse.
+/// The steps, their outcomes and their number are those of one check after the other, but boxes
+/// with a known outcome are not checked. Many boxes are found inside by checking the last of them,
+/// and many are refused for a reason that already refused another one. If long conflicts are
+/// divided ([`Settings::divide_after`]), some steps are refused that a check would accept.
 ///
 /// # Errors
-/// When nothing can be told of the start point.
+/// If the start point is undecided.
 #[doc(alias = "Incremental Rectangular-Robustification")]
 pub fn irr(
     oracle: &mut Oracle,
@@ -167,7 +167,7 @@ pub fn irr(
     };
     let asks_little = oracle.asks_little();
     let mut search = Ahead::new(oracle, settings, frontier, envelope);
-    // A box that is inside shows that the nominal values, which it holds, are so, too.
+    // A box inside the envelope proves that the nominal values in it are inside as well.
     let at_once = asks_little
         .then(|| search.run_at_once(&mut count))
         .flatten();
@@ -195,10 +195,10 @@ pub fn irr(
     })
 }
 
-/// Tells what keeps each of these ends of a box where it is, if something does. An end that can still
-/// move by less than its parameter's `step` is asked what would stop it there. `flow` can end that at
-/// any end; nothing is said of those that come after. If the box is inside the envelope, it is the oracle's accepted one
-/// afterwards.
+/// Returns the limit of each of these ends of a box, if there is one. For an end that can still
+/// move by less than its parameter's `step`, the limit is the reason why it cannot move by `step`.
+/// `flow` can end the computation at any end; later ends have no result. If the box is inside the
+/// envelope, it is the oracle's accepted one afterwards.
 pub fn limits(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
@@ -246,5 +246,5 @@ fn limit(
     }
 }
 
-/// An end that lies beyond this part of the [`farthest`] value may have no limit.
+/// Divisor of the [`farthest`] value: an end beyond the quotient may have no limit.
 const FAR: i64 = 4;

@@ -1,4 +1,4 @@
-//! What is known to stand against wider boxes: [`Known`].
+//! Known reasons that refuse wider boxes: [`Known`].
 
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
@@ -10,39 +10,39 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 use crate::cut::{Cut, Ground};
 use crate::row::Row;
 
-/// The cuts that a search has come across, and how much room each leaves to a box inside the
-/// envelope, the present one.
+/// The cuts that a search has found, and the slack of each in the present box, which is inside the
+/// envelope.
 ///
-/// Only wider boxes are asked about, so a cut that stands against a box with one end moved has that
-/// end in one of its rows: an index by end, and the room left in each row, make the question cheap
-/// however many parameters a cut is about.
+/// Queries are about wider boxes only, so a cut that refuses a box with one end moved contains that
+/// end in one of its rows. An index by end and the slack of each row make a query cheap, whatever
+/// the number of parameters in a cut.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Known {
     cuts: Vec<KnownCut>,
     rows: Vec<Row>,
-    /// For each row, the room that it leaves; `None` if it does not hold because an infinite end counts.
+    /// The slack of each row; `None` if the row does not hold because it contains an infinite end.
     room: Vec<Option<Rational>>,
-    /// By end ([`place`]), and then by cut: where it counts.
+    /// By end ([`place`]), and then by cut: the rows that contain it.
     mentions: Vec<Vec<Mention>>,
     /// Ends that cannot be infinite.
     finite: BTreeSet<BoxEnd>,
     /// The present box, if it is known.
     looked_at: Option<DecoupledEnvelope>,
-    /// The room of rows in the box that was settled, where it has changed since.
+    /// The slack of rows in the settled box, for rows that have changed since.
     before: Vec<(usize, Option<Rational>)>,
-    /// For each row, whether it has.
+    /// For each row, `true` if it has changed since.
     has_changed: Vec<bool>,
 }
 
-/// Rows of which one has to hold.
+/// Rows, at least one of which has to hold.
 #[derive(Clone, Debug)]
 struct KnownCut {
     rows: Range<usize>,
-    /// Why; `None` if boxes are only wanted to be so.
+    /// Proof of the cut; `None` if the condition is only wanted.
     ground: Option<Ground>,
 }
 
-/// A row that an end counts in.
+/// Row that contains an end.
 #[derive(Clone, Debug)]
 struct Mention {
     cut: usize,
@@ -51,12 +51,13 @@ struct Mention {
 }
 
 impl Known {
-    /// One more cut. The present box, which is settled, is this one.
+    /// Adds a cut. `envelope` is the present box, which is settled.
     pub(crate) fn add(&mut self, cut: Cut, envelope: &DecoupledEnvelope) {
         self.add_rows(cut.rows, Some(cut.ground), envelope);
     }
 
-    /// One more condition that boxes are wanted to meet, though those inside the envelope need not.
+    /// Adds a condition that the search wants boxes to satisfy, although boxes inside the envelope
+    /// need not.
     pub(crate) fn want(&mut self, row: Row, envelope: &DecoupledEnvelope) {
         self.add_rows(vec![row], None, envelope);
     }
@@ -71,7 +72,7 @@ impl Known {
                     self.mentions.resize_with(place + 1, Vec::new);
                 }
                 let mentions = &mut self.mentions[place];
-                // Most ends count in one row or two.
+                // Most ends occur in one row or two.
                 if mentions.len() == mentions.capacity() {
                     mentions.reserve_exact(mentions.len().max(1));
                 }
@@ -89,12 +90,12 @@ impl Known {
         self.cuts.push(KnownCut { rows, ground });
     }
 
-    /// The end was refused to be infinite, and will be in all wider boxes.
+    /// Records that the end cannot be infinite, in this box and in all wider ones.
     pub(crate) fn set_finite(&mut self, end: BoxEnd) {
         self.finite.insert(end);
     }
 
-    /// The present box is this one, if it was another.
+    /// Makes this the present box, if it was another.
     pub(crate) fn look_at(&mut self, envelope: &DecoupledEnvelope) {
         if self.looked_at.as_ref() != Some(envelope) {
             self.settle();
@@ -103,15 +104,14 @@ impl Known {
         }
     }
 
-    /// The present box is the one to come back to.
+    /// Settles the present box: [`undo`](Self::undo) returns to it.
     pub(crate) fn settle(&mut self) {
         for (row, _) in self.before.drain(..) {
             self.has_changed[row] = false;
         }
     }
 
-    /// The present box is the one that was settled last; at first, that of the cut that was added
-    /// first.
+    /// Returns to the box that was settled last; initially that of the first cut.
     pub(crate) fn undo(&mut self) {
         self.looked_at = None;
         for (row, room) in self.before.drain(..) {
@@ -120,13 +120,13 @@ impl Known {
         }
     }
 
-    /// Whether the present box with an end moved out from `from` to `to` is known not to be inside
-    /// the envelope, or not wanted. `None` is infinitely far.
+    /// Returns `true` if the present box with an end moved out from `from` to `to` is known to be
+    /// outside the envelope, or is not wanted. `None` is infinitely far.
     pub(crate) fn refuses(&self, end: BoxEnd, from: &Rational, to: Option<&Rational>) -> bool {
         to.is_none() && self.finite.contains(&end) || self.against(end, from, to).is_some()
     }
 
-    /// The rows that stand against that box, and why one of them has to hold.
+    /// Returns the rows that refuse that box, and the proof that one of them has to hold.
     pub(crate) fn against(
         &self,
         end: BoxEnd,
@@ -154,7 +154,7 @@ impl Known {
         Some((&self.rows[cut.rows.clone()], cut.ground.as_ref()))
     }
 
-    /// The present box is the one with this end moved out.
+    /// Moves this end of the present box out.
     pub(crate) fn moved(&mut self, end: BoxEnd, from: &Rational, to: Option<&Rational>) {
         self.looked_at = None;
         let farther = to.map(|to| to - from);

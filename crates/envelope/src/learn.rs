@@ -1,11 +1,11 @@
-//! From a box without a schedule, or without a strategy, to a [`Cut`].
+//! Derivation of a [`Cut`] from a box without a schedule, or without a strategy.
 //!
 //! A conflict is a cycle of bounds whose length depends linearly on the ends of the box. Every box
-//! in which it is negative is refused for the same reason, so that all boxes inside the envelope
-//! satisfy "it is not negative". A semi-reducible cycle depends on more: what follows a duration
-//! taken at its lower end must be negative, and a wait counts for no less than the duration takes
-//! at least. So it is a disjunction: the cycle is not negative, or what follows one of these is
-//! not.
+//! with a negative length of this cycle is refused for the same reason. So all boxes inside the
+//! envelope satisfy "the length is not negative". A semi-reducible cycle has further conditions:
+//! the part after a duration at its lower end must be negative, and a wait is at least as long as
+//! the minimum duration. So it gives a disjunction: the cycle is not negative, or one of these
+//! parts is not negative.
 
 mod shorter;
 
@@ -28,18 +28,18 @@ use shorter::Shortcuts;
 /// The limit on the rows of a cut.
 const MOST_ROWS: usize = 64;
 
-/// The outcome of a check, in terms of other boxes.
+/// Result of a check, in terms of cuts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Learnt {
-    /// Nothing is against it.
+    /// The box is accepted.
     Nothing,
-    /// It is refused, and others with it: at least one cut.
+    /// The box is refused, with at least one cut.
     Cuts(Vec<Cut>),
-    /// It is refused, but nothing linear can be said about others.
+    /// The box is refused, but there is no linear cut.
     Unknown,
 }
 
-/// That these values have no schedule.
+/// Returns the cut that follows from values without a schedule.
 pub(crate) fn without_schedule(
     plan: &ParametrizedPlan,
     values: &Valuation,
@@ -54,7 +54,7 @@ pub(crate) fn without_schedule(
         .iter()
         .map(|id| origins[id.index()])
         .collect();
-    // How often each parameter counts: its sign says which of its ends is the worse one.
+    // The sum of each parameter's coefficients; its sign determines the worse end.
     let mut constant = Rational::ZERO;
     let mut counts = vec![Rational::ZERO; plan.parameters.len()];
     for origin in &cycle {
@@ -85,8 +85,8 @@ pub(crate) fn without_schedule(
     learnt(vec![ends], Ground::Cycle(cycle), envelope)
 }
 
-/// The conflicts that prevent dynamic controllability in the box: so many at most, of those that come up
-/// when its network is gone through once.
+/// Returns the conflicts that prevent dynamic controllability in the box: at most `most`, found in
+/// one pass over its network.
 pub(crate) fn without_strategy(
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,
@@ -130,7 +130,7 @@ pub(crate) fn without_strategy(
     }
 }
 
-/// The conflict that prevents strong controllability in the box.
+/// Returns the conflict that prevents strong controllability in the box.
 pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Learnt {
     let Ok(network) = plan.uncertain_network(envelope) else {
         return Learnt::Unknown;
@@ -139,7 +139,7 @@ pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledE
         return Learnt::Nothing;
     };
     if total.is_none() {
-        // An infinite end, whatever the others are: nothing adds up.
+        // An end is infinite, whatever the others are, so there is no sum.
         return Learnt::Unknown;
     }
     let reader = Reader {
@@ -178,7 +178,7 @@ fn learnt(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope)
     }
 }
 
-/// One of these is not negative; in the box all are, or it is no cut.
+/// Returns the cut that one of these is not negative; `None` unless all are negative in the box.
 fn cut(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope) -> Option<Cut> {
     let mut rows = Vec::new();
     for ends in alternatives {
@@ -191,10 +191,10 @@ fn cut(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope) ->
     (!cut.holds_in(envelope)).then_some(cut)
 }
 
-/// All sums of one of these and one of those.
+/// Returns all sums of one element of each list.
 fn sums(mut some: Vec<Ends>, others: &[Ends]) -> Vec<Ends> {
     if let [other] = others {
-        // So it is nearly always, and a way may have thousands of parts.
+        // The usual case, and a way may have thousands of parts.
         for one in &mut some {
             one.add(other);
         }
@@ -206,7 +206,8 @@ fn sums(mut some: Vec<Ends>, others: &[Ends]) -> Vec<Ends> {
     sums.collect()
 }
 
-/// What a cycle of such steps says, if at its ends, one for each parameter, there is no schedule.
+/// Returns the cut of a cycle of such steps, provided that it uses one end of each parameter and
+/// excludes every schedule.
 fn whole<'a>(
     reader: &Reader<'_>,
     parts: impl Iterator<Item = &'a Part>,
@@ -225,7 +226,8 @@ fn whole<'a>(
     cut(vec![total], Ground::Cycle(origins), envelope)
 }
 
-/// The steps of a cycle one after the other, whatever ways they are parts of: ways lie in ways, as deep as a plan is long.
+/// Returns the steps of a cycle in order, without the structure of ways, which are nested as deeply
+/// as a plan is long.
 fn steps(cycle: &[Way]) -> impl Iterator<Item = &Part> {
     let mut open: Vec<&Part> = cycle.iter().flat_map(|way| &way.parts).rev().collect();
     std::iter::from_fn(move || {
@@ -245,7 +247,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// What a conflict in the box says about others.
+    /// Returns the cut that follows from a conflict in the box.
     fn cut(&self, refutation: &Refutation, envelope: &DecoupledEnvelope) -> Option<Cut> {
         let whole = whole(self, steps(&refutation.cycle), envelope);
         if whole.is_some() || refutation.is_flat {
@@ -265,7 +267,7 @@ impl Reader<'_> {
         cut(rows, ground, envelope)
     }
 
-    /// What a step is as long as, and the bound that it is; `None` for a way.
+    /// Returns the length of a step, and the bound that it represents; `None` for a way.
     fn plain(&self, part: &Part) -> Option<(Length, Origin)> {
         let constraint = |link: &LinkId| self.network.links[link.index()];
         Some(match part {
@@ -282,12 +284,12 @@ impl Reader<'_> {
         })
     }
 
-    /// The constraint that leaves a link's duration open.
+    /// Returns the constraint that leaves a link's duration open.
     fn constraint(&self, link: LinkId) -> &Constraint {
         &self.plan.plan.constraints[self.network.links[link.index()]]
     }
 
-    /// The lower bound of a link, or minus its upper one.
+    /// Returns the lower bound of a link, or minus its upper one.
     fn link(&self, link: LinkId, side: Side) -> Length {
         let constraint = self.constraint(link);
         let (bound, sign) = match side {
@@ -305,7 +307,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The bound of a requirement, and where it comes from.
+    /// Returns the bound of a requirement, and its origin.
     fn requirement(&self, id: ConstraintId) -> Option<(Length, Origin)> {
         let requirement = self.network.network.requirements().constraint(id);
         let fixed = Length::Fixed(requirement.bound.clone());
@@ -330,7 +332,8 @@ impl Reader<'_> {
             // A second duration that ends at the same node.
             return None;
         }
-        // Whatever the value, the bound has to hold: an upper bound at the parameter's lower end.
+        // The bound has to hold for all values, so an upper bound applies at the parameter's lower
+        // end.
         let (side, sign) = if is_upper {
             (Side::Lower, 1)
         } else {
@@ -341,8 +344,8 @@ impl Reader<'_> {
         Some((Length::End(end, Rational::from(sign)), origin))
     }
 
-    /// What a way can be as long as: the greatest of these. Adds to `legal` what has to be negative
-    /// for the way to be one.
+    /// Returns the possible lengths of a way; the greatest of them applies. Adds to `legal` the
+    /// lengths that have to be negative for the way to exist.
     fn lengths(&self, way: &Way, legal: &mut Vec<Ends>) -> Option<Vec<Ends>> {
         let mut lengths = vec![Ends::default()];
         for part in way.parts.iter().rev() {
@@ -367,7 +370,7 @@ impl Reader<'_> {
         Some(lengths)
     }
 
-    /// The way in terms of the plan.
+    /// Converts a way to the terms of the plan.
     fn way(&self, way: &Way) -> Option<ProofWay> {
         let constraint = |link: LinkId| self.network.links[link.index()];
         let parts = way.parts.iter().map(|part| {

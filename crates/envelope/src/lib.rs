@@ -1,17 +1,17 @@
 //! Robustness envelopes: the deviations under which a plan still works (Cashmore et al., 2020).
 //!
-//! In: a [`ParametrizedPlan`](elbowroom_plan::ParametrizedPlan). Out: a box of parameter values,
-//! the *decoupled envelope*, in which the plan is guaranteed to work.
+//! The input is a [`ParametrizedPlan`](elbowroom_plan::ParametrizedPlan). The output is a box of
+//! parameter values, the *decoupled envelope*, for which the plan is guaranteed to work.
 //!
 //! - [`mod@obligations`]: the requirements on every schedule of a plan.
 //! - [`mod@soundness`]: the check that every schedule for every value in a box satisfies them.
 //! - [`Guarantee`]: the controllability that is required in a box: weak, dynamic or strong.
 //! - [`Oracle`]: the exact box check (Algorithm 1's CHECKINENVELOPE), both together.
 //! - [`irr`]: Incremental Rectangular Robustification (Algorithm 1), anytime.
-//! - [`best()`]: the largest box by some objective, from outside, with a proof.
+//! - [`best()`]: the largest box by an objective, approached from outside, with a proof.
 //! - [`exact()`]: all values for which a plan works, as a union of polyhedra.
-//! - [`repair()`]: the cheapest change of quantities with which a plan works.
-//! - [`balance()`]: by how much everything may deviate at once.
+//! - [`repair()`]: the cheapest change of quantities that makes a plan work.
+//! - [`balance()`]: the deviation that all quantities tolerate at once.
 //! - [`Objection`]: the reason why a box is not inside, with values and a schedule that show it.
 //!
 //! Linear programs and minimum cost flows are solved here. `elbowroom-execution` does not depend on

@@ -10,7 +10,7 @@ pub use terms::Terms;
 
 mod terms;
 
-/// A factor by which a parameter can be multiplied in a [`Linear`] expression.
+/// Factor that multiplies a parameter in a [`Linear`] expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Factor {
     /// The time of a node.
@@ -37,7 +37,7 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// A number.
+    /// Creates a constant expression.
     pub fn constant(constant: Rational) -> Self {
         Self {
             constant,
@@ -45,7 +45,7 @@ impl Linear {
         }
     }
 
-    /// A parameter.
+    /// Creates an expression of one parameter.
     pub fn parameter(id: ParameterId) -> Self {
         Self {
             parameters: Terms::one(id, Rational::ONE),
@@ -53,7 +53,7 @@ impl Linear {
         }
     }
 
-    /// The time of `to` minus the time of `from`.
+    /// Creates the time of `to` minus the time of `from`.
     pub fn difference(from: NodeId, to: NodeId) -> Self {
         let mut difference = Self::default();
         difference.add_time(to, &Rational::ONE);
@@ -61,7 +61,7 @@ impl Linear {
         difference
     }
 
-    /// The number, if nothing else is in it.
+    /// Returns the number, if the expression is constant.
     pub fn as_constant(&self) -> Option<&Rational> {
         let is_constant =
             self.times.is_empty() && self.parameters.is_empty() && self.products.is_empty();
@@ -89,7 +89,7 @@ impl Linear {
         }
     }
 
-    /// `self + other`.
+    /// Returns `self + other`.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
         let mut sum = self.clone();
@@ -97,7 +97,7 @@ impl Linear {
         sum
     }
 
-    /// `self - other`.
+    /// Returns `self - other`.
     #[must_use]
     pub fn minus(&self, other: &Self) -> Self {
         let mut difference = self.clone();
@@ -105,7 +105,7 @@ impl Linear {
         difference
     }
 
-    /// `factor * self`.
+    /// Returns `factor * self`.
     #[must_use]
     pub fn scaled(&self, factor: &Rational) -> Self {
         let mut scaled = Self::default();
@@ -113,8 +113,7 @@ impl Linear {
         scaled
     }
 
-    /// The product, or `None` if it would be of a kind not representable here: two times, or
-    /// three factors.
+    /// Returns the product; `None` if it cannot be represented: two times, or three factors.
     pub fn times(&self, other: &Self) -> Option<Self> {
         if let Some(factor) = other.as_constant() {
             return Some(self.scaled(factor));
@@ -149,7 +148,7 @@ impl Linear {
         Some(product)
     }
 
-    /// The same with some parameters replaced by numbers.
+    /// Returns the same expression with some parameters replaced by numbers.
     #[must_use]
     pub fn with_values(&self, values: &BTreeMap<ParameterId, Rational>) -> Self {
         let mut fixed = Self {
@@ -179,7 +178,7 @@ impl Linear {
         fixed
     }
 
-    /// The value for these times (by node) and parameters.
+    /// Returns the value for these times (by node) and parameters.
     pub fn value(&self, times: &Schedule, parameters: &Valuation) -> Rational {
         let mut value = self.constant.clone();
         for (node, coefficient) in &self.times {
@@ -198,7 +197,7 @@ impl Linear {
         value
     }
 
-    /// A parameter whose square has a positive coefficient.
+    /// Returns a parameter whose square has a positive coefficient.
     pub fn squared_parameter(&self) -> Option<ParameterId> {
         let square = self.products.iter().find(|((first, factor), amount)| {
             *factor == Factor::Parameter(*first) && amount.is_positive()
@@ -206,7 +205,7 @@ impl Linear {
         square.map(|((id, _), _)| *id)
     }
 
-    /// The parameters that stand in products.
+    /// Returns the parameters that occur in products.
     pub fn multiplied_parameters(&self) -> impl Iterator<Item = ParameterId> + '_ {
         self.products.keys().flat_map(|(first, factor)| {
             let second = match factor {

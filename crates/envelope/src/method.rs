@@ -1,22 +1,22 @@
-//! How an envelope is searched for.
+//! Methods of searching for an envelope.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// How an envelope is searched for.
+/// Method of searching for an envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Method {
-    /// One end of the box at a time is moved out: [`irr`](crate::irr()).
+    /// Moves out one end of the box at a time: [`irr`](crate::irr()).
     Irr,
-    /// The largest box by some objective, with a proof: [`best`](crate::best()).
+    /// Finds the largest box by an objective, with a proof: [`best`](crate::best()).
     Best,
 }
 
 impl Method {
-    /// Its name in documents and on the command line.
+    /// Returns its name in documents and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Irr => "irr",

@@ -1,12 +1,12 @@
-//! What every schedule of a plan must satisfy, as linear inequalities.
+//! Requirements on every schedule of a plan, as linear inequalities.
 //!
-//! `Obligations::compile` runs the plan symbolically, once, in the order of a nominal
-//! schedule. That order is enough: the schedules of a network with boxed parameters form a convex
-//! set, so if two interfering happenings are at least ε apart in all of them, one always comes
-//! first. The separation itself is an obligation; where it holds, every value that a happening
-//! reads is one fixed expression in times and parameters (paper 1's `enc_eff` without its
-//! disjunctions). What remains undecided is only which commuting happenings come before a moment
-//! *inside* an action, where its over-all condition is read ([`OverAll`]).
+//! `Obligations::compile` runs the plan symbolically, once, in the order of a nominal schedule.
+//! That order is enough: the schedules of a network with boxed parameters form a convex set, so if
+//! two interfering happenings are at least ε apart in all of them, one always comes first. The
+//! separation itself is an obligation. If it holds, every value that a happening reads is one fixed
+//! expression in times and parameters (paper 1's `enc_eff` without its disjunctions). The only
+//! undecided question is which commuting happenings come before a moment *inside* an action, where
+//! its over-all condition is read ([`OverAll`]).
 //!
 //! An obligation is violated in exactly the schedules of its [`BadCase`]s.
 
@@ -37,12 +37,12 @@ pub struct Difference {
     pub to: NodeId,
     /// Greatest difference.
     pub bound: Rational,
-    /// Whether the bound itself is excluded.
+    /// `true` if the bound itself is excluded.
     pub is_strict: bool,
 }
 
 impl Difference {
-    /// `earlier < later`.
+    /// Returns `earlier < later`.
     pub fn before(earlier: NodeId, later: NodeId) -> Self {
         Self {
             from: later,
@@ -52,7 +52,7 @@ impl Difference {
         }
     }
 
-    /// `earlier <= later`.
+    /// Returns `earlier <= later`.
     pub fn not_after(earlier: NodeId, later: NodeId) -> Self {
         Self {
             from: later,
@@ -68,19 +68,19 @@ impl Difference {
 pub struct Inequality {
     /// The left-hand side.
     pub expression: Linear,
-    /// Whether zero itself is excluded.
+    /// `true` if zero itself is excluded.
     pub is_strict: bool,
 }
 
 impl Inequality {
-    /// Whether it holds for these times (by node) and parameters.
+    /// Returns `true` if the inequality holds for these times (by node) and parameters.
     pub fn holds(&self, times: &Schedule, parameters: &Valuation) -> bool {
         let value = self.expression.value(times, parameters);
         value.is_negative() || (value.is_zero() && !self.is_strict)
     }
 }
 
-/// One way in which an obligation can be violated: all of these at once.
+/// One way to violate an obligation: all of these constraints hold at once.
 ///
 /// Nodes are those of the plan and, in over-all conditions, [`StnPlan::nodes`]`.len()` for the
 /// moment at which the condition is read.
@@ -116,27 +116,27 @@ pub enum Requirement {
         /// The condition, one conjunct.
         condition: Condition,
     },
-    /// The action's duration obeys its domain.
+    /// The action's duration satisfies its constraints.
     Duration {
         /// The action.
         instance: InstanceId,
-        /// Which of its duration constraints; `None` for `>= 0`.
+        /// Index of the duration constraint; `None` for `>= 0`.
         constraint: Option<usize>,
     },
     /// A number that an effect needs is defined.
     Defined {
-        /// Where it is needed.
+        /// Happening that needs the number.
         node: NodeId,
     },
-    /// A happening changes a fluent in one way only, unless all it does is to increase and
-    /// decrease it.
+    /// A happening changes a fluent in one way only, unless all its changes are increases and
+    /// decreases.
     OneUpdate {
         /// The happening.
         node: NodeId,
         /// The fluent.
         fluent: FluentId,
     },
-    /// Processes and events keep their course.
+    /// Processes and events keep their nominal course.
     Nature {
         /// The happening after which it would change.
         after: NodeId,
@@ -150,12 +150,12 @@ pub enum Requirement {
     },
 }
 
-/// A requirement with all the ways in which it can be violated.
+/// Requirement with all the ways to violate it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obligation {
     /// The requirement.
     pub requirement: Requirement,
-    /// Violated exactly when one of these is the case.
+    /// The obligation is violated exactly when one of these holds.
     pub bad_cases: Vec<BadCase>,
 }
 
@@ -164,11 +164,11 @@ pub struct Obligation {
 pub struct Obligations {
     /// Obligations whose bad cases are known.
     pub direct: Vec<Obligation>,
-    /// Numeric and compound over-all conditions; their cases unfold on demand.
+    /// Numeric and compound over-all conditions; their cases are computed on demand.
     pub over_all: Vec<OverAll>,
 }
 
-/// The exact method does not cover something in the plan or its problem.
+/// Error for a plan or problem that the exact method does not cover.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -177,46 +177,46 @@ pub enum Refusal {
         "{place}: the value of {expression} is not linear in times and parameters; fix one of its factors"
     )]
     NotLinear {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
         /// The expression.
         expression: String,
     },
-    /// A rate changes while it acts.
+    /// A rate changes while it is active.
     #[error("{place}: the rate of change of {fluent} depends on something that changes later on")]
     ChangingRate {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
         /// The fluent it changes.
         fluent: String,
     },
-    /// A conditional effect hangs on what holds throughout its action.
+    /// A conditional effect depends on a condition throughout its action.
     #[error("{place}: a conditional effect with an over-all condition cannot be analysed")]
     GuardOverAll {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
     },
     /// Too many combinations of conditional effects or alternatives.
     #[error("{place}: more than {limit} combinations of cases")]
     TooManyCases {
-        /// Where they arise.
+        /// Location that the combinations arise from.
         place: String,
-        /// How many are considered.
+        /// Limit on combinations.
         limit: usize,
     },
     /// A derived fact depends on its own negation.
     #[error("{place}: a derived fact depends on its own negation; rewrite the rules without that")]
     Unstratified {
-        /// Where it is read.
+        /// Location that reads the derived fact.
         place: String,
     },
-    /// A number is left open that is not among the plan's parameters.
+    /// A number is left open that is not one of the plan's parameters.
     #[error("{place}: a number is left open that is no parameter; vary it or give it a value")]
     OpenNumber {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
     },
-    /// The ends of a parameter's interval do not decide what happens between them.
+    /// The ends of a parameter's interval do not decide the values between them.
     #[error(
         "parameter {name} is multiplied by itself, or by a time that it also bounds, or with \
          several numbers of one condition; give it a value, or vary one of these only"
@@ -225,12 +225,13 @@ pub enum Refusal {
         /// The parameter.
         name: String,
     },
-    /// What processes and events do is not known, or cannot be told by linear inequalities.
+    /// The behaviour of processes and events is unknown, or cannot be described by linear
+    /// inequalities.
     #[error("{place}: {obstacle}")]
     Nature {
-        /// Where it stands.
+        /// Location in the plan or problem.
         place: String,
-        /// What stands in the way.
+        /// Description of the obstacle.
         obstacle: String,
     },
     /// The plan's network has no schedule at the nominal values.
@@ -239,7 +240,7 @@ pub enum Refusal {
 }
 
 impl Requirement {
-    /// The requirement in words.
+    /// Describes the requirement in words.
     pub fn describe(&self, task: &Task, plan: &StnPlan) -> String {
         match self {
             Self::Separation { first, second } => format!(

@@ -16,17 +16,17 @@ use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::soundness::{Broken, Conditions, Counterexample, Soundness};
 
-/// Decides whether a plan is guaranteed to work in a box: for all values in it there is a
-/// schedule, and every schedule is valid (paper 1, CHECKINENVELOPE and theorem 1). "There is a
-/// schedule" is read as a [`Guarantee`] demands.
+/// Decides whether a plan is guaranteed to work in a box: for all values in it there is a schedule,
+/// and every schedule is valid (paper 1, CHECKINENVELOPE and theorem 1). "There is a schedule" is
+/// interpreted by a [`Guarantee`].
 ///
-/// It keeps one box that it has [accepted](Self::accepted), and remembers why. To move one end of
-/// that box ([`try_reach`](Self::try_reach)) costs little: only the proofs that use the end are
-/// looked for again. Since it is the oracle that makes the wider box, nobody can tell it something
-/// wrong about how two boxes differ. Other boxes can be asked about at any time
-/// ([`objection`](Self::objection)); that takes longer, and leaves the accepted box as it is.
+/// The oracle keeps one [accepted](Self::accepted) box and its proofs. Moving one end of that box
+/// ([`try_reach`](Self::try_reach)) costs little, because only the proofs that use the end are
+/// searched again. The oracle constructs the wider box itself, so the caller cannot misstate the
+/// difference of two boxes. Other boxes can be checked at any time
+/// ([`objection`](Self::objection)). That takes longer, and does not change the accepted box.
 ///
-/// A box that merely differs in one end from another one cannot be passed off as such:
+/// The interface has no way to pass an arbitrary box as one that differs in one end only:
 ///
 /// ```compile_fail
 /// # use elbowroom_envelope::Oracle;
@@ -43,35 +43,35 @@ pub struct Oracle {
     guarantee: Guarantee,
     asked: Asked,
     controllability: Controllability,
-    /// The conditions on all schedules; `None` while no values with a schedule are known, and where they are not asked
-    /// about.
+    /// The conditions on all schedules; `None` while no values with a schedule are known, or if
+    /// only the times are checked.
     soundness: Option<Soundness>,
-    /// The values whose order of happenings `soundness` goes by; at first the nominal ones.
+    /// Values that determine the order of happenings in `soundness`; initially the nominal ones.
     around: Valuation,
     /// The number of bad cases refuted from scratch before `around` changed last.
     refuted_before: usize,
     accepted: Option<DecoupledEnvelope>,
-    /// Whether `accepted` is the last box that was found inside, so that what is remembered is
+    /// `true` if `accepted` is the last box that was found inside, so that the stored proofs are
     /// about it.
     remembers_accepted: bool,
-    /// Whether all proofs that `soundness` knows hold in the last box found inside.
+    /// `true` if all proofs stored in `soundness` hold in the last box found inside.
     proofs_hold_in_last: bool,
     checks: usize,
     without_schedule: usize,
-    /// What the last search has found out.
+    /// Reasons that the last search has found.
     known: Known,
 }
 
-/// What of a plan is asked about.
+/// Scope of the check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Asked {
-    /// Every condition that all its schedules have to meet, and the times.
+    /// The conditions on all schedules, and the times.
     All,
-    /// Nothing but the times: its network is known to see to the conditions.
+    /// Only the times: the network is known to imply the conditions.
     Times,
 }
 
-/// An [`Objection`] before the values are worked out.
+/// [`Objection`] without its values.
 enum Reason {
     /// The plan has no schedule at these values.
     NoSchedule(Valuation),
@@ -80,11 +80,11 @@ enum Reason {
 }
 
 impl Oracle {
-    /// The oracle for a plan. If the plan has no schedule at its nominal values, that is what
-    /// stands against each box that holds them.
+    /// Creates the oracle for a plan. If the plan has no schedule at its nominal values, every box
+    /// that contains them is refused for that reason.
     ///
     /// # Errors
-    /// When the plan holds something beyond exact linear reasoning; the message names it.
+    /// If the plan contains something beyond exact linear reasoning; the message names it.
     pub fn new(
         task: &Arc<Task>,
         plan: &Arc<ParametrizedPlan>,
@@ -93,9 +93,11 @@ impl Oracle {
         Self::asking(task, plan, guarantee, Asked::All)
     }
 
-    /// The oracle for a plan all of whose schedules are known to be valid, whatever the values of its
-    /// parameters ([`keeps_all_that_is_read`](elbowroom_plan::deorder::keeps_all_that_is_read)). It takes time that grows little faster than
-    /// the plan; to look at each condition takes time that grows with the square of its length.
+    /// Creates the oracle for a plan whose schedules are all known to be valid, whatever the values
+    /// of its parameters
+    /// ([`keeps_all_that_is_read`](elbowroom_plan::deorder::keeps_all_that_is_read)). The time
+    /// grows little faster than the plan. Checking each condition would take time that grows with
+    /// the square of its length.
     ///
     /// # Errors
     /// As for [`new`](Self::new).
@@ -138,48 +140,49 @@ impl Oracle {
         })
     }
 
-    /// The plan it was made for.
+    /// Returns the plan that it was created for.
     pub fn plan(&self) -> &Arc<ParametrizedPlan> {
         &self.plan
     }
 
-    /// The guarantee that it checks.
+    /// Returns the guarantee that it checks.
     pub fn guarantee(&self) -> Guarantee {
         self.guarantee
     }
 
-    /// The box that was accepted by [`start`](Self::start), as widened since; `None` before that.
+    /// Returns the box that was accepted by [`start`](Self::start), as widened since; `None` before
+    /// that.
     pub fn accepted(&self) -> Option<&DecoupledEnvelope> {
         self.accepted.as_ref()
     }
 
-    /// How the conditions that the plan has to meet are met in a box that is accepted.
+    /// Returns the numbers of conditions of the plan, by what enforces them in an accepted box.
     pub fn conditions(&self) -> Conditions {
         let known = self.soundness.as_ref();
         known.map(Soundness::conditions).unwrap_or_default()
     }
 
-    /// The number of boxes checked.
+    /// Returns the number of boxes checked.
     pub fn checks(&self) -> usize {
         self.checks
     }
 
-    /// How many of these were refused because some values have no schedule.
+    /// Returns the number of checked boxes that were refused because some values have no schedule.
     pub fn without_schedule(&self) -> usize {
         self.without_schedule
     }
 
-    /// The number of bad cases refuted from scratch: a measure of work.
+    /// Returns the number of bad cases refuted from scratch: a measure of work.
     pub fn refutations(&self) -> usize {
         let now = self.soundness.as_ref().map_or(0, Soundness::refutations);
         self.refuted_before + now
     }
 
-    /// Takes a box for the one to widen, unless it is not inside the envelope, which the answer
-    /// then says. A box accepted earlier stays the accepted one in that case.
+    /// Makes a box the accepted one, or returns the objection if it is not inside the envelope. In
+    /// that case a box accepted earlier stays the accepted one.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub fn start(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Objection>, Refusal> {
         let reason = self.check_afresh(envelope)?;
         if reason.is_none() {
@@ -189,24 +192,23 @@ impl Oracle {
         Ok(reason.map(|reason| self.objection_of(envelope, reason)))
     }
 
-    /// Moves one end of the accepted box out so that it reaches that far ([`BoxEnd::reach`];
-    /// `None` is infinitely far), if the box stays inside the envelope: whether it does.
+    /// Moves one end of the accepted box out to `reach` ([`BoxEnd::reach`]; `None` is infinitely
+    /// far), if the box stays inside the envelope. Returns `true` if it does.
     ///
-    /// An end that reaches so far already stays where it is. If no box has been accepted yet, the
-    /// nominal values are the box to start from; if not even they are inside, neither is a wider
-    /// box.
+    /// An end that already reaches as far is not moved. If no box has been accepted yet, the
+    /// nominal values are the initial box. If not even they are inside, neither is a wider box.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub fn try_reach(&mut self, end: BoxEnd, reach: Option<Rational>) -> Result<bool, Refusal> {
         Ok(self.widen(end, reach)?.is_none())
     }
 
-    /// Like [`try_reach`](Self::try_reach), with the reason if the box cannot be widened so, which
-    /// can take some time to work out.
+    /// Like [`try_reach`](Self::try_reach), but returns the objection if the box cannot be widened.
+    /// Computing it can take some time.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub fn objection_to_reach(
         &mut self,
         end: BoxEnd,
@@ -216,10 +218,11 @@ impl Oracle {
         Ok(refused.map(|(envelope, reason)| self.objection_of(&envelope, reason)))
     }
 
-    /// Why the box is not inside the envelope; `None` if it is. The accepted box stays what it is.
+    /// Returns the reason why the box is not inside the envelope; `None` if it is. The accepted box
+    /// does not change.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub fn objection(
         &mut self,
         envelope: &DecoupledEnvelope,
@@ -266,8 +269,9 @@ impl Oracle {
         Ok(strong_conflict(&plan, &far).is_none())
     }
 
-    /// Values and a schedule in the box that break the obligation by as much as any do. Two
-    /// happenings that should be apart may then be so far the wrong way round that it does no harm.
+    /// Returns values and a schedule in the box with the greatest violation of the obligation. Two
+    /// happenings that should be apart may then be far apart in the reverse order, which is
+    /// harmless.
     pub fn worst_case(
         &self,
         envelope: &DecoupledEnvelope,
@@ -276,7 +280,7 @@ impl Oracle {
         self.soundness.as_ref()?.worst_case(envelope, broken)
     }
 
-    /// Values and a schedule in the box that show what is broken.
+    /// Returns values and a schedule in the box that show the violation.
     pub fn counterexample(
         &self,
         envelope: &DecoupledEnvelope,
@@ -285,8 +289,8 @@ impl Oracle {
         self.soundness.as_ref()?.counterexample(envelope, broken)
     }
 
-    /// The accepted box with an end moved out, and why that is refused; `None` if it is not, and
-    /// is the accepted box now.
+    /// Moves an end of the accepted box out. Returns the wider box and the reason if it is refused;
+    /// `None` if it is the accepted box now.
     fn widen(
         &mut self,
         end: BoxEnd,
@@ -323,7 +327,7 @@ impl Oracle {
         }
     }
 
-    /// The nominal values as a box, if they are inside.
+    /// Returns the nominal values as a box, if they are inside.
     fn start_at_nominal(
         &mut self,
     ) -> Result<Result<DecoupledEnvelope, (DecoupledEnvelope, Reason)>, Refusal> {
@@ -343,7 +347,7 @@ impl Oracle {
         end: BoxEnd,
     ) -> Result<Option<Reason>, Refusal> {
         if !self.remembers_accepted {
-            // Another box has been found inside since, so what is remembered is about that one.
+            // Another box has been found inside since, so the stored proofs are about that one.
             let again = self.check_afresh(accepted);
             self.checks -= 1;
             self.remembers_accepted = again?.is_none();
@@ -352,9 +356,8 @@ impl Oracle {
             return self.check_afresh(candidate);
         }
         self.checks += 1;
-        // Proofs found for a box that was refused, and is not the last accepted one with an end
-        // moved out, may not hold in the last accepted one: then which end has moved says nothing
-        // about them.
+        // Proofs found for a refused box that is not the last accepted one with an end moved out
+        // may not hold in the last accepted one. The moved end then says nothing about them.
         let trusted = self.proofs_hold_in_last.then_some(end);
         let reason = self.sound_and_controllable(candidate, Some(end), trusted);
         if let Ok(None) = &reason {
@@ -363,7 +366,7 @@ impl Oracle {
         reason
     }
 
-    /// Checks a box that need not have anything to do with the one before.
+    /// Checks a box that may be unrelated to the previous one.
     fn check_afresh(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Reason>, Refusal> {
         self.checks += 1;
         let reason = self.sound_and_controllable(envelope, None, None);
@@ -377,8 +380,8 @@ impl Oracle {
         moved: Option<BoxEnd>,
         trusted: Option<BoxEnd>,
     ) -> Result<Option<Reason>, Refusal> {
-        // A sound box with an infeasible one rejected afterwards would leave the networks of the
-        // feasibility check ahead of the accepted box, so soundness comes first.
+        // Soundness comes first. If a feasible box were rejected as unsound afterwards, the
+        // networks of the feasibility check would be ahead of the accepted box.
         if self.asked == Asked::All
             && let Some(reason) = self.unsound(envelope, trusted)?
         {
@@ -391,7 +394,8 @@ impl Oracle {
         Ok(None)
     }
 
-    /// Why not every schedule in the box meets the conditions, or there is none.
+    /// Returns the reason why some schedule in the box violates a condition, or why there is no
+    /// schedule.
     fn unsound(
         &mut self,
         envelope: &DecoupledEnvelope,
@@ -412,10 +416,11 @@ impl Oracle {
         Ok(broken.map(Reason::Broken))
     }
 
-    /// Goes by the order that happenings have in the box from now on. The box need not hold the
-    /// nominal values, and elsewhere a plan may work in another order.
+    /// Switches to the order of happenings in the box. The box need not contain the nominal values,
+    /// and elsewhere a plan may work in another order.
     ///
-    /// Values in the box that have no schedule, if that shows already; then nothing changes.
+    /// Returns values in the box without a schedule, if they are found on the way; then nothing
+    /// changes.
     fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
         let nearest = envelope.nearest(&self.plan.nominal());
         let Some(soundness) = Soundness::around(&self.task, &self.plan, &nearest)? else {

@@ -1,18 +1,19 @@
-//! Why a box is inside the envelope, told so that others can check it.
+//! Checkable proofs that a box is inside the envelope.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{NodeId, ParameterId, Schedule};
 
 use crate::obligations::{Difference, Inequality, Requirement};
 
-/// Why there are times for all points, whatever the values in a box are.
+/// Proof that there are times for all points, for all values in a box.
 #[derive(Clone, Debug)]
 pub enum ControlProof {
-    /// These times do, for the strong guarantee; those that the world decides on are the earliest.
+    /// These times work, for the strong guarantee; those that the world decides on are the
+    /// earliest.
     Times(Schedule),
     /// Rules for an executor that knows the values; the first case is split into the others.
     Schedules(Vec<ScheduleCase>),
-    /// What an executor has to keep to that learns the values as they come about.
+    /// Constraints for an executor that observes the values during execution.
     Strategy(Strategy),
 }
 
@@ -21,55 +22,55 @@ pub enum ControlProof {
 pub enum ScheduleCase {
     /// The parameter is at its least value in the first case, and at its greatest in the second.
     Split(ParameterId, [usize; 2]),
-    /// For each node how its time depends on the values.
+    /// A rule for the time of each node, depending on the values.
     Rule(Vec<TimeRule>),
 }
 
 /// `constant + Σ factor · value`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TimeRule {
-    /// What depends on no value.
+    /// Constant part.
     pub constant: Rational,
-    /// What values count; none is zero.
+    /// Factors of the values; none is zero.
     pub factors: Vec<(ParameterId, Rational)>,
 }
 
-/// A dispatchable form of the plan's network.
+/// Dispatchable form of the plan's network.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Strategy {
-    /// `to - from <= bound`, beside the plan's own constraints.
+    /// Edges `to - from <= bound`, in addition to the plan's own constraints.
     pub edges: Vec<(NodeId, NodeId, Rational)>,
-    /// Nodes that wait for the end of a duration (the plan's constraint at this position), and how
-    /// long at most after its beginning.
+    /// Nodes that wait for the end of a duration (the plan's constraint at this position), and the
+    /// longest wait after its beginning.
     pub waits: Vec<(NodeId, usize, Option<Rational>)>,
 }
 
-/// Why a condition of the plan cannot fail in any schedule for values in a box.
+/// Proof that a condition of the plan cannot fail in any schedule for values in a box.
 #[derive(Clone, Debug)]
 pub struct ConditionProof {
     /// The condition.
     pub requirement: Requirement,
     /// For an over-all condition, the nodes between which its moment lies.
     pub during: Option<[NodeId; 2]>,
-    /// Why it cannot fail; `None` where that cannot be told.
+    /// Proof that it cannot fail; `None` if it cannot be computed.
     pub why: Option<Unfailing>,
 }
 
-/// Why a condition cannot fail.
+/// Proof that a condition cannot fail.
 #[derive(Clone, Debug)]
 pub enum Unfailing {
     /// The moment is at or after a node, or before it.
     Either(NodeId, Box<Unfailing>, Box<Unfailing>),
     /// There is no such moment.
     Never(Refutation),
-    /// Each of the ways in which it could fail is impossible.
+    /// Each way for the condition to fail is impossible.
     Ways(Vec<Impossible>),
 }
 
-/// A way in which a condition could fail, and why it is impossible.
+/// Way for a condition to fail, with the proof that it is impossible.
 #[derive(Clone, Debug)]
 pub struct Impossible {
-    /// Differences of times, beside those of the place of the moment.
+    /// Differences of times, in addition to those for the place of the moment.
     pub differences: Vec<Difference>,
     /// Other inequalities.
     pub inequalities: Vec<Inequality>,
@@ -79,10 +80,10 @@ pub struct Impossible {
     pub sums: Vec<Refutation>,
 }
 
-/// Inequalities, each so many times, that add up to a contradiction.
+/// Inequalities with multipliers, whose sum is a contradiction.
 pub type Refutation = Vec<(Summand, Rational)>;
 
-/// An inequality of a [`Refutation`].
+/// Inequality of a [`Refutation`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Summand {
     /// The node comes at 0 or later.
@@ -91,8 +92,8 @@ pub enum Summand {
     AtLeast(usize),
     /// The upper bound of the plan's constraint at this position.
     AtMost(usize),
-    /// That difference: those of the place of the moment first.
+    /// The difference at this position: those for the place of the moment come first.
     Difference(usize),
-    /// That inequality.
+    /// The inequality at this position.
     Inequality(usize),
 }

@@ -1,4 +1,4 @@
-//! How far a box can grow in one direction.
+//! Search for the largest box along one direction.
 
 use std::ops::ControlFlow;
 
@@ -11,40 +11,40 @@ use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 use crate::row::Row;
 
-/// How often an interval is halved where nothing linear is known.
+/// Number of halvings of an interval when no linear cut is known.
 const HALVINGS: usize = 40;
 
 /// Boxes that grow with a number: each end lies at `min(most, base + number · step)`.
 #[derive(Clone, Debug)]
 pub(crate) struct Ray {
-    /// By [`place`]: how far out the end lies at 0.
+    /// By [`place`]: the reach of the end at 0.
     pub(crate) base: Vec<Rational>,
-    /// By how much the end moves out for each 1; not negative.
+    /// The distance by which the end moves out per unit; not negative.
     pub(crate) step: Vec<Rational>,
-    /// How far out it may lie; `None` without limit.
+    /// Greatest reach of the end; `None` without limit.
     pub(crate) most: Vec<Option<Rational>>,
 }
 
-/// How far a box can grow along a [`Ray`].
+/// Largest box along a [`Ray`], as bounds on its number.
 #[derive(Clone, Debug)]
 pub(crate) struct Reached {
     /// The box with this number is inside the envelope.
     pub(crate) inside: Rational,
-    /// No box with a greater number than this one is; the same as `inside` where that is exact.
+    /// No box with a greater number is inside; the same as `inside` if that is exact.
     pub(crate) outside: Rational,
-    /// What stands against greater numbers, by position among the cuts; `None` if only the limit of
-    /// the question does, or if it is nothing linear.
+    /// Cut that refuses greater numbers, by position; `None` if only the caller's limit does, or if
+    /// the reason is not linear.
     pub(crate) cut: Option<usize>,
 }
 
-/// The place of an end in a list: lower and upper, parameter by parameter.
+/// Returns the position of an end in a list: lower and upper, parameter by parameter.
 pub(crate) fn place(end: BoxEnd) -> usize {
     2 * end.parameter.index() + end.side.index()
 }
 
 impl Ray {
-    /// The nominal values, and no direction yet. Ends may lie as far out as the ranges of the
-    /// parameters; those of uncertain durations at 0 or later.
+    /// Creates a ray at the nominal values, without a direction. Ends may reach as far as the
+    /// ranges of the parameters; those of uncertain durations are at 0 or later.
     pub(crate) fn new(plan: &ParametrizedPlan) -> Self {
         let count = plan.parameters.len();
         let mut ray = Self {
@@ -62,7 +62,7 @@ impl Ray {
         ray
     }
 
-    /// How far out the end at a place lies.
+    /// Returns the reach of the end at a place.
     pub(crate) fn reach(&self, place: usize, number: &Rational) -> Rational {
         let reach = &self.base[place] + &self.step[place] * number;
         match &self.most[place] {
@@ -72,7 +72,7 @@ impl Ray {
         }
     }
 
-    /// The box of a number.
+    /// Returns the box of a number.
     pub(crate) fn at(&self, plan: &ParametrizedPlan, number: &Rational) -> DecoupledEnvelope {
         let mut envelope = DecoupledEnvelope::point(&plan.nominal());
         for index in 0..plan.parameters.len() {
@@ -84,16 +84,16 @@ impl Ray {
         envelope
     }
 
-    /// The greatest number from `least` to `most` for which the box is inside the envelope. The box
-    /// of `least` is.
+    /// Searches for the greatest number from `least` to `most` whose box is inside the envelope.
+    /// The box of `least` must be inside.
     ///
-    /// A box that is refused says which others are; the greatest number that this leaves is the
-    /// next to be asked about, so that the first that is accepted is the answer. Where nothing
-    /// linear is known, the interval is halved. What is learnt is added to `cuts`; `on_step` is
-    /// told the greatest number so far before each box that is checked, and can end the search.
+    /// A refused box yields cuts. The greatest number that satisfies them is checked next, so the
+    /// first accepted number is the result. If no linear cut is known, the interval is halved. New
+    /// cuts are added to `cuts`. `on_step` receives the greatest number so far before each check,
+    /// and can end the search.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub(crate) fn shoot(
         &self,
         oracle: &mut Oracle,
@@ -129,7 +129,7 @@ impl Ray {
                         self.lower(&mut reached, &cut, cuts.len());
                         cuts.push(cut);
                     }
-                    // A bound that is not reached itself, or one that was known before.
+                    // The bound itself is not reached, or it was known before.
                     let is_stuck = reached.outside == before && next == before;
                     if reached.outside > next {
                         reached.outside = next;
@@ -152,7 +152,7 @@ impl Ray {
         Ok(reached)
     }
 
-    /// Lowers the greatest number possible to what a cut leaves.
+    /// Lowers the greatest possible number to the limit of a cut.
     fn lower(&self, reached: &mut Reached, cut: &Cut, index: usize) {
         let left = self.left_by(cut, &reached.outside);
         let left = left.unwrap_or_default().max(reached.inside.clone());
@@ -162,7 +162,7 @@ impl Ray {
         }
     }
 
-    /// The greatest number up to `most` that a cut leaves.
+    /// Returns the greatest number up to `most` that satisfies a cut.
     fn left_by(&self, cut: &Cut, most: &Rational) -> Option<Rational> {
         let left = cut
             .rows
@@ -171,7 +171,7 @@ impl Ray {
         left.max()
     }
 
-    /// The greatest number up to `most` for which a row holds, strict or not.
+    /// Returns the greatest number up to `most` for which a row holds, ignoring strictness.
     fn left_by_row(&self, row: &Row, most: &Rational) -> Option<Rational> {
         let value = |number: &Rational| {
             let sum = row.factors.iter().map(|(end, factor)| {
@@ -180,7 +180,7 @@ impl Ray {
             });
             sum.fold(Rational::ZERO, |sum, term| sum + term) - &row.bound
         };
-        // Between the numbers at which an end comes to its limit, the value is linear.
+        // The value is linear between the numbers at which ends reach their limits.
         let mut corners = vec![Rational::ZERO, most.clone()];
         for end in row.factors.keys() {
             let place = place(end);

@@ -1,5 +1,4 @@
-//! The plan's network with rigidly connected nodes taken together, and weights that depend on a
-//! box.
+//! The plan's network with rigidly connected nodes merged, and weights that depend on a box.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -34,15 +33,15 @@ pub struct Edge {
 
 /// The plan's network over classes of rigidly connected nodes.
 ///
-/// Two nodes are in one class if constraints without parameters fix their difference. Plans are
-/// full of such pairs (fixed durations, timed initials); what is left is often tiny.
+/// Two nodes are in one class if constraints without parameters fix their difference. Plans contain
+/// many such pairs (fixed durations, timed initials), and the remaining network is often tiny.
 #[derive(Clone, Debug)]
 pub struct Reduction {
-    /// For each node its class, and by how much it comes after the class's own time.
+    /// For each node its class, and its offset from the time of the class.
     places: Vec<(ClassId, Rational)>,
     class_count: usize,
     edges: Arc<Vec<Edge>>,
-    /// Parameters that are differences of times, by the constraint `[p, p]` that says so.
+    /// Parameters that are differences of times, defined by a constraint `[p, p]`.
     pub substitution: Substitution,
     /// Parameters that bound more than the one difference they are.
     pub coupled: Vec<ParameterId>,
@@ -50,16 +49,16 @@ pub struct Reduction {
     mentioned: BTreeSet<ParameterId>,
 }
 
-/// The network of a box, and which edge each of its constraints comes from.
+/// Network of a box, with the edge that each of its constraints comes from.
 pub struct BoxNetwork {
-    /// Over classes.
+    /// The network over classes.
     pub network: Network<Delta>,
     /// For each constraint of the network, a position in [`Reduction::edges`].
     pub edges: Vec<usize>,
 }
 
 impl Reduction {
-    /// The reduced network of a plan.
+    /// Computes the reduced network of a plan.
     pub fn new(plan: &ParametrizedPlan) -> Self {
         let places = classes(plan);
         let class_count = 1 + places
@@ -116,18 +115,18 @@ impl Reduction {
         reduction
     }
 
-    /// Drops constraints that the others imply whatever values the parameters take in their
-    /// ranges.
+    /// Drops constraints that the others imply for all values of the parameters in their ranges.
     ///
-    /// Besides being less work, this shows what parameters really bear on: a constraint "the end
-    /// comes after time 0" would put the duration before it on a cycle of constraints.
+    /// This saves work, and reveals the constraints that a parameter really affects: a constraint
+    /// "the end comes after time 0" would put the duration before it on a cycle of constraints.
     fn drop_implied(&mut self, plan: &ParametrizedPlan) {
         let ranges = DecoupledEnvelope::ranges(plan);
         let BoxNetwork { network, edges } = self.network(&ranges);
         let nominal = DecoupledEnvelope::point(&plan.nominal());
         let nominal = self.network(&nominal).network;
         let has_parameter = |id: ConstraintId| self.edges[edges[id.index()]].end.is_some();
-        // Whole numbers are several times faster; sums of paths must stay far from overflow.
+        // Whole numbers are several times faster, and small enough that sums of paths do not
+        // overflow.
         let implied = match scaled([&network, &nominal]) {
             Some([network, nominal]) => implied(network, nominal, has_parameter),
             None => implied(network, nominal, has_parameter),
@@ -140,7 +139,7 @@ impl Reduction {
         });
     }
 
-    /// Learns what a constraint says about the parameters in it.
+    /// Records the parameters of a constraint.
     fn note_parameters(
         &mut self,
         plan: &ParametrizedPlan,
@@ -164,16 +163,16 @@ impl Reduction {
         }
     }
 
-    /// Whether the parameter bounds a difference of times.
+    /// Returns `true` if the parameter bounds a difference of times.
     pub fn is_in_network(&self, parameter: ParameterId) -> bool {
         self.mentioned.contains(&parameter)
     }
 
-    /// A parameter in a product that the corners of a box say nothing about.
+    /// Returns a parameter in a product that the corners of a box do not decide.
     ///
-    /// Products are exact only one inequality at a time, only if the multiplied parameter does not
-    /// also move the times, and only if it does not multiply itself: a square is least between the
-    /// ends of an interval, unless its coefficient is negative.
+    /// Products are exact only for one inequality at a time, only if the multiplied parameter does
+    /// not also move the times, and only if it is not multiplied by itself: a square is least
+    /// between the ends of an interval, unless its coefficient is negative.
     pub(crate) fn undecided_at_corners(&self, case: &BadCase) -> Option<ParameterId> {
         let is_joint = case.inequalities.len() > 1;
         let expressions = case.inequalities.iter().map(|i| &i.expression);
@@ -213,7 +212,7 @@ impl Reduction {
         }
     }
 
-    /// Of parallel edges that depend on the same end only the tightest says anything.
+    /// Keeps only the tightest of parallel edges that depend on the same end.
     fn keep_tightest(&mut self) {
         let edges = Arc::make_mut(&mut self.edges);
         edges.sort_by(|a, b| {
@@ -225,8 +224,8 @@ impl Reduction {
         edges.dedup_by(|b, a| (a.from, a.to, a.end) == (b.from, b.to, b.end));
     }
 
-    /// The node's class, and by how much the node comes after it. One node more than the plan has
-    /// is the moment of an over-all condition; it has a class of its own, the last.
+    /// Returns the node's class, and the node's offset from it. The node after the plan's last is
+    /// the moment of an over-all condition; it has its own class, the last.
     pub fn place(&self, node: NodeId) -> (ClassId, Rational) {
         match self.places.get(node.index()) {
             Some((class, offset)) => (*class, offset.clone()),
@@ -234,37 +233,38 @@ impl Reduction {
         }
     }
 
-    /// By how much nodes come after their classes.
+    /// Returns the offsets of nodes from their classes.
     pub(crate) fn offsets(&self) -> impl Iterator<Item = &Rational> {
         self.places.iter().map(|(_, offset)| offset)
     }
 
-    /// The class of the moment at which an over-all condition is read.
+    /// Returns the class of the moment at which an over-all condition is read.
     pub fn moment(&self) -> ClassId {
         ClassId(u32::try_from(self.class_count).expect("fewer classes than nodes"))
     }
 
-    /// The constraints.
+    /// Returns the constraints.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
     }
 
-    /// The constraints, for whoever keeps them.
+    /// Returns a shared reference to the constraints.
     pub(crate) fn shared_edges(&self) -> Arc<Vec<Edge>> {
         Arc::clone(&self.edges)
     }
 
-    /// The number of classes.
+    /// Returns the number of classes.
     pub fn class_count(&self) -> usize {
         self.class_count
     }
 
-    /// The number of nodes of the plan.
+    /// Returns the number of nodes of the plan.
     pub fn node_count(&self) -> usize {
         self.places.len()
     }
 
-    /// The network in which every parameter ranges over its interval, separately for each edge.
+    /// Returns the network for a box, with every parameter at the worst end of its interval,
+    /// separately for each edge.
     pub fn network(&self, envelope: &DecoupledEnvelope) -> BoxNetwork {
         let mut network = Network::with_nodes(self.class_count);
         let mut edges = Vec::with_capacity(self.edges.len());
@@ -282,7 +282,7 @@ impl Reduction {
         BoxNetwork { network, edges }
     }
 
-    /// The times of the classes, from those of all nodes.
+    /// Converts the times of all nodes to those of the classes.
     pub(crate) fn class_times(&self, schedule: &Schedule) -> Vec<Rational> {
         let mut times = vec![Rational::ZERO; self.class_count];
         for ((class, offset), time) in self.places.iter().zip(schedule.iter()) {
@@ -291,7 +291,7 @@ impl Reduction {
         times
     }
 
-    /// The times of all nodes, from those of the classes; class 0 holds time zero.
+    /// Converts the times of the classes to those of all nodes; class 0 contains time zero.
     pub fn times(&self, class_times: &[Rational]) -> Schedule {
         self.places
             .iter()
@@ -301,7 +301,7 @@ impl Reduction {
 }
 
 impl Edge {
-    /// The bound in a box; `None` if there is none.
+    /// Returns the bound in a box; `None` if there is none.
     pub fn bound(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
         match self.end {
             None => Some(self.constant.clone()),
@@ -310,11 +310,11 @@ impl Edge {
     }
 }
 
-/// The constraints that others imply; none if the network is inconsistent (then there is nothing
-/// to gain, and the check of the nominal values will say so).
+/// Returns the constraints that others imply; none if the network is inconsistent (the check of the
+/// nominal values will then fail anyway).
 ///
-/// They are looked for in a schedule of the plan as it is: in one of the whole network everything
-/// may be at once, and then each search goes through all of it.
+/// The search uses the nominal schedule of the plan. In a schedule of the whole network many nodes
+/// may coincide, so that each search would visit all of it.
 fn implied<W: Weight>(
     network: Network<W>,
     nominal: Network<W>,
@@ -328,7 +328,8 @@ fn implied<W: Weight>(
     let Some(schedule) = schedule.filter(|schedule| schedule.holds_in(network.network())) else {
         return network.implied(keep);
     };
-    // What is near in time is looked through at once, the way back to the beginning is not.
+    // Searches among nodes that are close in time are fast, but searches along constraints back to
+    // the beginning are not. So those constraints are handled first.
     let late = implied_by_earlier(network.network(), &schedule, &keep);
     let mut left = Network::with_nodes(network.network().node_count());
     let mut ids = Vec::new();
@@ -355,11 +356,12 @@ fn implied<W: Weight>(
     implied
 }
 
-/// Of the constraints that say that a node comes so long after the first one, those that follow from one that
-/// says so of a node that is no later in the schedule.
+/// Returns, for each constraint, `true` if it is a lower bound on the time from the first node to
+/// another one, and follows from such a bound of a node that is no later in the schedule.
 ///
-/// All of them can go: if they followed from each other in a circle, all of its nodes would be at one time, the
-/// bounds between them would add up to nothing, and so each would be 0. Nodes on such circles are left alone.
+/// All of them can be removed. If they implied each other in a cycle, all nodes of the cycle would
+/// be at one time, the bounds between them would add up to 0, and so each would be 0. Nodes on such
+/// cycles are skipped.
 fn implied_by_earlier<W: Weight>(
     network: &Network<W>,
     schedule: &Times<W>,
@@ -407,8 +409,8 @@ fn implied_by_earlier<W: Weight>(
         .collect()
 }
 
-/// The networks with all bounds multiplied by their common denominator, if they are so small that no
-/// sum of them overflows.
+/// Returns the networks with all bounds multiplied by their common denominator, if no sum of the
+/// results overflows.
 fn scaled(networks: [&Network<Delta>; 2]) -> Option<[Network<i128>; 2]> {
     let bounds = networks.into_iter().flat_map(Network::constraints);
     let unit = CommonDenominator::of(bounds.map(|constraint| &constraint.bound.real))?;
@@ -427,9 +429,9 @@ fn scaled(networks: [&Network<Delta>; 2]) -> Option<[Network<i128>; 2]> {
     Some([one?, other?])
 }
 
-/// Each node's class and offset: a union-find over constraints of the form `[c, c]`.
+/// Returns each node's class and offset: a union-find over constraints of the form `[c, c]`.
 fn classes(plan: &ParametrizedPlan) -> Vec<(ClassId, Rational)> {
-    // `parent[n]` and by how much `n` comes after its parent.
+    // The parent of `n`, and the offset of `n` from it.
     let mut parents: Vec<(usize, Rational)> = (0..plan.plan.nodes.len())
         .map(|node| (node, Rational::ZERO))
         .collect();
@@ -464,7 +466,7 @@ fn classes(plan: &ParametrizedPlan) -> Vec<(ClassId, Rational)> {
         .collect()
 }
 
-/// The node's root, and by how much the node comes after it.
+/// Returns the node's root, and the node's offset from it.
 fn root(parents: &[(usize, Rational)], node: usize) -> (usize, Rational) {
     let (mut at, mut offset) = (node, Rational::ZERO);
     while parents[at].0 != at {

@@ -1,19 +1,19 @@
-//! The cheapest change of a plan's quantities with which the plan works.
+//! The cheapest change of a plan's quantities that makes the plan work.
 //!
-//! A plan works with some values of its quantities if it has a valid schedule in which interfering
-//! actions come in the order that they have in the plan. Timed initials may come before or after
-//! actions, as it fits. What this asks for is learnt bit by bit, like the cuts of [`best`](crate::best()):
+//! A plan works with some values of its quantities if it has a valid schedule with the plan's order
+//! of interfering actions. Timed initials may come before or after actions, as needed. The search
+//! learns the requirements step by step, like the cuts of [`best`](crate::best()):
 //!
-//! - A linear program knows the plan's bounds and orders. Its variables are the times of all
-//!   happenings and the quantities that may change; it makes the cost of their changes least.
-//! - Its schedule is put before the judge. If that accepts it, it is the cheapest repair.
-//! - If not, some [obligation](crate::obligations) is broken. What breaks it is a conjunction of
-//!   inequalities in which expressions go by the order of the schedule. So in each valid schedule
-//!   one of these is false, or some happenings come in another order: these are the cases into which the search
-//!   branches, the one with the least cost first.
+//! - A linear program contains the plan's bounds and orders. Its variables are the times of all
+//!   happenings and the quantities that may change. It minimises the cost of their changes.
+//! - The validator checks its schedule. If it accepts the schedule, this is the cheapest repair.
+//! - Otherwise some [obligation](crate::obligations) is violated. The violation is a conjunction of
+//!   inequalities, whose expressions assume the order of the schedule. So in each valid schedule
+//!   one of these is false, or some happenings come in another order. The search branches into
+//!   these cases, the one with the least cost first.
 //!
-//! No case is left out, and each linear program is a lower bound on the cost in its case, so the
-//! first schedule that the judge accepts is proven to be the cheapest.
+//! The cases are exhaustive, and each linear program is a lower bound on the cost in its case. So
+//! the first schedule that the validator accepts is proven to be the cheapest.
 
 mod flaw;
 mod moment;
@@ -36,18 +36,18 @@ use flaw::{Finder, Flaw};
 use orders::Orders;
 use program::{Program, Solved};
 
-/// A parameter of the plan that a repair may change.
+/// Parameter of the plan that a repair may change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Changeable {
-    /// The parameter. Its range, as far as it is closed, is not left; open ends count as closed.
+    /// The parameter. It stays in its range; open ends of the range count as closed.
     pub parameter: ParameterId,
-    /// Values that cost nothing: the nominal value, or what the domain allows.
+    /// Values without cost: the nominal value, or the values that the domain allows.
     pub free: Interval,
-    /// The cost of each unit by which the value lies outside of `free`; positive.
+    /// Cost per unit of the value's distance from `free`; positive.
     pub weight: Rational,
 }
 
-/// What stands in the way of a cheaper repair, or of any.
+/// Constraint that prevents a cheaper repair, or any repair.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Hindrance {
     /// One side of the plan's constraint at this position.
@@ -56,7 +56,7 @@ pub enum Hindrance {
     Beginning,
     /// Two interfering happenings keep their order, at least ε apart.
     Order(NodeId, NodeId),
-    /// Something that every valid schedule satisfies.
+    /// A requirement on every valid schedule.
     Requirement(Requirement),
     /// The parameter stays in its range, or does not change at all.
     Range(ParameterId),
@@ -67,46 +67,46 @@ pub enum Hindrance {
 pub struct Repair {
     /// The values of all parameters.
     pub values: Valuation,
-    /// A valid schedule, as early as can be at this cost.
+    /// The earliest valid schedule at this cost.
     pub schedule: Schedule,
-    /// What the changes cost: the sum of weight times deviation.
+    /// Cost of the changes: the sum of weight times deviation.
     pub cost: Rational,
-    /// No repair costs less than this. It is the cost, unless that comes arbitrarily near to the
-    /// bound without reaching it.
+    /// Lower bound on the cost of any repair. It equals the cost, unless costs arbitrarily close to
+    /// the bound are possible, but not the bound itself.
     pub bound: Rational,
-    /// What makes the repair cost so much: inequalities that add up to the bound, each with its
-    /// multiplier.
+    /// Explanation of the cost: inequalities that add up to the bound, each with its multiplier.
     pub because: Vec<(Hindrance, Rational)>,
 }
 
-/// Why a search for a repair ended.
+/// Result of a search for a repair.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RepairRun {
-    /// There is a repair, and none is cheaper.
+    /// A repair was found, and none is cheaper.
     Repaired {
         /// The repair.
         repair: Repair,
-        /// How many linear programs were solved; none if nothing has to change.
+        /// Number of linear programs solved; 0 if nothing has to change.
         cases: usize,
     },
     /// No values within the ranges make the plan work in its order.
     Impossible {
-        /// What stands in the way where the least was changed; each entry alone or all together.
+        /// Constraints that are in conflict in the case with the least change; some or all of them
+        /// together.
         because: Vec<Hindrance>,
     },
-    /// The judge rejects a plan in which every obligation is met: it breaks something that no
-    /// obligation stands for.
+    /// The validator rejects a plan that meets every obligation: the violated requirement has no
+    /// obligation.
     Unexplained {
         /// The values.
         values: Valuation,
         /// The schedule.
         schedule: Schedule,
     },
-    /// It was ended before anything was found.
+    /// The search was stopped before anything was found.
     Stopped {
-        /// Whether it was told to; otherwise there were too many cases.
+        /// `true` if the caller cancelled the search; otherwise a limit was reached.
         is_cancelled: bool,
-        /// No repair costs less.
+        /// Lower bound on the cost of any repair.
         bound: Rational,
     },
 }
@@ -129,25 +129,25 @@ impl Default for RepairLimits {
     }
 }
 
-/// A case that has been solved and not yet been looked at.
+/// Solved case that has not been examined yet.
 struct Open {
-    /// The rows that hold in it besides those that always do.
+    /// The rows of this case, in addition to those of all cases.
     rows: Vec<usize>,
     /// The happenings whose order it decides.
     decided: BTreeSet<(NodeId, NodeId)>,
     solved: Solved,
 }
 
-/// Looks for the cheapest values of some parameters with which the plan has a valid schedule.
+/// Searches for the cheapest values of some parameters that give the plan a valid schedule.
 ///
-/// `order`, if there is one, gives each node a time: interfering actions keep the order that they
-/// have there. Without it they keep the order that the plan's bounds give them, and all orders that
-/// these leave open are searched. Parameters that are not among `changeable` keep their nominal values. `judge` says
-/// whether the plan with these values and times is valid; `flow`, asked between linear programs,
-/// whether to go on.
+/// `order`, if present, gives each node a time, and interfering actions keep that order. Without it
+/// they keep the order that the plan's bounds imply, and all orders that are left open are
+/// searched. Parameters that are not in `changeable` keep their nominal values. `judge` returns
+/// `true` if the plan with these values and times is valid. `flow` is polled between linear
+/// programs, and can end the search.
 ///
 /// # Errors
-/// When the plan holds something beyond exact linear reasoning; the message names it.
+/// If the plan contains something beyond exact linear reasoning; the message names it.
 pub fn repair(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -187,7 +187,7 @@ pub fn repair(
         }],
         Err(because) => return Ok(RepairRun::Impossible { because }),
     };
-    // What stood in the way in the case that was given up first: the one with the least change.
+    // Constraints in conflict in the first case without a solution, which has the least change.
     let mut hopeless: Option<Vec<Hindrance>> = None;
     while let Some(case) = take_cheapest(&mut open) {
         let cost = &case.solved.cost.real;
@@ -257,8 +257,8 @@ pub fn repair(
     })
 }
 
-/// The earliest schedule with the nominal values, or the free ones nearest to them, if there is one: often nothing
-/// else is needed, and it takes no linear program.
+/// Returns the earliest schedule with the nominal values, or the free ones nearest to them, if
+/// there is one. Often this is already the repair, and it needs no linear program.
 fn unchanged(
     plan: &ParametrizedPlan,
     changeable: &[Changeable],
@@ -286,7 +286,7 @@ fn unchanged(
     Some((values, schedule.into()))
 }
 
-/// The case of least cost; of several the one that was opened last, which is the most decided.
+/// Removes the case of least cost. Ties go to the newest case, which has the most decisions.
 fn take_cheapest(open: &mut Vec<Open>) -> Option<Open> {
     let cost = |case: &Open| -> Delta { case.solved.cost.clone() };
     let best = (0..open.len()).rev().min_by_key(|&at| cost(&open[at]))?;

@@ -1,4 +1,4 @@
-//! Moving the ends of a box onto their limits.
+//! Moves the ends of a box to their limits.
 
 use std::ops::ControlFlow;
 
@@ -9,22 +9,22 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side};
 use crate::irr::farthest;
 use crate::oracle::Oracle;
 
-/// The largest distance between an end and its limit where the limit is not found exactly: 10⁻¹².
+/// The largest distance between an end and a limit that is not found exactly: 10⁻¹².
 const RESOLUTION: (i64, i64) = (1, 1_000_000_000_000);
 
-/// The box with each end moved out until it touches its limit: upper before lower, parameter by
-/// parameter, each as far as those before it allow.
+/// Moves each end of the box out until it reaches its limit: upper before lower, parameter by
+/// parameter, each as far as the previous ones allow.
 ///
-/// A limit is a fraction, mostly one with a small denominator or few decimals. Halving encloses it;
-/// the simplest fraction and the shortest decimal that are enclosed are tried as well, and one of
-/// them is the limit as soon as no simpler one is left. What is returned lies inside the envelope
-/// in any case, and less than 10⁻¹² from the limit.
+/// A limit is a fraction, usually one with a small denominator or few decimals. Bisection encloses
+/// it. The simplest fraction and the shortest decimal in the enclosing interval are tried as well,
+/// and one of them is the limit as soon as no simpler one remains. The result always lies inside
+/// the envelope, and less than 10⁻¹² from the limit.
 ///
-/// `None` if `envelope` is not inside the robustness envelope. `on_step` is called after every
-/// check and can end the work at any moment.
+/// Returns `None` if `envelope` is not inside the robustness envelope. `on_step` is called after
+/// every check and can end the work at any moment.
 ///
 /// # Errors
-/// When there are too many cases to tell apart.
+/// If there are too many cases to decide.
 pub fn sharpen(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
@@ -60,7 +60,7 @@ fn push(
         return ControlFlow::Continue(());
     }
     let farthest = farthest(oracle.plan().parameter(end.parameter));
-    // Of where nothing can be told, the end stays away.
+    // An undecided box counts as refused.
     let mut accepts = |reach| oracle.try_reach(end, reach).unwrap_or(false);
     if accepts(border.clone()) {
         return on_step();
@@ -68,7 +68,7 @@ fn push(
     let mut outside = if let Some(border) = border {
         border
     } else {
-        // Something stops it: go out until there.
+        // There is a limit: move out until it is enclosed.
         let mut step = Rational::ONE;
         loop {
             if inside > farthest {
@@ -106,7 +106,7 @@ fn push(
     ControlFlow::Continue(())
 }
 
-/// The fraction with the smallest denominator strictly between two numbers, `low < high`.
+/// Returns the fraction with the smallest denominator strictly between two numbers, `low < high`.
 fn simplest_between(low: &Rational, high: &Rational) -> Rational {
     if low.is_negative() {
         if high.is_positive() {
@@ -119,7 +119,7 @@ fn simplest_between(low: &Rational, high: &Rational) -> Rational {
     if next < *high {
         return next;
     }
-    // Both lie between `whole` and `next`: compare the reciprocals of what is left.
+    // Both lie between `whole` and `next`: compare the reciprocals of the remainders.
     let (low, high) = (low - &whole, high - &whole);
     let least = high
         .reciprocal()
@@ -134,7 +134,7 @@ fn simplest_between(low: &Rational, high: &Rational) -> Rational {
             .expect("greater than `least`, which is positive")
 }
 
-/// A number with as few decimals as possible strictly between two numbers, `low < high`.
+/// Returns a number with as few decimals as possible strictly between two numbers, `low < high`.
 fn shortest_decimal_between(low: &Rational, high: &Rational) -> Rational {
     let tenth = Rational::new(1, 10);
     let mut unit = Rational::ONE;

@@ -1,11 +1,11 @@
-//! Whether every schedule of a plan is valid, for every value in a box.
+//! Check that every schedule of a plan is valid, for every value in a box.
 //!
 //! The second half of paper 1's CHECKINENVELOPE, `enc_tn ∧ enc_eff ∧ enc_R → enc_proofs`, without
-//! an SMT solver. Each way of breaking an obligation is a system of linear inequalities over the
-//! schedules of the box ([`BadCase`]); that it has no solution is shown by a path or a flow in the
-//! plan's network, or, where parameters are coupled, by a linear program. Such proofs are sums of
-//! constraints, so they are kept, and when a box is widened only those that use the moved end
-//! and no longer add up are looked for again.
+//! an SMT solver. Each way of violating an obligation is a system of linear inequalities over the
+//! schedules of the box ([`BadCase`]). A path or a flow in the plan's network proves that it has no
+//! solution or, if parameters are coupled, a linear program. Such proofs are sums of constraints,
+//! and they are stored. When a box is widened, only proofs that use the moved end and no longer
+//! hold are searched again.
 
 mod bad_case;
 mod certificate;
@@ -37,27 +37,28 @@ pub use sound_box::SoundBox;
 
 /// Decides, box by box, whether every schedule of a plan is valid.
 ///
-/// It does not hold the task and the plan, only what it has made of them: both are handed to it
-/// with each question, and must be those that it was made for.
+/// It does not store the task and the plan, only data derived from them. The caller passes both
+/// with each query, and they must be the ones that it was created for.
 #[derive(Clone, Debug)]
 pub(crate) struct Soundness {
     reduction: Reduction,
     obligations: Obligations,
-    /// The schedule from which the order of happenings was taken.
+    /// Schedule that defines the order of happenings.
     schedule: Schedule,
     direct: Vec<DirectCase>,
     over_all: Vec<Option<Proof>>,
-    /// Whether these proofs are about boxes within the ranges of the parameters.
+    /// `true` if these proofs are about boxes within the ranges of the parameters.
     is_in_ranges: bool,
-    /// The numbers in all bounds but the ends of boxes; `None` if they are large.
+    /// The numbers in all bounds except the ends of boxes; `None` if they are large.
     numbers: Option<Numbers>,
-    /// The case that broke last: the likeliest to break next. At first, one after all others.
+    /// The case that was violated last, which is likely to be violated next. Initially one past the
+    /// end.
     suspect: usize,
     /// The number of bad cases refuted from scratch.
     refutations: usize,
 }
 
-/// A bad case of a direct obligation with the proofs that it is impossible.
+/// Bad case of a direct obligation with the proofs that it is impossible.
 #[derive(Clone, Debug)]
 struct DirectCase {
     obligation: usize,
@@ -65,16 +66,16 @@ struct DirectCase {
     proofs: Option<Vec<Certificate>>,
 }
 
-/// An obligation that some schedule of a box breaks.
+/// Obligation that some schedule of a box violates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Broken {
     /// The requirement.
     pub requirement: Requirement,
-    /// How it is broken.
+    /// Violated case.
     pub case: BadCase,
 }
 
-/// Values of the parameters and a schedule that break an obligation.
+/// Values of the parameters and a schedule that violate an obligation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Counterexample {
     /// The parameters' values.
@@ -85,14 +86,14 @@ pub struct Counterexample {
     pub moment: Option<Rational>,
 }
 
-/// The first obligation that some schedule for some value in the box (not empty) breaks; `None` if
-/// every schedule is valid.
+/// Returns the first obligation that some schedule for some value in the box (not empty) violates;
+/// `None` if every schedule is valid.
 ///
-/// That there is a schedule for every value is not asked: see [`Oracle`](crate::Oracle) for the
-/// whole check.
+/// It does not check that there is a schedule for every value: see [`Oracle`](crate::Oracle) for
+/// the whole check.
 ///
 /// # Errors
-/// When the plan has no schedule at the values in the box nearest to its nominal ones, or holds
+/// If the plan has no schedule at the values in the box nearest to its nominal ones, or contains
 /// something beyond exact linear reasoning.
 pub fn broken_in(
     task: &Task,
@@ -105,19 +106,19 @@ pub fn broken_in(
     soundness.broken(task, plan, envelope, None)
 }
 
-/// The number of conditions of a plan, by what enforces them in all its schedules.
+/// Numbers of conditions of a plan, by what enforces them in all its schedules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conditions {
-    /// Those that are bounds on the difference of two times: the network implies them, so that an
-    /// executor that keeps to the network keeps to them.
+    /// Bounds on the difference of two times: the network implies them, so an executor that
+    /// respects the network also respects them.
     pub differences: usize,
-    /// Those on numbers, or on several differences at once: they hold in every schedule of the
-    /// network, so that an executor need not look at them.
+    /// Conditions on numbers, or on several differences at once. They hold in every schedule of the
+    /// network, so that an executor need not check them.
     pub all_schedules: usize,
 }
 
 impl Soundness {
-    /// How what is required is met.
+    /// Returns the numbers of conditions, by what enforces them.
     pub(crate) fn conditions(&self) -> Conditions {
         let direct = self.obligations.direct.iter();
         let is_difference =
@@ -132,14 +133,14 @@ impl Soundness {
         }
     }
 
-    /// Compiles a plan's obligations for boxes that hold these values; `None` if it has no schedule
-    /// there.
+    /// Compiles a plan's obligations for boxes that contain these values; `None` if it has no
+    /// schedule there.
     ///
-    /// Happenings are required to keep the order that they have there. That is no restriction in a
-    /// box with these values in it; in others, a different order may work as well.
+    /// Happenings are required to keep the order that they have there. In a box that contains these
+    /// values, that is no restriction. In others, a different order may also work.
     ///
     /// # Errors
-    /// When the plan holds something beyond exact linear reasoning.
+    /// If the plan contains something beyond exact linear reasoning.
     pub(crate) fn around(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -187,25 +188,25 @@ impl Soundness {
         }))
     }
 
-    /// The plan's network with rigidly connected nodes taken together.
+    /// Returns the plan's network with rigidly connected nodes merged.
     pub(crate) fn reduction(&self) -> &Reduction {
         &self.reduction
     }
 
-    /// The number of bad cases refuted from scratch so far: a measure of work.
+    /// Returns the number of bad cases refuted from scratch so far: a measure of work.
     pub(crate) fn refutations(&self) -> usize {
         self.refutations
     }
 
-    /// The first obligation that some schedule for some value in the box breaks. The box contains
-    /// the values that this was made [around](Self::around).
+    /// Returns the first obligation that some schedule for some value in the box violates. The box
+    /// must contain the values that this was created [around](Self::around).
     ///
-    /// Remembers the proofs it finds. `moved` is a hint, for speed: the box differs only in that
-    /// end, further out than before, from the last one for which the answer was `None`, and all
-    /// boxes asked about since have been that one with an end moved out.
+    /// Stores the proofs it finds. `moved` is a hint, for speed: the box differs only in that end,
+    /// which is further out, from the last box with the result `None`, and all boxes checked since
+    /// have been that one with an end moved out.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub(crate) fn broken(
         &mut self,
         task: &Task,
@@ -217,10 +218,11 @@ impl Soundness {
         Ok(found.pop())
     }
 
-    /// The same for `most` obligations at most: those that are the better reasons, if any is.
+    /// Like [`broken`](Self::broken), but returns at most `most` obligations: if possible, those
+    /// that give better reasons.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart, and nothing is known to be broken.
+    /// If there are too many cases to decide, and no violation is known.
     pub(crate) fn all_broken(
         &mut self,
         task: &Task,
@@ -241,8 +243,8 @@ impl Soundness {
             ..
         } = self;
         let mut schedules = Lazy::Unmade(reduction, envelope, numbers.as_ref());
-        // What deviates adds up, so in a box later conditions are the first to break, and the one that
-        // broke last is the likeliest. Of a single course of events the earliest is named.
+        // Deviations accumulate, so in a box later conditions are violated first, and the one that
+        // was violated last is the most likely. In a point, the earliest violation is reported.
         let is_point = envelope.is_point();
         let count = direct.len();
         let first = (*suspect + 1).min(count);
@@ -253,8 +255,9 @@ impl Soundness {
             let direct = &mut direct[index];
             let obligation = &obligations.direct[direct.obligation];
             let is_separation = matches!(obligation.requirement, Requirement::Separation { .. });
-            // What happenings read is known only where those that interfere keep their order, so
-            // that they do not is the better reason, and the only one with a counterexample.
+            // The values that happenings read are only known if interfering ones keep their order.
+            // So a violated separation is the better reason, and the only one with a
+            // counterexample.
             let is_enough = found.len() >= most || !apart.is_empty();
             if is_enough && !is_separation || direct.stands(envelope, moved) {
                 continue;
@@ -335,7 +338,7 @@ impl Soundness {
         Ok(found)
     }
 
-    /// Values and a schedule in the box that break the obligation as said.
+    /// Returns values and a schedule in the box that violate the obligation in the given case.
     pub(crate) fn counterexample(
         &self,
         envelope: &DecoupledEnvelope,
@@ -344,9 +347,9 @@ impl Soundness {
         if let Requirement::Separation { first, second } = broken.requirement
             && broken.case.differences.len() == 1
         {
-            // The wrong way round may do no harm if they are far apart. But schedules are convex:
-            // between such a one and the one that the order was taken from lies one with the
-            // happenings in order, and too near.
+            // The reverse order may be harmless if the happenings are far apart. But schedules are
+            // convex: between such a schedule and the reference schedule there is one with the
+            // happenings in order, and too close.
             let mut near = broken.case.clone();
             near.differences.push(Difference::not_after(first, second));
             let witness = bad_case::witness(&self.reduction, envelope, &near, None);
@@ -357,9 +360,9 @@ impl Soundness {
         bad_case::witness(&self.reduction, envelope, &broken.case, None)
     }
 
-    /// Like [`counterexample`](Self::counterexample), but breaking the obligation by as much as
-    /// any does. Two happenings that should be apart may then be so far the wrong way round that
-    /// it does no harm.
+    /// Like [`counterexample`](Self::counterexample), but with the greatest violation of the
+    /// obligation. Two happenings that should be apart may then be far apart in the reverse order,
+    /// which is harmless.
     pub(crate) fn worst_case(
         &self,
         envelope: &DecoupledEnvelope,
@@ -374,7 +377,7 @@ impl Soundness {
 }
 
 impl DirectCase {
-    /// Whether the known proofs still stand.
+    /// Returns `true` if the known proofs still hold.
     fn stands(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
         let Some(proofs) = &self.proofs else {
             return false;
@@ -386,7 +389,7 @@ impl DirectCase {
     }
 }
 
-/// The earliest schedule at these values, by node.
+/// Returns the earliest schedule at these values, by node.
 pub(crate) fn earliest_schedule(reduction: &Reduction, valuation: &Valuation) -> Option<Schedule> {
     let point = DecoupledEnvelope::point(valuation);
     let network = reduction.network(&point).network;
@@ -400,8 +403,8 @@ pub(crate) fn earliest_schedule(reduction: &Reduction, valuation: &Valuation) ->
     Some(reduction.times(&times))
 }
 
-/// Products are exact only one inequality at a time, and only if the multiplied parameter does not
-/// also move the times.
+/// Checks that products are exact: that holds only for one inequality at a time, and only if the
+/// multiplied parameter does not also move the times.
 fn check_products(
     plan: &ParametrizedPlan,
     reduction: &Reduction,
@@ -415,8 +418,8 @@ fn check_products(
     }
 }
 
-/// The same for an over-all condition, read at any place of its moment among the events of the
-/// nominal schedule. Other places come to light with a box.
+/// Checks the products of an over-all condition, read at any place of its moment among the events
+/// of the nominal schedule. Other places are checked for each box.
 fn check_over_all(
     (task, plan): (&Task, &ParametrizedPlan),
     reduction: &Reduction,

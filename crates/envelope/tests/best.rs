@@ -1,4 +1,4 @@
-//! The best box against all boxes on a grid.
+//! The best box, compared with all boxes on a grid.
 
 mod given;
 
@@ -17,8 +17,8 @@ use given::Given;
 const NOMINAL: i64 = 2;
 const MOST: i64 = 6;
 
-/// Three actions, the first two of which use up something, with bounds between their starts and
-/// ends.
+/// Returns a problem with three actions, the first two of which consume a resource, and bounds
+/// between their starts and ends.
 fn problem(bounds: &str) -> String {
     format!(
         "parameter a default {NOMINAL} lb 0 ub {MOST}; parameter b default {NOMINAL} lb 0 ub {MOST};
@@ -35,7 +35,7 @@ const DOMAIN: &str = "
     (:durative-action burn :parameters () :duration (>= ?duration 0)
       :condition (at end (>= (x) ?duration)) :effect (at end (decrease (x) ?duration)))";
 
-/// A sequence of numbers that look like chance.
+/// Pseudorandom number generator.
 struct Dice(u64);
 
 impl Dice {
@@ -52,7 +52,8 @@ impl Dice {
         words[index.expect("below the number of words")]
     }
 
-    /// A few bounds between starts and ends, most of them satisfied at the nominal values.
+    /// Generates a few bounds between starts and ends, most of them satisfied at the nominal
+    /// values.
     fn bounds(&mut self) -> String {
         let points = [
             "one.start",
@@ -83,7 +84,7 @@ impl Dice {
     }
 }
 
-/// All boxes with whole ends around the nominal values.
+/// Returns all boxes with whole ends around the nominal values.
 fn boxes(plan: &ParametrizedPlan) -> Vec<DecoupledEnvelope> {
     let mut boxes = vec![DecoupledEnvelope::point(&plan.nominal())];
     for index in 0..plan.parameters.len() {
@@ -103,13 +104,13 @@ fn boxes(plan: &ParametrizedPlan) -> Vec<DecoupledEnvelope> {
     boxes
 }
 
-/// The sum of widths.
+/// Returns the sum of widths.
 fn widths(envelope: &DecoupledEnvelope) -> Rational {
     let widths = envelope.intervals().iter();
     widths.filter_map(Interval::width).sum()
 }
 
-/// How far each end lies from the nominal value, the least first.
+/// Returns the distances of the ends from the nominal values, in ascending order.
 fn slacks(envelope: &DecoupledEnvelope) -> Vec<Rational> {
     let nominal = Rational::from(NOMINAL);
     let ends = envelope.intervals().iter().flat_map(|interval| {
@@ -121,7 +122,8 @@ fn slacks(envelope: &DecoupledEnvelope) -> Vec<Rational> {
     slacks
 }
 
-/// The logarithm of the product of widths in relation to the nominal values, a millionth wider.
+/// Returns the logarithm of the product of widths, relative to the nominal values, each a millionth
+/// wider.
 fn volume(envelope: &DecoupledEnvelope) -> f64 {
     let widths = envelope.intervals().iter().filter_map(Interval::width);
     let nominal = Rational::from(NOMINAL).to_f64();
@@ -221,7 +223,8 @@ fn no_box_on_a_grid_is_better_than_the_best_one() {
     assert!(unproved * 10 < proved, "{proved} {unproved}");
 }
 
-/// Two actions one after the other, done within ten units; the unit is a parameter of the test.
+/// Returns a plan of two sequential actions with a deadline after ten units; the unit is a
+/// parameter of the test.
 fn relay(unit: &Rational) -> String {
     let limit = &Rational::from(10) * unit;
     format!(
@@ -281,7 +284,7 @@ fn no_box_on_a_grid_has_more_volume_than_the_best_one() {
     assert!(unproved * 10 < proved, "{proved} {unproved}");
 }
 
-/// A search for the least slack that is ended knows at least the box with which it began.
+/// A search for the least slack that is cancelled returns at least its initial box.
 #[test]
 fn search_that_is_ended_is_no_worse_than_its_beginning() {
     let mut dice = Dice(11);
@@ -343,14 +346,14 @@ fn everything_may_deviate_by_exactly_what_fits() {
             let shares = balance(&mut oracle, &mut || ControlFlow::Continue(()));
             let shares = shares.unwrap().unwrap();
             if guarantee == Guarantee::Strong {
-                // The second start follows the first end at once, which takes an observer.
+                // The second start follows the first end at once, which requires an observation.
                 for share in [shares.more, shares.less, shares.either] {
                     assert_eq!(share.inside, Rational::ZERO);
                     assert_eq!(share.outside, Some(Rational::ZERO));
                 }
                 continue;
             }
-            // Both of them five times as long come to ten units.
+            // With both of them five times as long, the makespan is ten units.
             let four = Rational::from(4);
             for share in [&shares.more, &shares.either] {
                 assert_eq!(share.inside, four, "{guarantee}");

@@ -1,4 +1,4 @@
-//! The box in which durations most likely stay, against all boxes on a grid.
+//! The box that durations most likely stay in, compared with all boxes on a grid.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -21,7 +21,7 @@ const MOST: i64 = 6;
 const DOMAIN: &str = "
     (:durative-action run :parameters () :duration (>= ?duration 0) :condition () :effect (and))";
 
-/// Three actions, with bounds between their starts and ends.
+/// Returns a problem with three actions, and bounds between their starts and ends.
 fn problem(bounds: &str) -> String {
     format!(
         "parameter a default {NOMINAL} lb 0 ub {MOST}; parameter b default {NOMINAL} lb 0 ub {MOST};
@@ -33,8 +33,8 @@ fn problem(bounds: &str) -> String {
     )
 }
 
-/// Bounds of several sorts: deadlines that two durations share, in which the later starts are waited
-/// for or fixed, and actions that have to end in each other.
+/// Bounds of several kinds: deadlines that two durations share, with later starts that wait or are
+/// fixed, and actions that have to end in each other.
 const BOUNDS: [&str; 6] = [
     "c: two.end - .zero in [0, 7];",
     "c: two.end - .zero in [0, 6]; c: three.end - two.start in [-inf, 3];",
@@ -57,7 +57,7 @@ fn values(tenths: &[i64]) -> Chance {
     Chance::values(tenths.iter().copied().map(number).collect()).expect("values")
 }
 
-/// Distributions of all sorts for three durations: `None` for one that is as planned.
+/// Distributions of all kinds for three durations; `None` for a duration that is as planned.
 fn families() -> Vec<[Option<Chance>; 3]> {
     let normal = |mean, deviation, cuts| {
         let (mean, deviation) = (number(mean), number(deviation));
@@ -109,7 +109,7 @@ fn families() -> Vec<[Option<Chance>; 3]> {
     ]
 }
 
-/// All boxes with whole ends around the nominal values.
+/// Returns all boxes with whole ends around the nominal values.
 fn boxes(plan: &ParametrizedPlan) -> Vec<DecoupledEnvelope> {
     let mut boxes = vec![DecoupledEnvelope::point(&plan.nominal())];
     for index in 0..plan.parameters.len() {
@@ -133,7 +133,7 @@ fn boxes(plan: &ParametrizedPlan) -> Vec<DecoupledEnvelope> {
 /// The logarithm of the probability of each interval, by parameter; `None` if that is 0.
 type Known = BTreeMap<(usize, Rational, Rational), Option<f64>>;
 
-/// The logarithm of the probability that all durations are inside; `None` if that is 0.
+/// Returns the logarithm of the probability that all durations are inside; `None` if that is 0.
 fn logarithm(
     envelope: &DecoupledEnvelope,
     chances: &[Option<Chance>],

@@ -1,5 +1,5 @@
-//! Mistakes found in the box check, most of them by the second oracle, and limits that it once had,
-//! each as a small case.
+//! Bugs of the box check, most of them found by the second oracle, and former limitations, each as
+//! a small case.
 
 mod given;
 
@@ -208,9 +208,9 @@ fn timed_initials_that_move_may_change_places() {
         plan: "action instance l : (look); c: l - .zero in [5, 5];",
         vary: &["timed p"],
     };
-    // The goal counts after both, whichever is the last.
+    // The goal is evaluated after both, whichever is the last.
     assert_eq!(given.answer("[2, 6]"), "inside");
-    // A condition counts on arrival.
+    // A condition is evaluated on arrival.
     let given = Given {
         domain: "(:action look :parameters () :precondition (or (p) (q)) :effect (and))",
         goal: "",
@@ -284,7 +284,7 @@ fn timed_initials_may_be_close_to_each_other() {
 
 #[test]
 fn a_parameter_times_itself_is_not_decided_at_corners() {
-    // (x) becomes s²: 64 at both ends of [-8, 8], and 0 between. Below 50, the ends do decide.
+    // (x) becomes s²: 64 at both ends of [-8, 8], and 0 between. For "below 50", the ends decide.
     let squared = |condition: &str| {
         let domain = format!(
             "(:synth-parameters ?s)
@@ -316,7 +316,7 @@ fn a_parameter_times_itself_is_not_decided_at_corners() {
 
 #[test]
 fn a_counterexample_to_separation_has_the_happenings_in_order() {
-    // The wrong way round, and far apart, does no harm: it is no counterexample.
+    // The reverse order with a large distance is harmless, so it is no counterexample.
     let given = Given {
         domain: "(:action clear :parameters () :precondition (and) :effect (not (p)))",
         init: "(at 17/2 (p))",
@@ -331,8 +331,8 @@ fn a_counterexample_to_separation_has_the_happenings_in_order() {
 
 #[test]
 fn a_least_duration_beside_an_open_one_takes_no_corners() {
-    // Twenty actions one after the other, each at least 1 long, with a deadline for all: small and
-    // large durations do harm, but the small ones each by themselves.
+    // Twenty sequential actions, each at least 1 long, with a deadline for all: small and large
+    // durations are violations, but each small one independently.
     let count = 20;
     let each = |line: &dyn Fn(usize) -> String| (0..count).map(line).collect::<Vec<_>>().concat();
     let text = [
@@ -367,7 +367,7 @@ fn a_least_duration_beside_an_open_one_takes_no_corners() {
 
 #[test]
 fn thirty_durations_whose_sum_has_a_least_and_a_greatest_value() {
-    // There would be 2^30 corners, and two of them matter.
+    // There would be 2^30 corners, but only two of them matter.
     let actions: Vec<String> = (0..30)
         .map(|index| {
             let follows = match index {

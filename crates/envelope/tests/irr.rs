@@ -1,4 +1,4 @@
-//! The search against the algorithm as it is written: one check of one box after the other.
+//! The search compared with the algorithm as published: one check of one box after the other.
 
 mod given;
 
@@ -13,7 +13,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, S
 
 use given::Given;
 
-/// A sequence of numbers that look like chance.
+/// Pseudorandom number generator.
 struct Dice(u64);
 
 impl Dice {
@@ -32,7 +32,7 @@ const DOMAIN: &str = "
     (:durative-action burn :parameters () :duration (>= ?duration 0)
       :condition (at end (>= (x) ?duration)) :effect (at end (decrease (x) ?duration)))";
 
-/// Actions one after the other or side by side, some of which use up something, with bounds
+/// Returns a plan of sequential or parallel actions, some of which consume a resource, with bounds
 /// between their starts and ends and ranges of their durations.
 fn plan_text(dice: &mut Dice) -> String {
     let count = 2 + dice.below(4);
@@ -76,7 +76,8 @@ fn plan_text(dice: &mut Dice) -> String {
     text
 }
 
-/// Actions one after the other, many of which have to be in a window: conflicts are along several windows.
+/// Returns a plan of sequential actions, many with a window, so that conflicts span several
+/// windows.
 fn plan_in_windows(dice: &mut Dice, count: usize) -> String {
     let mut text = String::new();
     for action in 0..count {
@@ -106,8 +107,8 @@ fn plan_in_windows(dice: &mut Dice, count: usize) -> String {
     text
 }
 
-/// What a search came to: the steps with the box after each and the number of checks by then, and
-/// how it ended.
+/// Result of a search: the steps, each with the resulting box and the number of checks so far, and
+/// the reason for the end.
 #[derive(Debug, PartialEq)]
 struct Told {
     steps: Vec<Option<(DecoupledEnvelope, BoxEnd, usize)>>,
@@ -133,7 +134,7 @@ impl Progress {
     }
 }
 
-/// Algorithm 1, box by box. `most` is the number of steps after which it is ended.
+/// Runs algorithm 1, box by box. It ends after `most` steps.
 fn one_by_one(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,
@@ -239,8 +240,8 @@ fn as_built(oracle: &mut Oracle, settings: &Settings, most: usize) -> Told {
     }
 }
 
-/// Compares what stands against boxes with one end further out, as the search remembers it, with what
-/// an oracle says that remembers nothing. The number of objections.
+/// Compares the stored objections to boxes with one end further out with those of a fresh oracle.
+/// Returns the number of objections.
 fn objections(
     own: &mut Oracle,
     fresh: &mut Oracle,
@@ -319,7 +320,7 @@ fn the_search_takes_the_steps_of_one_check_after_the_other() {
             let found = as_built(&mut own, &settings, most);
             assert_eq!(found, expected, "{guarantee} {settings:?} {most} {text}");
             if let Some(envelope) = &found.envelope {
-                // What is told is what the oracle goes on from, and it is inside.
+                // The reported box is the oracle's accepted one, and it is inside.
                 assert_eq!(own.accepted(), Some(envelope), "{guarantee} {text}");
                 assert_eq!(own.checks(), found.checks);
                 assert_eq!(oracle.clone().objection(envelope), Ok(None));
@@ -336,7 +337,8 @@ fn the_search_takes_the_steps_of_one_check_after_the_other() {
     );
 }
 
-/// The sum of how far ends are from the nominal values, without those that nothing keeps near.
+/// Returns the sum of the distances of ends from the nominal values, without ends that have no
+/// limit.
 fn room(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
     let point = DecoupledEnvelope::point(&plan.nominal());
     BoxEnd::all(plan.parameters.len())
@@ -352,7 +354,7 @@ fn where_long_conflicts_are_divided_the_box_is_inside_and_hardly_smaller() {
     for round in 0..60 {
         let mut text = plan_in_windows(&mut dice, 60);
         if round >= 40 {
-            // Only times by which actions have to be over.
+            // Keeps deadlines only.
             let opens =
                 |constraint: &&str| constraint.contains(".zero") && constraint.ends_with("inf]");
             let left = text.split("; ").filter(|constraint| !opens(constraint));

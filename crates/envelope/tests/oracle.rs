@@ -1,4 +1,4 @@
-//! The oracle and the box that it keeps.
+//! The oracle and its accepted box.
 
 mod given;
 
@@ -8,7 +8,7 @@ use elbowroom_plan::{BoxEnd, ParameterId, Side};
 
 use given::{Given, envelope, oracle};
 
-/// Two actions one after the other, done within 10 by a constraint, and by a deadline at 20.
+/// Two sequential actions, done within 10 by a constraint, with a deadline at 20.
 const RELAY: Given<'_> = Given {
     domain: "(:durative-action run :parameters () :duration (>= ?duration 0)
                 :condition (at end (p)) :effect (and))",
@@ -38,7 +38,7 @@ fn a_look_at_another_box_changes_nothing_about_how_the_accepted_one_can_be_widen
     let mut oracle = oracle(&task, &plan).unwrap();
     let accepted = envelope("[1, 1] [1, 8]");
     assert_eq!(oracle.start(&accepted), Ok(None));
-    // This box is inside as well, but nothing found for it holds for the accepted one.
+    // This box is also inside, but the proofs found for it do not hold for the accepted one.
     assert_eq!(oracle.objection(&envelope("[1, 8] [1, 1]")), Ok(None));
     assert_eq!(oracle.accepted(), Some(&accepted));
     let too_far = oracle.objection_to_reach(upper(0), Some(number(8)));
@@ -102,8 +102,7 @@ fn an_oracle_can_be_made_in_one_thread_and_used_in_another() {
     assert_eq!(asked.join().unwrap(), Ok(true));
 }
 
-/// The relay needs nobody to know anything in advance: of guarantees the stronger one never gives
-/// more.
+/// A stronger guarantee never accepts more than a weaker one.
 #[test]
 fn a_stronger_guarantee_accepts_no_box_that_a_weaker_one_refuses() {
     let (task, plan) = RELAY.task_and_plan();

@@ -1,4 +1,4 @@
-//! How long the questions about a network take. `cargo bench -p elbowroom-network`
+//! Benchmark of the checks of a network. `cargo bench -p elbowroom-network`
 
 #![allow(
     clippy::print_stdout,
@@ -17,8 +17,8 @@ fn main() {
     divan::main();
 }
 
-/// So many jobs side by side, each a chain of tasks whose durations the world chooses, with
-/// deadlines and hand-overs between neighbours: 2 · jobs · tasks points and one.
+/// Returns a network of `jobs` parallel jobs, each a chain of `tasks` contingent links, with
+/// deadlines and hand-overs between neighbours. It has 2 · jobs · tasks + 1 points.
 fn network(jobs: usize, tasks: usize, slack: i64) -> NetworkFile {
     let mut points = vec!["\"start\"".to_owned()];
     let mut requirements = Vec::new();
@@ -42,7 +42,7 @@ fn network(jobs: usize, tasks: usize, slack: i64) -> NetworkFile {
                 lower + 2 + task % 5
             ));
             if job > 0 {
-                // A hand-over: the neighbour begins this task neither long before nor after.
+                // A hand-over: the neighbour begins this task at about the same time.
                 requirement(
                     &format!("e{}.{task}", job - 1),
                     &begin,
@@ -118,7 +118,8 @@ fn reading(bencher: Bencher, (jobs, tasks): (usize, usize)) {
     bencher.bench_local(|| read("network", text.as_bytes()).is_ok());
 }
 
-/// The networks with published verdicts, where they are there: those of about 100 points, and all.
+/// Benchmarks the networks with published verdicts, if they are available: those of about 100
+/// points, and all.
 #[divan::bench(args = ["about 100 points", "all"], sample_count = 20, sample_size = 1)]
 fn published(bencher: Bencher, which: &str) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/stn");

@@ -1,4 +1,4 @@
-//! Puts a network together while its file is read.
+//! Builder for a network while its file is read.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::file::{Correlation, Duration, Format, GivenWait, NetworkFile};
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// A network that is being read.
+/// Network that is being read.
 #[derive(Debug)]
 pub(crate) struct Builder {
     format: Format,
@@ -21,7 +21,7 @@ pub(crate) struct Builder {
     requirements: Network<Rational>,
     links: Vec<ContingentLink<Rational>>,
     durations: Vec<Option<Duration>>,
-    /// Where the text says what each link is.
+    /// Positions of the links in the text.
     places: Vec<usize>,
     /// For each node, the link that ends there.
     ending: BTreeMap<NodeId, LinkId>,
@@ -29,7 +29,7 @@ pub(crate) struct Builder {
     pub(crate) waits: Vec<GivenWait>,
 }
 
-/// A contingent link as it stands in a file.
+/// Contingent link as given in a file.
 #[derive(Debug)]
 pub(crate) struct GivenLink {
     pub(crate) at: usize,
@@ -58,7 +58,7 @@ impl Builder {
         }
     }
 
-    /// A new time point.
+    /// Adds a time point.
     pub(crate) fn point(&mut self, name: &str, at: usize, report: &mut Report) {
         if self.by_name.contains_key(name) {
             report.mistake(
@@ -73,12 +73,12 @@ impl Builder {
         self.by_name.insert(name.to_owned(), node);
     }
 
-    /// The time point of that name, if there is one.
+    /// Returns the time point of that name, if there is one.
     pub(crate) fn find(&self, name: &str) -> Option<NodeId> {
         self.by_name.get(name).copied()
     }
 
-    /// The time point of that name; that there is none is a mistake.
+    /// Returns the time point of that name; reports a mistake if there is none.
     pub(crate) fn named(&self, name: &str, at: usize, report: &mut Report) -> Option<NodeId> {
         let node = self.find(name);
         if node.is_none() {
@@ -91,7 +91,7 @@ impl Builder {
         node
     }
 
-    /// `lower <= to - from <= upper`.
+    /// Adds the requirement `lower <= to - from <= upper`.
     pub(crate) fn requirement(
         &mut self,
         (from, to): (NodeId, NodeId),
@@ -115,7 +115,7 @@ impl Builder {
         }
     }
 
-    /// Adds a contingent link; `None` after a mistake was noted.
+    /// Adds a contingent link. Returns `None` after reporting a mistake.
     pub(crate) fn link(&mut self, given: GivenLink, report: &mut Report) -> Option<LinkId> {
         let GivenLink {
             at,
@@ -165,7 +165,7 @@ impl Builder {
             return None;
         }
         let id = LinkId(u32::try_from(self.links.len()).ok()?);
-        // The first one stays the one that ends there: what comes later asks for it by its end.
+        // The first link keeps the end node, because later lookups find a link by its end.
         if self.ending.contains_key(&end) {
             report.mistake(
                 at,
@@ -186,27 +186,27 @@ impl Builder {
         Some(id)
     }
 
-    /// All time points so far, by node.
+    /// Returns all time points so far, by node.
     pub(crate) fn nodes(&self) -> impl Iterator<Item = NodeId> + use<> {
         self.requirements.nodes()
     }
 
-    /// The link that ends at a node.
+    /// Returns the link that ends at a node.
     pub(crate) fn link_ending_at(&self, node: NodeId) -> Option<LinkId> {
         self.ending.get(&node).copied()
     }
 
-    /// The link of that number.
+    /// Returns the link with that identifier.
     pub(crate) fn link_of(&self, id: LinkId) -> &ContingentLink<Rational> {
         &self.links[id.index()]
     }
 
-    /// How the duration of a link is distributed.
+    /// Returns the distribution of the duration of a link, if it has one.
     pub(crate) fn duration_of(&self, id: LinkId) -> Option<&Duration> {
         self.durations[id.index()].as_ref()
     }
 
-    /// The network, unless there were mistakes.
+    /// Returns the network, unless there were mistakes.
     pub(crate) fn finish(self, report: &mut Report) -> Option<NetworkFile> {
         if report.is_failed() {
             return None;
@@ -236,7 +236,7 @@ impl Builder {
     }
 }
 
-/// The link that makes no sense. All but circles were found before.
+/// Returns the invalid link. All errors except cycles were reported before.
 fn place_of(bad: &BadLink) -> LinkId {
     match bad {
         BadLink::NoSuchNode(id)

@@ -1,4 +1,4 @@
-//! Other forms of a network, as networks of their own.
+//! Other forms of a network, as separate networks.
 
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{ContingentLink, Dispatchable, UncertainNetwork};
@@ -7,9 +7,9 @@ use elbowroom_stn::{ConsistentNetwork, Constraint, NegativeCycle, Network};
 use crate::file::{Format, GivenWait, NetworkFile};
 
 impl NetworkFile {
-    /// Requirements, and the bounds of links as if they could be chosen: what holds if the world
-    /// is kind. Constraints of links follow the requirements, for each link first the upper bound,
-    /// if there is one, and then the lower one.
+    /// Returns the requirements and the bounds of links, as if the executor chose all durations.
+    /// Constraints of links follow the requirements, for each link first the upper bound, if there
+    /// is one, and then the lower one.
     pub fn kind_network(&self) -> Network<Rational> {
         let mut network = self.network.requirements().clone();
         for link in self.network.links() {
@@ -26,10 +26,10 @@ impl NetworkFile {
         network
     }
 
-    /// The network with all bounds that follow, each as tight as it is; links are kept.
+    /// Returns the network with all implied bounds, as tight as possible; links are kept.
     ///
     /// # Errors
-    /// When the network contradicts itself.
+    /// If the network is inconsistent.
     pub fn minimal(&self) -> Result<Self, NegativeCycle<Rational>> {
         let minimal = ConsistentNetwork::try_from(self.kind_network())?.minimal();
         let requirements = self.network.requirements();
@@ -44,7 +44,7 @@ impl NetworkFile {
         Ok(self.with(tight, Vec::new()))
     }
 
-    /// The network's dispatchable form, waits included.
+    /// Returns the network's dispatchable form, waits included.
     #[must_use]
     pub fn dispatchable(&self, form: &Dispatchable<Rational>) -> Self {
         let mut network = Network::with_nodes(self.points.len());
@@ -60,11 +60,11 @@ impl NetworkFile {
         self.with(network, waits.collect())
     }
 
-    /// The network in whole numbers, as most programs want them, and how many of its units make one
-    /// of this network's. Links that can only take one time become requirements: most programs want
-    /// links with room between their bounds. `None` if a number becomes too large for that.
+    /// Returns the network in whole numbers, as most programs require them, and the number of its
+    /// units per unit of this network. Links with a single possible duration become requirements,
+    /// because most programs require a positive width. `None` if a number becomes too large.
     ///
-    /// How durations are distributed and waits are left out.
+    /// Distributions of durations and waits are left out.
     pub fn in_whole_numbers(&self) -> Option<(Self, Rational)> {
         let whole = self.network.whole()?;
         let factor = whole.unit.fraction(1).reciprocal()?;
@@ -101,7 +101,7 @@ impl NetworkFile {
         Some((file, factor))
     }
 
-    /// The same points and links with other requirements.
+    /// Returns the same points and links with other requirements.
     fn with(&self, requirements: Network<Rational>, waits: Vec<GivenWait>) -> Self {
         let links = self.network.links().to_vec();
         Self {

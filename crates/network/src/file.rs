@@ -1,10 +1,10 @@
-//! A network as a file describes it.
+//! Contents of a network file.
 
 use elbowroom_num::Rational;
 use elbowroom_stn::NodeId;
 use elbowroom_stn::uncertain::{LinkId, UncertainNetwork};
 
-/// In which format a file is written.
+/// Format of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Nodes and constraints in JSON, as the HEATlab programs read and write them.
@@ -19,12 +19,12 @@ pub enum Format {
     Dimacs,
     /// For each node, a list of inequalities, in JSON.
     Inequalities,
-    /// JSON of our own (`docs/formats/network.md`).
+    /// Elbowroom's own JSON format (`docs/formats/network.md`).
     Elbowroom,
 }
 
 impl Format {
-    /// The format's name, for people.
+    /// Returns the format's name, for display.
     pub fn name(self) -> &'static str {
         match self {
             Self::Heatlab => "HEATlab JSON",
@@ -41,28 +41,28 @@ impl Format {
 /// The distribution of a contingent link's duration, in the network's unit of time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Duration {
-    /// Bell-shaped.
+    /// Normal.
     Normal {
         /// The mean.
         mean: Rational,
         /// The standard deviation; not negative.
         deviation: Rational,
     },
-    /// All values alike.
+    /// Uniform.
     Uniform {
-        /// From here.
+        /// The least value.
         from: Rational,
-        /// To here.
+        /// The greatest value.
         to: Rational,
     },
-    /// `from` and what an exponential distribution of mean `mean` adds.
+    /// Exponential with mean `mean`, shifted by `from`.
     Exponential {
         /// The least value.
         from: Rational,
-        /// The mean of what comes on top; not negative.
+        /// Mean of the exponential part; not negative.
         mean: Rational,
     },
-    /// `from` and what a gamma distribution adds.
+    /// Gamma, shifted by `from`.
     Gamma {
         /// The least value.
         from: Rational,
@@ -73,44 +73,43 @@ pub enum Duration {
     },
 }
 
-/// Durations that tend to be long together, or short.
+/// Group of correlated durations.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Correlation {
     /// The links, all of them normally distributed.
     pub links: Vec<LinkId>,
-    /// Row by row, how much each two of them correlate; between -1 and 1, 1 in the diagonal.
+    /// Correlation matrix, row by row; entries between -1 and 1, and 1 in the diagonal.
     pub matrix: Vec<Vec<Rational>>,
 }
 
-/// Once the link is activated, `node` waits until its end has happened, but not longer than
-/// `delay` after the activation; part of networks in dispatchable form.
+/// Wait of a network in dispatchable form: once the link is activated, `node` waits until its end
+/// has happened, but not longer than `delay` after the activation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GivenWait {
     /// The time point that waits.
     pub node: NodeId,
     /// The link whose end it waits for.
     pub link: LinkId,
-    /// For how long at most; `None` if there is no other way than the link's end.
+    /// Longest wait; `None` if only the link's end can end it.
     pub delay: Option<Rational>,
 }
 
 /// The contents of a network file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NetworkFile {
-    /// How it is written.
+    /// Format of the file.
     pub format: Format,
     /// The network's name; empty if it has none.
     pub name: String,
-    /// The names of the time points, by [`NodeId`]; no two are the same.
+    /// The names of the time points, by [`NodeId`]; all are different.
     pub points: Vec<String>,
-    /// The time point from which times count, where the file has one.
+    /// Time point that serves as time zero, if the file has one.
     pub reference: Option<NodeId>,
     /// Requirements and contingent links.
     pub network: UncertainNetwork<Rational>,
-    /// How the durations of the links are distributed, by [`LinkId`]; `None` if the file does not
-    /// say.
+    /// Distributions of the durations of the links, by [`LinkId`]; `None` if the file gives none.
     pub durations: Vec<Option<Duration>>,
-    /// Which durations correlate.
+    /// Groups of correlated durations.
     pub correlations: Vec<Correlation>,
     /// The waits of a network in dispatchable form.
     pub waits: Vec<GivenWait>,
@@ -119,12 +118,12 @@ pub struct NetworkFile {
 }
 
 impl NetworkFile {
-    /// The name of a time point.
+    /// Returns the name of a time point.
     pub fn point(&self, node: NodeId) -> &str {
         &self.points[node.index()]
     }
 
-    /// Whether the world decides nothing: a simple temporal network.
+    /// Returns `true` if the network has no contingent links: a simple temporal network.
     pub fn is_certain(&self) -> bool {
         self.network.links().is_empty()
     }

@@ -1,16 +1,16 @@
-//! JSON with places, exact numbers, and the bare infinities that some programs write.
+//! JSON parser with positions, exact numbers, and the bare infinities that some programs write.
 //!
-//! Python writes `Infinity`, which strict JSON does not have; numbers stay as they were written, so
-//! that they can be read exactly.
+//! Python writes `Infinity`, which strict JSON does not have. Numbers keep their text, so that they
+//! can be parsed exactly.
 
 use std::borrow::Cow;
 
 use crate::mistake::Report;
 
-/// Deeper nesting than any network has, shallow enough for any stack.
+/// Limit on nesting: deeper than any network needs, and shallow enough for any stack.
 const DEEPEST: usize = 64;
 
-/// A value and where it begins.
+/// A value and its position.
 #[derive(Debug)]
 pub(crate) struct Json<'a> {
     pub(crate) at: usize,
@@ -21,7 +21,7 @@ pub(crate) struct Json<'a> {
 pub(crate) enum Value<'a> {
     Null,
     Bool,
-    /// As it is written; also `Infinity`, `-Infinity` and `NaN`.
+    /// The text of the number; also `Infinity`, `-Infinity` and `NaN`.
     Number(&'a str),
     Text(Cow<'a, str>),
     List(Vec<Json<'a>>),
@@ -29,7 +29,7 @@ pub(crate) enum Value<'a> {
 }
 
 impl<'a> Json<'a> {
-    /// The member of that name; the last one, if there are several.
+    /// Returns the member of that name; the last one, if there are several.
     pub(crate) fn member(&self, name: &str) -> Option<&Json<'a>> {
         match &self.value {
             Value::Object(members) => {
@@ -61,7 +61,7 @@ impl<'a> Json<'a> {
         }
     }
 
-    /// The kind of the value, for a message.
+    /// Returns the kind of the value, for a message.
     pub(crate) fn kind(&self) -> &'static str {
         match &self.value {
             Value::Null => "null",
@@ -74,7 +74,7 @@ impl<'a> Json<'a> {
     }
 }
 
-/// Reads a document; `None` after a mistake was noted.
+/// Parses a document. Returns `None` after reporting a mistake.
 pub(crate) fn parse<'a>(text: &'a str, report: &mut Report) -> Option<Json<'a>> {
     let mut reader = Reader { text, at: 0 };
     let read = reader.value(0).and_then(|value| {
@@ -119,7 +119,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The text at this place, for a message.
+    /// Returns the text at this place, for a message.
     fn here(&self) -> String {
         match self.text[self.at..].chars().next() {
             Some(letter) => format!("`{letter}`"),
@@ -200,7 +200,7 @@ impl<'a> Reader<'a> {
         Ok(Value::List(items))
     }
 
-    /// Whether the list or object ends here; otherwise steps over the comma.
+    /// Returns `true` if the list or object ends here; otherwise skips the comma.
     fn is_last(&mut self, end: u8) -> Result<bool, Wrong> {
         self.skip_space();
         match self.peek() {
@@ -219,7 +219,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A number, `true`, `false`, `null` or an infinity.
+    /// Reads a number, `true`, `false`, `null` or an infinity.
     fn word(&mut self) -> Result<Value<'a>, Wrong> {
         let start = self.at;
         while let Some(b'-' | b'+' | b'.' | b'0'..=b'9' | b'A'..=b'Z' | b'a'..=b'z') = self.peek() {
@@ -259,7 +259,7 @@ impl<'a> Reader<'a> {
         Err(self.wrong("the text that begins here has no end", "add a double quote"))
     }
 
-    /// A string with escape sequences, the first of them at `at`.
+    /// Reads a string with escape sequences, the first of them at `at`.
     fn escaped(&mut self, start: usize, at: usize) -> Result<Cow<'a, str>, Wrong> {
         let begin = self.at;
         let mut read = self.text[start..at].to_owned();
@@ -280,7 +280,7 @@ impl<'a> Reader<'a> {
                     Some('u') => {
                         let digits: String = letters.by_ref().take(4).map(|(_, c)| c).collect();
                         let code = u32::from_str_radix(&digits, 16).ok();
-                        // Halves of a pair stay unknown: no name needs them.
+                        // Surrogate pairs are not decoded, because no name needs them.
                         let letter = code.and_then(char::from_u32);
                         read.push(letter.unwrap_or(char::REPLACEMENT_CHARACTER));
                     }

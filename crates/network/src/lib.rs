@@ -1,13 +1,13 @@
-//! The field's formats for temporal networks, read as they are.
+//! Readers and writers for the file formats of temporal networks.
 //!
-//! [`read`] takes the bytes of a file in any of them and answers with a [`NetworkFile`]: time
-//! points with names, requirements, contingent links, and how their durations are distributed.
-//! Numbers are exact. What cannot be read is refused with the place in the text and what to do
-//! ([`Diagnostics`]). [`write_json`], [`write_graphml`] and [`write_plain`] write networks so that
-//! [`read()`] reads them back, [`NetworkFile::minimal`] and [`NetworkFile::dispatchable`] derive other forms, and
-//! [`weak()`] decides whether there is a schedule for whatever the world does.
+//! [`read`] parses the bytes of a file in any of these formats and returns a [`NetworkFile`]: time
+//! points with names, requirements, contingent links, and the distributions of their durations.
+//! Numbers are exact. Errors report the position in the text and a remedy ([`Diagnostics`]).
+//! [`write_json`], [`write_graphml`] and [`write_plain`] write networks so that [`read()`] reads
+//! them back, [`NetworkFile::minimal`] and [`NetworkFile::dispatchable`] derive other forms, and
+//! [`weak()`] decides weak controllability.
 //!
-//! This crate looks at no files, no clock and no random numbers.
+//! This crate uses no files, no clock and no random numbers.
 //!
 //! ```
 //! use elbowroom_network::read;

@@ -1,8 +1,8 @@
-//! What is wrong in a text, and where.
+//! Mistakes in a text, with their positions.
 
 use elbowroom_text::{Diagnostics, Source};
 
-/// Characters that end the word at which a mistake is marked.
+/// Characters that end the marked word of a mistake.
 const ENDS: [char; 12] = [',', ';', '(', ')', '[', ']', '{', '}', '<', '>', '"', '='];
 
 /// Collects mistakes and remarks while a text is read.
@@ -20,7 +20,7 @@ impl Report {
         }
     }
 
-    /// Notes a mistake at a byte of the text: in the word that begins there.
+    /// Reports a mistake in the word that begins at a byte of the text.
     pub(crate) fn mistake(
         &mut self,
         at: usize,
@@ -43,7 +43,7 @@ impl Report {
             .advise(help.into());
     }
 
-    /// Notes something that is taken otherwise than the text says, or left out.
+    /// Reports something that is interpreted differently from the text, or left out.
     pub(crate) fn remark(&mut self, remark: impl Into<String>) {
         let remark = remark.into();
         if !self.remarks.contains(&remark) {
@@ -55,7 +55,7 @@ impl Report {
         self.found.is_failed()
     }
 
-    /// The value with what was remarked, or the mistakes, by position.
+    /// Returns the value with the remarks, or the mistakes sorted by position.
     pub(crate) fn finish<T>(self, value: Option<T>) -> Result<(T, Vec<String>), Diagnostics> {
         let (value, _) = self.found.finish(value)?;
         Ok((value, self.remarks))

@@ -1,8 +1,8 @@
-//! Bounds as files write them.
+//! Bounds as written in files.
 
 use elbowroom_num::Rational;
 
-/// A number, or none at all on that side.
+/// Finite or infinite bound.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Bound {
     NegativeInfinity,

@@ -1,4 +1,4 @@
-//! Which format a file is in, and reading it.
+//! Detection of a file's format, and the readers.
 
 mod dimacs;
 mod distribution;
@@ -17,7 +17,7 @@ use crate::json::{self, Json, Value};
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// Endings of files that describe conditional networks or more, and what these are.
+/// Extensions of files with unsupported kinds of networks, and the names of these kinds.
 const REFUSED: [(&str, &str); 6] = [
     ("cstn", "a conditional network (CSTN)"),
     ("cstnu", "a conditional network with uncertainty (CSTNU)"),
@@ -33,15 +33,15 @@ const REFUSED: [(&str, &str); 6] = [
     ("pstn", "a probabilistic network of the CSTNU Tool (PSTN)"),
 ];
 
-/// Advice on a network of a kind that is refused.
+/// Advice on unsupported kinds of networks.
 const REFUSED_HELP: &str =
     "simple networks (STN) and networks with contingent links (STNU) are read";
 
-/// Reads a file of any of the known formats; the name serves messages, and its ending counts where
-/// the text leaves the kind of network open.
+/// Reads a file of any of the known formats. The name is used in messages. Its extension is only
+/// used if the text does not determine the kind of network.
 ///
 /// # Errors
-/// When the bytes are no network, or one of a kind that is not supported.
+/// If the bytes are not a network, or if the kind of network is not supported.
 pub fn read(name: &str, bytes: &[u8]) -> Result<NetworkFile, Diagnostics> {
     let source = Source::from_bytes(name, bytes);
     let mut report = Report::new(&source);
@@ -92,7 +92,7 @@ fn any(name: &str, text: &str, report: &mut Report) -> Option<NetworkFile> {
     }
 }
 
-/// The extension of a file's name, in lower case.
+/// Returns the extension of a file's name, in lower case.
 fn ending(name: &str) -> String {
     let base = name.rsplit(['/', '\\']).next().unwrap_or_default();
     match base.rsplit_once('.') {
@@ -101,7 +101,7 @@ fn ending(name: &str) -> String {
     }
 }
 
-/// Whether a line looks like `Z=0, A=3, C(A)=7`.
+/// Returns `true` if a line looks like `Z=0, A=3, C(A)=7`.
 fn is_trace(line: &str) -> bool {
     let is_event = |event: &str| {
         let (name, time) = event.split_once('=')?;
@@ -135,7 +135,7 @@ fn any_json(text: &str, report: &mut Report) -> Option<NetworkFile> {
     None
 }
 
-/// The list under a name; that it is missing is a mistake.
+/// Returns the list under a name; reports a mistake if it is missing.
 fn list<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report) -> &'j [Json<'a>] {
     let Some(member) = required(parent, name, report) else {
         return &[];
@@ -151,7 +151,7 @@ fn list<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report) -> &'j [J
     items.unwrap_or_default()
 }
 
-/// The member of that name; that it is missing is a mistake.
+/// Returns the member of that name; reports a mistake if it is missing.
 fn required<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report) -> Option<&'j Json<'a>> {
     let member = parent.member(name);
     if member.is_none() {
@@ -164,7 +164,7 @@ fn required<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report) -> Op
     member
 }
 
-/// A number or an infinity, as a number or a text.
+/// Reads a number or an infinity, given as a number or a string.
 fn bound(json: &Json<'_>, report: &mut Report) -> Option<Bound> {
     let read = match &json.value {
         Value::Number(number) => Bound::parse(number),
@@ -181,7 +181,7 @@ fn bound(json: &Json<'_>, report: &mut Report) -> Option<Bound> {
     read
 }
 
-/// A finite number.
+/// Reads a finite number.
 fn number(json: &Json<'_>, report: &mut Report) -> Option<Rational> {
     match bound(json, report)? {
         Bound::Finite(number) => Some(number),
@@ -192,7 +192,7 @@ fn number(json: &Json<'_>, report: &mut Report) -> Option<Rational> {
     }
 }
 
-/// A bound under a name, or that one if there is none of that name.
+/// Reads a bound under a name; returns `missing` if there is none.
 fn bound_or(parent: &Json<'_>, name: &str, missing: Bound, report: &mut Report) -> Option<Bound> {
     match parent.member(name) {
         Some(json) if !matches!(json.value, Value::Null) => bound(json, report),
@@ -200,7 +200,7 @@ fn bound_or(parent: &Json<'_>, name: &str, missing: Bound, report: &mut Report) 
     }
 }
 
-/// The name of a time point: a number or a text.
+/// Reads the name of a time point: a number or a string.
 fn point_name(json: &Json<'_>, report: &mut Report) -> Option<String> {
     match &json.value {
         Value::Number(number) => Some((*number).to_owned()),
@@ -216,7 +216,7 @@ fn point_name(json: &Json<'_>, report: &mut Report) -> Option<String> {
     }
 }
 
-/// A matrix of so many rows, symmetric, with 1 in its diagonal.
+/// Reads a symmetric matrix with `size` rows and 1 in its diagonal.
 fn correlation_matrix(
     parent: &Json<'_>,
     name: &str,

@@ -1,12 +1,12 @@
-//! Is there a schedule for whatever the world does?
+//! Weak controllability: a schedule for every choice of durations.
 //!
-//! Weak controllability (Vidal & Fargier 1999): for each choice of durations of the contingent
-//! links there are times for the other points, perhaps such that had to know the durations
-//! beforehand. The durations with a schedule form a convex set, so the corners decide, where each
-//! link is as short or as long as it may be; those that matter are found by [`branching`].
+//! For each choice of durations of the contingent links there are times for the other points (Vidal
+//! & Fargier 1999). They may depend on durations that are not known yet. The durations with a
+//! schedule form a convex set, so it is enough to check the corners, where each link has its least
+//! or its greatest duration. The relevant corners are found by [`branching`].
 //!
-//! A link that may last for ever needs no branching: if anything at all limits its end from
-//! above, some duration is too long.
+//! A link without an upper bound needs no branching: if any constraint limits its end from above,
+//! some duration is too long.
 //!
 //! [`branching`]: elbowroom_stn::branching
 
@@ -20,13 +20,13 @@ use elbowroom_stn::{Constraint, ConstraintId, Network, NodeId};
 /// The result of a weak-controllability check.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Weak {
-    /// There is a schedule for whatever the world does.
+    /// There is a schedule for every choice of durations.
     Controllable,
-    /// For these durations there is none.
+    /// There is no schedule for these durations.
     Uncontrollable(WeakConflict),
-    /// It takes more than so many branches to find out.
+    /// The limit on branches was reached before the check was finished.
     Undecided {
-        /// How many were looked at.
+        /// Number of branches that were examined.
         branches: usize,
     },
 }
@@ -34,11 +34,11 @@ pub enum Weak {
 /// Durations without a schedule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WeakConflict {
-    /// The links that matter, and how long each takes; the others may take any time.
+    /// The links in the conflict with their durations; the others may have any duration.
     pub durations: BTreeMap<LinkId, Rational>,
-    /// The contradiction in that case, in the order of a cycle.
+    /// The contradiction, in the order of a cycle.
     pub steps: Vec<WeakStep>,
-    /// By how much; negative.
+    /// Length of the cycle; negative.
     pub total: Rational,
 }
 
@@ -51,7 +51,7 @@ pub struct WeakStep {
     pub to: NodeId,
     /// The upper bound of the difference.
     pub bound: Rational,
-    /// Where it comes from.
+    /// Origin of the bound.
     pub given: Given,
 }
 
@@ -64,8 +64,8 @@ pub enum Given {
     Link(LinkId),
 }
 
-/// Whether there is a schedule for whatever the world does; after `most_branches` the question is
-/// given up.
+/// Decides weak controllability: for all durations within their bounds there is a schedule. Returns
+/// [`Weak::Undecided`] after `most_branches` branches.
 pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> Weak {
     if let Some(conflict) = endless(network).or_else(|| own_limit(network)) {
         return Weak::Uncontrollable(conflict);
@@ -82,15 +82,15 @@ pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> Weak 
                 .collect();
             match at(network, &durations) {
                 Some(conflict) => Weak::Uncontrollable(conflict),
-                // Every corner found has a negative cycle; were it not so, nothing would be known.
+                // Unreachable: every corner found has a negative cycle.
                 None => Weak::Undecided { branches: 0 },
             }
         }
     }
 }
 
-/// What contradicts itself if these links take so long, if something does. Links that are not
-/// mentioned limit nothing.
+/// Returns the contradiction that results from these durations, if any. Links that are not listed
+/// add no constraints.
 pub fn at(
     network: &UncertainNetwork<Rational>,
     durations: &BTreeMap<LinkId, Rational>,
@@ -136,7 +136,7 @@ pub fn at(
     })
 }
 
-/// The duration of the link at that end.
+/// Returns the duration of the link at that end.
 fn duration(link: &ContingentLink<Rational>, side: Side) -> Rational {
     match side {
         Side::Lower => link.lower.clone(),
@@ -144,7 +144,7 @@ fn duration(link: &ContingentLink<Rational>, side: Side) -> Rational {
     }
 }
 
-/// A conflict of a link without an upper bound whose end is limited from above.
+/// Returns a conflict of a link without an upper bound whose end is limited from above.
 fn endless(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
     let shortest: BTreeMap<LinkId, Rational> = network
         .link_ids()
@@ -158,7 +158,7 @@ fn endless(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
         if let Some(conflict) = at(network, &shortest) {
             return Some(conflict);
         }
-        // So long that the way from its beginning to its end is shorter.
+        // Lengthens the duration until it exceeds the path from the link's beginning to its end.
         let mut durations = shortest.clone();
         let mut step = Rational::ONE;
         loop {
@@ -172,7 +172,7 @@ fn endless(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
     None
 }
 
-/// Whether bounds lead from the beginning of a link to its end without the link itself.
+/// Returns `true` if bounds lead from the activation of a link to its end without the link itself.
 fn is_limited(network: &UncertainNetwork<Rational>, id: LinkId) -> bool {
     let link = network.link(id);
     let requirements = network.requirements();
@@ -195,7 +195,7 @@ fn is_limited(network: &UncertainNetwork<Rational>, id: LinkId) -> bool {
     is_seen[link.end.index()]
 }
 
-/// A conflict of a link with a requirement on the very same difference.
+/// Returns a conflict of a link with a requirement on the same difference.
 fn own_limit(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
     for constraint in network.requirements().constraints() {
         for (node, other, side) in [
@@ -219,7 +219,7 @@ fn own_limit(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
     None
 }
 
-/// A corner without a schedule: the links that matter, and at which end each is.
+/// Returns a corner without a schedule: the relevant links, with the end of each.
 fn corner_without_schedule(
     network: &UncertainNetwork<Rational>,
     most_branches: usize,
@@ -241,7 +241,7 @@ fn corner_without_schedule(
     };
     let mut corner = branching.corner_without_schedule()?;
     if let Some(corner) = &mut corner {
-        // Links of one duration, or without an upper bound, are on the cycle as they are.
+        // Links with a single duration, or without an upper bound, are not branched on.
         for id in network.link_ids() {
             let link = network.link(id);
             if link.upper.as_ref().is_none_or(|upper| *upper == link.lower) {
@@ -252,11 +252,11 @@ fn corner_without_schedule(
     Ok(corner)
 }
 
-/// The bounds of the network, those of links depending on how long the links take.
+/// Returns the bounds of the network; those of links depend on their durations.
 fn bounds(network: &UncertainNetwork<Rational>) -> Vec<OpenBound<LinkId>> {
     let mut bounds = Vec::new();
     for constraint in network.requirements().constraints() {
-        // What a link says of its own difference is as tight; see `own_limit`.
+        // The link's own bound on this difference is at least as tight; see `own_limit`.
         let is_own = [
             (constraint.to, constraint.from),
             (constraint.from, constraint.to),
@@ -278,7 +278,7 @@ fn bounds(network: &UncertainNetwork<Rational>) -> Vec<OpenBound<LinkId>> {
     for id in network.link_ids() {
         let link = network.link(id);
         if link.upper.is_none() {
-            // The other way, a link that may last for ever lies on no cycle; see `endless`.
+            // A link without an upper bound lies on no cycle in the other direction; see `endless`.
             bounds.push(OpenBound {
                 from: link.activation,
                 to: link.end,

@@ -1,4 +1,4 @@
-//! What bounds mean, in the file's own names.
+//! Descriptions of bounds in words, with the file's own names.
 
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::LinkId;
@@ -6,16 +6,16 @@ use elbowroom_stn::{ConstraintId, NodeId};
 
 use crate::file::NetworkFile;
 
-/// Digits after the point that people get to see.
+/// Digits after the decimal point in messages.
 const DIGITS: u32 = 3;
 
-/// A number in short decimals.
+/// Formats a number with few decimals.
 pub fn number(value: &Rational) -> String {
     value.to_decimal(DIGITS)
 }
 
 impl NetworkFile {
-    /// `to - from <= bound` in words: "C at most 12 after X", "X at least 7 after C".
+    /// Describes `to - from <= bound` in words: "C at most 12 after X", "X at least 7 after C".
     pub fn bound_in_words(&self, from: NodeId, to: NodeId, bound: &Rational) -> String {
         let (from, to) = (self.point(from), self.point(to));
         if bound.is_negative() {
@@ -27,13 +27,13 @@ impl NetworkFile {
         }
     }
 
-    /// A requirement in words.
+    /// Describes a requirement in words.
     pub fn requirement_in_words(&self, id: ConstraintId) -> String {
         let constraint = self.network.requirements().constraint(id);
         self.bound_in_words(constraint.from, constraint.to, &constraint.bound)
     }
 
-    /// The sentence that a link may end as early as its lower bound.
+    /// Describes that a link may end as early as its lower bound.
     pub fn early_in_words(&self, id: LinkId) -> String {
         let link = self.network.link(id);
         let (begin, end) = (self.point(link.activation), self.point(link.end));
@@ -41,7 +41,7 @@ impl NetworkFile {
         format!("{end} may come as early as {lower} after {begin}")
     }
 
-    /// The sentence that a link may end as late as its upper bound.
+    /// Describes that a link may end as late as its upper bound.
     pub fn late_in_words(&self, id: LinkId) -> String {
         let link = self.network.link(id);
         let (begin, end) = (self.point(link.activation), self.point(link.end));
@@ -53,7 +53,7 @@ impl NetworkFile {
         }
     }
 
-    /// The sentence that a link takes this long.
+    /// Describes that a link has this duration.
     pub fn duration_in_words(&self, id: LinkId, duration: &Rational) -> String {
         let link = self.network.link(id);
         let (begin, end) = (self.point(link.activation), self.point(link.end));

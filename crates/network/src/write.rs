@@ -1,4 +1,4 @@
-//! Networks as text that [`crate::read()`] reads back.
+//! Writers for networks, in formats that [`crate::read()`] reads back.
 
 use std::fmt::{self, Write as _};
 
@@ -7,7 +7,7 @@ use elbowroom_stn::uncertain::ContingentLink;
 
 use crate::file::{Duration, NetworkFile};
 
-/// A network in JSON (`docs/formats/network.md`). Nothing is lost.
+/// Writes a network in JSON (`docs/formats/network.md`). Nothing is lost.
 pub fn write_json(file: &NetworkFile) -> String {
     let mut text = String::from("{\n  \"format\": \"elbowroom-network\",\n  \"version\": 1,\n");
     // Writing to a string cannot fail.
@@ -124,7 +124,7 @@ fn json_link(
     text
 }
 
-/// A number: as it is if it is whole, otherwise as the text of a fraction.
+/// Formats a number: a whole number as a number, others as a string with a fraction.
 fn json_number(number: &Rational) -> String {
     if number.is_integer() {
         number.to_string()
@@ -133,7 +133,7 @@ fn json_number(number: &Rational) -> String {
     }
 }
 
-/// A text of JSON.
+/// Quotes a string for JSON.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for letter in text.chars() {
@@ -151,9 +151,9 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
-/// A network as sections of plain text (`# KIND OF NETWORK`). How durations are distributed and
-/// waits have no place there. `None` if a link has no upper bound, or a time point's name cannot
-/// stand there: it is empty, or has a space, a quote or `#` in it.
+/// Writes a network as sections of plain text (`# KIND OF NETWORK`). This format has no
+/// distributions and no waits. Returns `None` if a link has no upper bound, or if a time point's
+/// name is empty or contains a space, a quote or `#`.
 pub fn write_plain(file: &NetworkFile) -> Option<String> {
     let is_bad = |letter: char| letter.is_whitespace() || matches!(letter, '#' | '"' | '\'');
     let mut points = file.points.iter();
@@ -188,9 +188,9 @@ pub fn write_plain(file: &NetworkFile) -> Option<String> {
     ))
 }
 
-/// A network in GraphML as the CSTNU Tool reads it; that tool knows whole numbers only, so others
-/// are for us. How durations are distributed has no place there. `None` if a wait has no end but
-/// that of its link, which has no place there either.
+/// Writes a network in GraphML as the CSTNU Tool reads it. That tool knows whole numbers only;
+/// files with others are only for this crate. Distributions are left out, because the format has
+/// none. Returns `None` if a wait only ends with its link, which the format cannot express.
 pub fn write_graphml(file: &NetworkFile) -> Option<String> {
     if file.waits.iter().any(|wait| wait.delay.is_none()) {
         return None;
@@ -253,7 +253,7 @@ fn graphml(file: &NetworkFile, text: &mut String) -> fmt::Result {
     Ok(())
 }
 
-/// Each edge: its ends, its type, and its values.
+/// Returns the edges, each with its ends, its type and its values.
 fn graphml_edges(file: &NetworkFile) -> Vec<([String; 2], &'static str, String)> {
     let name = |node| escaped(file.point(node));
     let value = |value: &str| format!("<data key=\"Value\">{value}</data>");
@@ -286,7 +286,7 @@ fn graphml_edges(file: &NetworkFile) -> Vec<([String; 2], &'static str, String)>
     edges
 }
 
-/// A text of XML.
+/// Escapes a string for XML.
 fn escaped(text: &str) -> String {
     let mut escaped = String::new();
     for letter in text.chars() {

@@ -1,22 +1,22 @@
-//! As much of XML as GraphML files use, with places.
+//! Parser for the subset of XML that GraphML files use, with positions.
 //!
 //! Elements, attributes, texts, CDATA, character references; comments, processing instructions and
-//! document types are skipped. Names lose their prefixes. A document may consist of several
-//! elements side by side: some tools write that.
+//! document types are skipped. Prefixes of names are removed. A document may consist of several
+//! root elements, because some tools write that.
 
 use crate::mistake::Report;
 
-/// Deeper nesting than any network has, shallow enough for any stack.
+/// Limit on nesting: deeper than any network needs, and shallow enough for any stack.
 const DEEPEST: usize = 64;
 
-/// An element, and where it begins.
+/// An element and its position.
 #[derive(Debug, Default)]
 pub(crate) struct Element {
     pub(crate) at: usize,
     pub(crate) name: String,
     pub(crate) attributes: Vec<(String, String)>,
     pub(crate) children: Vec<Element>,
-    /// The text directly inside, and where it begins.
+    /// The text directly inside, and its position.
     pub(crate) text: String,
     pub(crate) text_at: usize,
 }
@@ -27,13 +27,13 @@ impl Element {
         found.map(|(_, value)| value.as_str())
     }
 
-    /// The children of that name.
+    /// Returns the children of that name.
     pub(crate) fn named<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Element> {
         self.children.iter().filter(move |child| child.name == name)
     }
 }
 
-/// The elements of a document; `None` after a mistake was noted.
+/// Parses the elements of a document. Returns `None` after reporting a mistake.
 pub(crate) fn parse(text: &str, report: &mut Report) -> Option<Vec<Element>> {
     let mut reader = Reader {
         text,
@@ -59,7 +59,7 @@ struct Wrong {
 struct Reader<'a> {
     text: &'a str,
     at: usize,
-    /// The elements that are open, around them one for the document.
+    /// The stack of open elements; the first one represents the document.
     open: Vec<Element>,
 }
 
@@ -76,7 +76,7 @@ impl Reader<'_> {
         &self.text[self.at..]
     }
 
-    /// Steps over everything until after `end`.
+    /// Skips everything up to and including `end`.
     fn skip_past(&mut self, end: &str, what: &str) -> Result<(), Wrong> {
         match self.rest().find(end) {
             Some(offset) => {
@@ -115,7 +115,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// `<!DOCTYPE …>`, perhaps with declarations in brackets.
+    /// Skips `<!DOCTYPE …>`, possibly with declarations in brackets.
     fn document_type(&mut self) -> Result<(), Wrong> {
         let rest = self.rest();
         let first = rest.find('>');
@@ -271,7 +271,7 @@ impl Reader<'_> {
         self.at += rest.len() - rest.trim_start().len();
     }
 
-    /// A stretch of the text with its character references resolved.
+    /// Returns a part of the text with its character references resolved.
     fn resolved(&mut self, start: usize, end: usize) -> Result<String, Wrong> {
         let text = &self.text[start..end];
         if !text.contains('&') {
@@ -301,12 +301,12 @@ impl Reader<'_> {
     }
 }
 
-/// A name without its prefix.
+/// Returns a name without its prefix.
 fn local(name: &str) -> String {
     name.rsplit(':').next().unwrap_or_default().to_owned()
 }
 
-/// The character that `&name;` stands for.
+/// Returns the character that `&name;` encodes.
 fn reference(name: &str) -> Option<char> {
     match name {
         "lt" => Some('<'),

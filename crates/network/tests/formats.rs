@@ -1,4 +1,4 @@
-//! What each format says, and what is refused.
+//! Contents and errors of each format.
 
 mod samples;
 
@@ -20,7 +20,7 @@ fn refused(name: &str, text: &str) -> String {
     }
 }
 
-/// The network in words: requirements, then links.
+/// Describes the network in words: requirements, then links.
 fn words(file: &NetworkFile) -> String {
     let requirements = file.network.requirements();
     let mut lines: Vec<String> = requirements
@@ -332,7 +332,7 @@ fn links_that_depend_on_their_own_end_are_refused() {
     assert!(refused("f", text).contains("depends on its own end"));
 }
 
-/// The second link is refused; what names its end afterwards means the first.
+/// The second link is refused; later references to its end mean the first link.
 #[test]
 fn two_links_with_one_end_are_refused_whatever_else_names_that_end() {
     let link = "{\"source\": 0, \"sink\": 1, \"label\": \"one\", \"type\": \"pstc\",

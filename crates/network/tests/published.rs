@@ -1,4 +1,4 @@
-//! Networks as their authors published them, where they are there.
+//! Networks as published by their authors, if they are available.
 
 #![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use elbowroom_network::{Format, NetworkFile, read};
 use skipped::skipped;
 
-/// The folder with the networks; `None`, and a word about it, where it is not there.
+/// Returns the folder with the networks; prints a note and returns `None` if it does not exist.
 fn folder() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/stn");
     if folder.is_dir() {

@@ -1,4 +1,4 @@
-//! Whatever the bytes, no reader panics; what is read can be written and read again.
+//! No reader panics on any bytes, and every parsed network can be written and read again.
 
 mod samples;
 

@@ -1,4 +1,4 @@
-//! Weak controllability against all corners.
+//! Weak controllability, compared with a check of all corners.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,8 @@ use elbowroom_stn::uncertain::{ContingentLink, LinkId, UncertainNetwork};
 use elbowroom_stn::{Constraint, Network, NodeId};
 use proptest::prelude::*;
 
-/// Whether there is a schedule at each corner, an endless link ending far out.
+/// Returns `true` if there is a schedule at each corner; links without an upper bound end very late
+/// there.
 fn plainly_weak(network: &UncertainNetwork<Rational>) -> bool {
     let links: Vec<LinkId> = network.link_ids().collect();
     (0..1_u32 << links.len()).all(|corner| {
@@ -39,7 +40,7 @@ fn arbitrary_networks() -> impl Strategy<Value = UncertainNetwork<Rational>> {
             let bound = Rational::from(bound);
             requirements.add(Constraint::at_most(NodeId(from), NodeId(to), bound));
         }
-        // The link that ends at node n begins before n, so that none depends on itself.
+        // The link that ends at node n begins before n, so that no link depends on itself.
         let contingent = links
             .into_iter()
             .enumerate()
@@ -65,7 +66,7 @@ proptest! {
             Weak::Controllable => prop_assert!(plainly_weak(&network)),
             Weak::Uncontrollable(conflict) => {
                 prop_assert!(!plainly_weak(&network));
-                // The durations lie within the bounds, and what is shown is a cycle.
+                // The durations lie within the bounds, and the steps form a negative cycle.
                 for (&id, duration) in &conflict.durations {
                     let link = network.link(id);
                     prop_assert!(*duration >= link.lower);
@@ -99,8 +100,8 @@ proptest! {
     }
 }
 
-/// Two links that must end together, whatever they take, are not weakly controllable; with their
-/// beginnings free they are.
+/// Two links that must end together, whatever their durations, are not weakly controllable. They
+/// are if the executor chooses when they begin.
 #[test]
 fn ends_can_be_brought_together_only_by_one_who_knows_the_durations() {
     let minutes = |n: i64| Rational::from(n);

@@ -1,5 +1,5 @@
-//! Chains of time points with bounds on their differences, and shared consumption: the linear
-//! programs that plans lead to.
+//! Linear programs of the kind that plans lead to: chains of time points with bounds on their
+//! differences, and shared consumption.
 
 use divan::Bencher;
 use elbowroom_num::simplex::{Simplex, VariableId};
@@ -9,8 +9,8 @@ fn main() {
     divan::main();
 }
 
-/// `count` time points; each lies 1 to 3 (and a bit) after one of the last three before it, and
-/// each tenth sum of four stays below a limit.
+/// Returns a system of `count` time points. Each lies 1 to 3 (and a bit) after one of the last
+/// three before it, and each tenth sum of four stays below a limit.
 fn plan(count: i64) -> (Simplex, Vec<VariableId>) {
     let mut system = Simplex::new();
     let mut tag = 0..;
@@ -57,7 +57,7 @@ fn maximize_the_last_after_a_check(bencher: Bencher, count: i64) {
         .bench_values(|mut system| system.maximize(&objective));
 }
 
-/// One bound more, a check, and back: what a search does all the time.
+/// Adds a bound, checks, and undoes it, as a search does all the time.
 #[divan::bench(args = [20, 100, 300], max_time = 5)]
 fn push_check_pop(bencher: Bencher, count: i64) {
     let (mut system, points) = plan(count);

@@ -1,15 +1,17 @@
-//! How likely a random number lies in an interval, between two fractions.
+//! Bounds on the probability that a random number lies in an interval, as fractions.
 //!
-//! A [`Chance`] is a distribution as somebody states it: a density whose logarithm is concave, cut at
-//! both sides (what would be beyond a cut is at the cut), or a list of values. A [`Reach`] is an interval
-//! around a point, by how far its ends lie from it. Of all intervals in a [`Cell`], a rectangle of
-//! reaches, [`Chance::height`] says how far the logarithm of the probability is at most above a linear
-//! function: that is what makes the best of many intervals provable.
+//! A [`Chance`] is a user-stated distribution: either a density whose logarithm is concave, cut at
+//! both sides (values beyond a cut are moved to the cut), or a list of values. A [`Reach`] is an
+//! interval around a point, given by the distances of its ends from the point. A [`Cell`] is a
+//! rectangle of reaches. [`Chance::height`] bounds how far the logarithm of the probability rises
+//! above a linear function for all intervals of a cell. Branch and bound uses that bound to prove
+//! an interval optimal.
 //!
-//! For a density with a concave logarithm, the logarithm of the probability of an interval is a jointly
-//! concave function of its ends (Prékopa 1973), and lies below each of its tangents. What is at a cut is
-//! there or not: a cell that leaves that open counts it by a share that grows with the reach. Of a list of
-//! values, a cell counts those that it may reach.
+//! For a density with a concave logarithm, the logarithm of the probability of an interval is a
+//! jointly concave function of its ends (Prékopa 1973), and lies below each of its tangents. The
+//! probability mass at a cut is either inside the interval or not. If the intervals of a cell
+//! differ in that, the mass counts with a share that grows with the reach. For a list of values, a
+//! cell counts the values that its intervals may contain.
 
 mod density;
 mod height;
@@ -19,12 +21,12 @@ use crate::Rational;
 pub use density::Density;
 pub use height::{Cut, Steps};
 
-/// The distribution of a number that is rounded to multiples of something.
+/// Distribution of a number that is rounded to multiples of a resolution.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Chance {
-    /// It has a density, but for what is at its cuts.
+    /// A density; only the mass at its cuts is discrete.
     Dense(Dense),
-    /// One of these values, all alike; sorted, at least one.
+    /// Equally likely values; sorted, at least one.
     Values(Vec<Rational>),
 }
 
@@ -33,53 +35,54 @@ pub enum Chance {
 pub struct Dense {
     /// The density.
     pub density: Density,
-    /// Lesser numbers become this.
+    /// Lower cut: lesser numbers become this.
     pub minimum: Option<Rational>,
-    /// Greater numbers become this.
+    /// Upper cut: greater numbers become this.
     pub maximum: Option<Rational>,
-    /// An interval counts as so much longer at either end: half of what numbers are rounded to.
+    /// Length added to an interval at either end: half of the rounding resolution.
     pub margin: Rational,
 }
 
-/// How far an interval reaches below and above a point.
+/// Distances of the lower and the upper end of an interval from a point inside it.
 pub type Reach = [Rational; 2];
 
-/// The intervals around a point whose lower ends lie so far below it, between two numbers, and whose
-/// upper ends so far above it.
+/// Set of intervals around a point: the distances of the lower end and of the upper end each lie
+/// within a range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cell {
     /// The least and the greatest distance of the lower end.
     pub below: [Rational; 2],
     /// The least and the greatest distance of the upper end.
     pub above: [Rational; 2],
-    /// Of the lower and of the upper end, whether the greatest distance is not reached.
+    /// For the lower and the upper end, `true` if the greatest distance is excluded.
     pub is_open: [bool; 2],
 }
 
-/// Where a linear bound on a probability touches, or nearly so.
+/// Place where a linear bound on a probability is tight, or nearly tight.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Touch {
     /// At this interval.
     At(Reach),
-    /// Where the probability is this.
+    /// At intervals with this probability.
     Mass(Rational),
     /// Nowhere: no probability is more than 1.
     Nowhere,
 }
 
 impl Chance {
-    /// A list of values.
+    /// Creates the distribution of a list of equally likely values.
     ///
-    /// `None` if it is empty.
+    /// `None` if the list is empty.
     pub fn values(mut values: Vec<Rational>) -> Option<Self> {
         values.sort_unstable();
         (!values.is_empty()).then_some(Self::Values(values))
     }
 
-    /// A density that is cut at both sides, of a number that is rounded to multiples of `resolution`.
-    /// Where nothing or everything is beyond a cut, that is said more simply.
+    /// Creates the distribution of a number with this density, cut at both sides and rounded to
+    /// multiples of `resolution`. Cuts without any mass are dropped. If a cut has all the mass, the
+    /// result is a single value.
     ///
-    /// `None` if the density makes no sense ([`Density::is_sound`]).
+    /// `None` if the density is invalid ([`Density::is_sound`]).
     pub fn dense(
         density: Density,
         minimum: Option<Rational>,
@@ -98,7 +101,7 @@ impl Chance {
         let minimum = minimum.map(round).filter(|cut| !is_beyond(cut, &first));
         let maximum = maximum.map(round);
         let maximum = maximum.filter(|cut| last.as_ref().is_none_or(|last| cut < last));
-        // The upper cut is the last to be made.
+        // The upper cut is applied last.
         let ends = [&maximum, &minimum];
         if let [Some(maximum), Some(minimum)] = ends
             && maximum <= minimum
@@ -123,8 +126,8 @@ impl Chance {
         }))
     }
 
-    /// How likely the number, rounded to a multiple of `resolution`, is not outside the closed interval
-    /// with these ends: at least so much.
+    /// Returns a lower bound on the probability that the number, rounded to a multiple of
+    /// `resolution`, lies in the closed interval with these ends.
     pub fn inside(&self, [lower, upper]: [&Rational; 2], resolution: &Rational) -> Rational {
         match self {
             Self::Values(values) => share(values, |own| lower <= own && own <= upper),
@@ -151,8 +154,7 @@ impl Chance {
         }
     }
 
-    /// Between which two numbers lies the probability of an interval around a point, counted longer by
-    /// the margin.
+    /// Returns bounds on the probability of an interval around a point, extended by the margin.
     pub fn mass(&self, point: &Rational, [below, above]: &Reach) -> [Rational; 2] {
         let (lower, upper) = (point - below, point + above);
         match self {
@@ -176,10 +178,10 @@ impl Chance {
         }
     }
 
-    /// Of the lower and of the upper end, how far from a point it has to lie for the interval to have
-    /// any probability, and how far at most it gains anything.
+    /// Returns, for the lower and the upper end, the distance from a point from which the interval
+    /// has any probability, and the distance beyond which it gains none.
     ///
-    /// With a log-normal density, the most is where its logarithm is no longer concave.
+    /// With a lognormal density, the latter is where its logarithm is no longer concave.
     pub fn limits(&self, point: &Rational) -> [(Rational, Option<Rational>); 2] {
         let positive = |distance: Rational| distance.max(Rational::ZERO);
         let ([first, last], [gains_below, gains_above]) = match self {
@@ -212,8 +214,8 @@ impl Chance {
         [(least_below, most_below), (least_above, most_above)]
     }
 
-    /// The places at which what an interval around a point has jumps: of the lower end, and of the upper
-    /// one, the distances, the least first.
+    /// Returns the distances at which the probability of an interval around a point jumps, for the
+    /// lower and the upper end, in ascending order.
     pub fn jumps(&self, point: &Rational) -> [Vec<Rational>; 2] {
         match self {
             Self::Values(values) => {
@@ -240,8 +242,9 @@ impl Chance {
 }
 
 impl Dense {
-    /// What bounds on the probability take for the cuts: beyond the upper one, where the logarithm of
-    /// the density is not concave, all that is left counts as if it were there.
+    /// Returns the cuts that the bounds on the probability use. The logarithm of the density is not
+    /// concave beyond the bend. If the bend comes before the upper cut, all mass beyond the bend
+    /// counts as if it were at the bend.
     pub(crate) fn cuts(&self) -> [Option<Rational>; 2] {
         let bend = self.density.bend().map(|bend| bend - &self.margin);
         let upper = match (self.maximum.clone(), bend) {
@@ -252,7 +255,7 @@ impl Dense {
     }
 }
 
-/// The share of the values that satisfy something.
+/// Returns the share of the values that satisfy a condition.
 fn share(values: &[Rational], is_in: impl Fn(&Rational) -> bool) -> Rational {
     let count = |count: usize| Rational::from(i64::try_from(count).unwrap_or(i64::MAX));
     let inside = values.iter().filter(|own| is_in(own)).count();

@@ -14,7 +14,7 @@ use crate::Rational;
 pub struct Delta {
     /// The rational part.
     pub real: Rational,
-    /// How many times δ is added.
+    /// Coefficient of δ.
     pub infinitesimal: Rational,
 }
 
@@ -25,7 +25,7 @@ impl Delta {
         infinitesimal: Rational::ZERO,
     };
 
-    /// Just below `real`: the bound of `x < real`.
+    /// Returns the number just below `real`: the bound of `x < real`.
     pub fn just_below(real: Rational) -> Self {
         Self {
             real,
@@ -33,7 +33,7 @@ impl Delta {
         }
     }
 
-    /// Just above `real`: the bound of `x > real`.
+    /// Returns the number just above `real`: the bound of `x > real`.
     pub fn just_above(real: Rational) -> Self {
         Self {
             real,
@@ -41,7 +41,7 @@ impl Delta {
         }
     }
 
-    /// `self · factor`.
+    /// Returns `self · factor`.
     #[must_use]
     pub fn scaled(&self, factor: &Rational) -> Self {
         Self {

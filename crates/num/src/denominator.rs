@@ -5,7 +5,7 @@ use crate::Rational;
 /// A common denominator of some fractions: multiplied by it, each of them is a whole number.
 ///
 /// Sums, differences and comparisons of the whole numbers are those of the fractions, and several
-/// times faster. How large they may become is for the algorithm to say that adds them up.
+/// times faster. The caller must ensure that sums do not overflow.
 ///
 /// ```
 /// use elbowroom_num::{CommonDenominator, Rational};
@@ -26,8 +26,8 @@ impl Default for CommonDenominator {
 }
 
 impl CommonDenominator {
-    /// The least common denominator of these numbers; `None` if it does not fit an `i64`, or one of
-    /// them does not.
+    /// Returns the least common denominator of these numbers; `None` if it does not fit an `i64`,
+    /// or one of them does not.
     pub fn of<'a>(numbers: impl IntoIterator<Item = &'a Rational>) -> Option<Self> {
         let mut common = Self::default();
         for number in numbers {
@@ -36,8 +36,8 @@ impl CommonDenominator {
         Some(common)
     }
 
-    /// Becomes a denominator of this number too; `None`, and stays what it is, if that does not fit
-    /// an `i64`.
+    /// Extends the denominator so that it is also one of this number. Returns `None` and leaves it
+    /// unchanged if the result does not fit an `i64`.
     pub fn include(&mut self, number: &Rational) -> Option<()> {
         let (_, own) = number.as_small()?;
         if self.0 % own != 0 {
@@ -46,25 +46,25 @@ impl CommonDenominator {
         Some(())
     }
 
-    /// The number multiplied by the denominator; `None` if that is no whole number, or does not fit
-    /// an `i64`.
+    /// Returns the number multiplied by the denominator; `None` if that is no whole number, or does
+    /// not fit an `i64`.
     pub fn whole(self, number: &Rational) -> Option<i64> {
         let (numerator, own) = number.as_small()?;
         (self.0 % own == 0).then(|| numerator.checked_mul(self.0 / own))?
     }
 
-    /// The whole number divided by the denominator.
+    /// Returns the whole number divided by the denominator.
     pub fn fraction(self, whole: i64) -> Rational {
         Rational::new(whole, self.0)
     }
 
-    /// The denominator itself; positive.
+    /// Returns the denominator itself; positive.
     pub fn get(self) -> i64 {
         self.0
     }
 }
 
-/// The greatest common divisor of two positive numbers.
+/// Returns the greatest common divisor of two positive numbers.
 fn gcd(a: i64, b: i64) -> i64 {
     let shared = crate::rational::gcd(a.unsigned_abs().into(), b.unsigned_abs().into());
     i64::try_from(shared).expect("it divides them")

@@ -1,7 +1,7 @@
-//! Functions whose values are no fractions, between two fractions.
+//! Enclosures of functions with irrational values, between two fractions.
 //!
-//! Each value is an interval that the true one certainly lies in: computed with whole numbers, the
-//! unit being 2^-60, and every rounding counted.
+//! Each result is an interval that certainly contains the true value. It is computed with whole
+//! numbers in units of 2^-60, and every rounding error is counted.
 
 mod normal;
 
@@ -13,15 +13,15 @@ use crate::Rational;
 const ONE: i128 = 1 << 60;
 /// The logarithm of 2 in these units, rounded down.
 const LN_2: i128 = 0x0B17_217F_7D1C_F79A;
-/// No logarithm's series adds up more roundings than this, in these units.
+/// Upper bound on the rounding errors of a logarithm's series, in these units.
 const ROUNDED: i128 = 64;
 
-/// The natural logarithm, between two numbers less than 10^-15 apart unless the argument is
-/// astronomically large or small; `None` unless it is positive.
+/// Returns bounds on the natural logarithm that are less than 10^-15 apart, unless the argument is
+/// astronomically large or small; `None` unless the argument is positive.
 ///
-/// With `m·2^k` as the argument and `m` between 3/4 and 3/2, it is `k` times the logarithm of 2 plus
-/// twice the area tangent of `(m - 1) / (m + 1)`, a series in which each term is less than a 25th of
-/// the one before.
+/// With `m·2^k` as the argument and `m` between 3/4 and 3/2, it is `k` times the logarithm of 2
+/// plus twice the area tangent of `(m - 1) / (m + 1)`. In that series, each term is less than a
+/// 25th of the previous one.
 ///
 /// ```
 /// use elbowroom_num::{Rational, enclosed};
@@ -61,22 +61,22 @@ pub fn ln(argument: &Rational) -> Option<[Rational; 2]> {
     ])
 }
 
-/// The greatest multiple of a billionth that is not above this number: with what is known of
-/// functions only between bounds, no more digits are worth keeping.
+/// Returns the greatest multiple of a billionth that is not above this number. Functions are known
+/// only between bounds, so more digits are not worth keeping.
 pub fn billionths_below(number: &Rational) -> Rational {
     let billion = Rational::from(1_000_000_000);
     (number * &billion).floor() / billion
 }
 
-/// The least multiple of a billionth that is not below this number.
+/// Returns the least multiple of a billionth that is not below this number.
 pub fn billionths_above(number: &Rational) -> Rational {
     let billion = Rational::from(1_000_000_000);
     (number * &billion).ceil() / billion
 }
 
-/// A positive number as `m·2^k`, with `m` between 3/4 and 3/2.
+/// Splits a positive number into `m·2^k`, with `m` between 3/4 and 3/2.
 fn halved(number: &Rational) -> (Rational, i64) {
-    /// Powers of two by which a number is brought near to 1, the large ones first.
+    /// Exponents of the powers of two that scale a number to near 1, in descending order.
     const STEPS: [u32; 6] = [32, 16, 8, 4, 2, 1];
     let mut mantissa = number.clone();
     let mut power = 0;
@@ -101,7 +101,7 @@ fn halved(number: &Rational) -> (Rational, i64) {
     (mantissa, power)
 }
 
-/// A number between -4 and 4 in units of 2^-60, rounded down.
+/// Converts a number between -4 and 4 to units of 2^-60, rounded down.
 fn steps(number: &Rational) -> Option<i64> {
     let unit = Rational::from(i64::try_from(ONE).ok()?);
     (number * &unit).floor().as_small().map(|(steps, _)| steps)
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn the_logarithm_of_the_base_is_enclosed() {
-        // 1/0! + 1/1! + … + 1/25!, and what the rest is less than.
+        // 1/0! + 1/1! + … + 1/25!, and an upper bound on the remainder.
         let (mut sum, mut term) = (Rational::ZERO, Rational::ONE);
         for n in 1..=25_i64 {
             sum += &term;

@@ -9,14 +9,14 @@ use crate::Rational;
 pub enum End {
     /// The number itself belongs to the interval.
     Closed(Rational),
-    /// The interval comes as close to the number as one likes, without it.
+    /// The interval comes arbitrarily close to the number, and excludes it.
     Open(Rational),
     /// No limit on this side.
     Infinite,
 }
 
 impl End {
-    /// The number at this end, unless it is infinite.
+    /// Returns the number at this end, unless it is infinite.
     pub fn value(&self) -> Option<&Rational> {
         match self {
             End::Closed(value) | End::Open(value) => Some(value),
@@ -24,7 +24,7 @@ impl End {
         }
     }
 
-    /// Whether there is no limit on this side.
+    /// Returns `true` if there is no limit on this side.
     pub fn is_infinite(&self) -> bool {
         matches!(self, End::Infinite)
     }
@@ -33,9 +33,9 @@ impl End {
 /// All rationals between a lower and an upper end.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Interval {
-    /// Where the interval begins.
+    /// Lower end of the interval.
     pub lower: End,
-    /// Where the interval stops.
+    /// Upper end of the interval.
     pub upper: End,
 }
 
@@ -46,7 +46,7 @@ impl Interval {
         upper: End::Infinite,
     };
 
-    /// `[lower, upper]`.
+    /// Returns `[lower, upper]`.
     pub fn closed(lower: Rational, upper: Rational) -> Self {
         Self {
             lower: End::Closed(lower),
@@ -54,12 +54,12 @@ impl Interval {
         }
     }
 
-    /// `[value, value]`.
+    /// Returns `[value, value]`.
     pub fn point(value: Rational) -> Self {
         Self::closed(value.clone(), value)
     }
 
-    /// `[lower, inf)`.
+    /// Returns `[lower, inf)`.
     pub fn at_least(lower: Rational) -> Self {
         Self {
             lower: End::Closed(lower),
@@ -67,7 +67,7 @@ impl Interval {
         }
     }
 
-    /// `(-inf, upper]`.
+    /// Returns `(-inf, upper]`.
     pub fn at_most(upper: Rational) -> Self {
         Self {
             lower: End::Infinite,
@@ -75,7 +75,7 @@ impl Interval {
         }
     }
 
-    /// Whether `value` belongs to the interval.
+    /// Returns `true` if `value` belongs to the interval.
     pub fn contains(&self, value: &Rational) -> bool {
         let above = match &self.lower {
             End::Closed(lower) => value >= lower,
@@ -90,7 +90,7 @@ impl Interval {
         above && below
     }
 
-    /// Whether no rational belongs to the interval.
+    /// Returns `true` if no rational belongs to the interval.
     pub fn is_empty(&self) -> bool {
         match (&self.lower, &self.upper) {
             (End::Infinite, _) | (_, End::Infinite) => false,
@@ -101,12 +101,12 @@ impl Interval {
         }
     }
 
-    /// `upper - lower`, or `None` when an end is infinite.
+    /// Returns `upper - lower`, or `None` when an end is infinite.
     pub fn width(&self) -> Option<Rational> {
         Some(self.upper.value()? - self.lower.value()?)
     }
 
-    /// The intersection of both intervals.
+    /// Returns the intersection of both intervals.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
         Self {
@@ -116,7 +116,7 @@ impl Interval {
     }
 }
 
-/// The end that excludes more; `is_tighter(a, b)` compares two distinct finite ends.
+/// Returns the end that excludes more; `is_tighter(a, b)` compares two distinct finite ends.
 fn tighter(a: &End, b: &End, is_tighter: fn(&Rational, &Rational) -> bool) -> End {
     match (a.value(), b.value()) {
         (None, _) => b.clone(),
@@ -167,7 +167,7 @@ impl Side {
     /// Both, the lower first: the order of an array with one entry for each.
     pub const BOTH: [Self; 2] = [Self::Lower, Self::Upper];
 
-    /// The other one.
+    /// Returns the other end.
     #[must_use]
     pub fn opposite(self) -> Self {
         match self {
@@ -176,7 +176,7 @@ impl Side {
         }
     }
 
-    /// Its position in [`BOTH`](Self::BOTH).
+    /// Returns its position in [`BOTH`](Self::BOTH).
     pub fn index(self) -> usize {
         match self {
             Self::Lower => 0,
@@ -184,7 +184,7 @@ impl Side {
         }
     }
 
-    /// This end of an interval.
+    /// Returns this end of an interval.
     pub fn of(self, interval: &Interval) -> &End {
         match self {
             Self::Lower => &interval.lower,
@@ -192,8 +192,8 @@ impl Side {
         }
     }
 
-    /// How far out this end of an interval lies: the upper end itself, minus the lower end, `None`
-    /// if infinite. Widening the interval makes it greater.
+    /// Returns the reach of this end of an interval: the upper end itself, or the negated lower
+    /// end; `None` if infinite. Widening the interval makes it greater.
     pub fn reach(self, interval: &Interval) -> Option<Rational> {
         let value = self.of(interval).value()?;
         Some(match self {
@@ -202,7 +202,8 @@ impl Side {
         })
     }
 
-    /// The number at which this end of an interval lies when it reaches so far out.
+    /// Returns the number at which this end of an interval lies if its [`reach`](Self::reach) is
+    /// `reach`.
     pub fn at_reach(self, reach: &Rational) -> Rational {
         match self {
             Self::Lower => -reach,

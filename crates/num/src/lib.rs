@@ -1,21 +1,21 @@
 //! Exact numbers: rationals, bounds with infinities, intervals.
 //!
-//! Everything that decides whether a plan is sound is computed with [`Rational`], so that a
-//! guarantee never hangs on a rounding error. Small numbers (numerator and denominator in an
-//! `i64`) take a fast path without allocation; anything larger is kept exactly as well.
+//! Every decision about the soundness of a plan is computed with [`Rational`], so that no guarantee
+//! depends on a rounding error. Small numbers (numerator and denominator in an `i64`) take a fast
+//! path without allocation. Larger numbers are also exact.
 //!
 //! - [`Rational`]: an exact fraction.
 //! - [`Delta`]: a rational plus a multiple of an infinitesimal, to treat `<` like `<=`.
-//! - [`CommonDenominator`]: the unit in which given fractions are whole numbers.
+//! - [`CommonDenominator`]: the unit that makes given fractions whole numbers.
 //! - [`Total`]: a sum of many products.
 //! - [`Interval`]: a set of rationals between two ends, each closed, open or infinite.
 //! - [`enclosed`]: logarithms, powers of e and the normal distribution, between two fractions.
-//! - [`chance`]: how likely a random number lies in an interval, and linear bounds on the logarithm
-//!   of that.
+//! - [`chance`]: the probability that a random number lies in an interval, and linear bounds on its
+//!   logarithm.
 //! - [`simplex`]: systems of linear inequalities, decided and optimised exactly, with proofs.
-//! - [`work`]: how much work was done, counted in the same way on every machine.
+//! - [`work`]: deterministic count of the work done, the same on every machine.
 //!
-//! No planning word occurs in this crate.
+//! This crate contains no planning concepts.
 //!
 //! ```
 //! use elbowroom_num::Rational;

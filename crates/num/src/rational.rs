@@ -22,7 +22,7 @@ enum Repr {
     /// Numerator and denominator in lowest terms; the numerator is not `i64::MIN`, the denominator
     /// positive.
     Small(i64, i64),
-    /// Only what does not fit `Small`.
+    /// Used only for numbers that do not fit `Small`.
     Big(Box<RBig>),
 }
 
@@ -40,7 +40,7 @@ impl Rational {
         Self(Small(numerator, 1))
     }
 
-    /// The fraction `numerator / denominator`.
+    /// Creates the fraction `numerator / denominator`.
     ///
     /// # Panics
     /// If `denominator` is zero.
@@ -109,22 +109,22 @@ impl Rational {
         }
     }
 
-    /// Whether this is 0.
+    /// Returns `true` if this is 0.
     pub fn is_zero(&self) -> bool {
         matches!(self.0, Small(0, _))
     }
 
-    /// Whether this is below 0.
+    /// Returns `true` if this is below 0.
     pub fn is_negative(&self) -> bool {
         self.signum() < 0
     }
 
-    /// Whether this is above 0.
+    /// Returns `true` if this is above 0.
     pub fn is_positive(&self) -> bool {
         self.signum() > 0
     }
 
-    /// Whether this is a whole number.
+    /// Returns `true` if this is a whole number.
     pub fn is_integer(&self) -> bool {
         match &self.0 {
             Small(_, denominator) => *denominator == 1,
@@ -132,7 +132,7 @@ impl Rational {
         }
     }
 
-    /// -1, 0 or 1, as this is below, at or above 0.
+    /// Returns -1, 0 or 1, as this is below, at or above 0.
     pub fn signum(&self) -> i32 {
         match &self.0 {
             Small(numerator, _) => match numerator.cmp(&0) {
@@ -150,7 +150,7 @@ impl Rational {
         }
     }
 
-    /// The distance to 0.
+    /// Returns the absolute value.
     #[must_use]
     pub fn abs(&self) -> Self {
         if self.is_negative() {
@@ -160,12 +160,12 @@ impl Rational {
         }
     }
 
-    /// `1 / self`, or `None` for 0.
+    /// Returns `1 / self`, or `None` for 0.
     pub fn reciprocal(&self) -> Option<Self> {
         self.checked_div_into(&Self::ONE)
     }
 
-    /// `self / divisor`, or `None` when `divisor` is 0.
+    /// Returns `self / divisor`, or `None` when `divisor` is 0.
     pub fn checked_div(&self, divisor: &Self) -> Option<Self> {
         divisor.checked_div_into(self)
     }
@@ -178,7 +178,7 @@ impl Rational {
         }
     }
 
-    /// The largest whole number not above this.
+    /// Returns the largest whole number not above this.
     #[must_use]
     pub fn floor(&self) -> Self {
         match &self.0 {
@@ -187,13 +187,13 @@ impl Rational {
         }
     }
 
-    /// The smallest whole number not below this.
+    /// Returns the smallest whole number not below this.
     #[must_use]
     pub fn ceil(&self) -> Self {
         -((-self).floor())
     }
 
-    /// The nearest floating-point number; for display and heuristics only.
+    /// Returns the nearest floating-point number; for display and heuristics only.
     #[allow(
         clippy::cast_precision_loss,
         reason = "that is what this function is for"
@@ -205,19 +205,18 @@ impl Rational {
         }
     }
 
-    /// The greatest multiple of a power of two, `2^-bits`, that is not above this, as a count of
-    /// these.
+    /// Returns this number in units of `2^-bits`, rounded down.
     pub(crate) fn in_units(&self, bits: usize) -> IBig {
         let unit = RBig::from(IBig::ONE << bits);
         (self.to_big() * unit).floor()
     }
 
-    /// So many times a power of two, `2^-bits`.
+    /// Returns `units` times `2^-bits`.
     pub(crate) fn from_units(units: IBig, bits: usize) -> Self {
         Self::from_big(RBig::from_parts(units, UBig::ONE << bits))
     }
 
-    /// Numerator and denominator, when both fit an `i64`.
+    /// Returns numerator and denominator, when both fit an `i64`.
     pub fn as_small(&self) -> Option<(i64, i64)> {
         match self.0 {
             Small(numerator, denominator) => Some((numerator, denominator)),
@@ -225,7 +224,7 @@ impl Rational {
         }
     }
 
-    /// The denominator of the fraction in lowest terms, when it fits an `i64`.
+    /// Returns the denominator of the fraction in lowest terms, when it fits an `i64`.
     pub fn denominator(&self) -> Option<i64> {
         match &self.0 {
             Small(_, denominator) => Some(*denominator),
@@ -233,7 +232,7 @@ impl Rational {
         }
     }
 
-    /// The number in decimal notation with at most `digits` digits after the point, rounded
+    /// Formats the number in decimal notation with at most `digits` digits after the point, rounded
     /// half away from zero, without trailing zeros: `1/3` with 3 digits is `0.333`.
     pub fn to_decimal(&self, digits: u32) -> String {
         if let Small(whole, 1) = &self.0 {
@@ -260,7 +259,7 @@ impl Rational {
     }
 }
 
-/// The greatest common divisor; `gcd(0, b) = b`.
+/// Returns the greatest common divisor; `gcd(0, b) = b`.
 pub(crate) fn gcd(a: u128, b: u128) -> u128 {
     // Nearly all operands fit 64 bits, where a division is several times cheaper.
     if let (Ok(a), Ok(b)) = (u64::try_from(a), u64::try_from(b)) {
@@ -276,7 +275,8 @@ pub(crate) fn gcd(a: u128, b: u128) -> u128 {
     a
 }
 
-/// The binary algorithm: shifts and subtractions instead of divisions.
+/// Computes the greatest common divisor by the binary algorithm: shifts and subtractions instead of
+/// divisions.
 fn gcd_u64(mut a: u64, mut b: u64) -> u64 {
     if a == 0 || b == 0 {
         return a | b;

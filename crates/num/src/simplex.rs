@@ -1,10 +1,10 @@
 //! Exact linear programs, solved incrementally.
 //!
-//! The general simplex of Dutertre & de Moura ("A fast linear-arithmetic solver for DPLL(T)",
-//! CAV 2006): variables are free, some are defined as linear combinations of others, and every
-//! constraint is a bound on one variable. Bounds come and go; the tableau stays, so a system that
-//! differs little from the last one is decided in a few pivots. Bounds are [`Delta`]s, so they
-//! can be strict.
+//! The general simplex of Dutertre & de Moura ("A fast linear-arithmetic solver for DPLL(T)", CAV
+//! 2006): variables are free, some are defined as linear combinations of others, and every
+//! constraint is a bound on one variable. Bounds can be added and removed while the tableau stays,
+//! so a system that differs little from the last one is decided in a few pivots. Bounds are
+//! [`Delta`]s, so they can be strict.
 //!
 //! ```
 //! use elbowroom_num::simplex::{Optimum, Simplex};
@@ -46,7 +46,7 @@ use tableau::Tableau;
 pub struct VariableId(pub u32);
 
 impl VariableId {
-    /// The variable's place in a list of all variables.
+    /// Returns the variable's position in a list of all variables.
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -56,20 +56,20 @@ impl VariableId {
     }
 }
 
-/// Why no values satisfy all bounds: Farkas' lemma.
+/// Proof that no values satisfy all bounds, by Farkas' lemma.
 ///
-/// Written as `term <= 0`, the bounds with these tags, each times its multiplier, add up to
-/// `c <= 0` with a constant `c > 0`.
+/// With all bounds written as `term <= 0`, the bounds with these tags, each times its multiplier,
+/// add up to `c <= 0` with a constant `c > 0`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{} bounds contradict each other", .certificate.len())]
 pub struct Infeasible {
-    /// Tags in ascending order with their multipliers, which are positive. Leaving any one out
-    /// ends the contradiction.
+    /// Tags in ascending order with their multipliers, which are positive. Without any one of them,
+    /// there is no contradiction.
     pub certificate: Vec<(usize, Rational)>,
 }
 
 impl Infeasible {
-    /// The tags of the bounds that contradict each other.
+    /// Returns the tags of the bounds that contradict each other.
     pub fn tags(&self) -> impl Iterator<Item = usize> {
         self.certificate.iter().map(|(tag, _)| *tag)
     }
@@ -88,7 +88,7 @@ pub struct Simplex {
     variables: Vec<Variable>,
     /// The assertions replaced since the first [`Simplex::push`], oldest first.
     replaced: Vec<Replaced>,
-    /// How long `replaced` was at each push.
+    /// Length of `replaced` at each push.
     levels: Vec<usize>,
 }
 
@@ -119,12 +119,12 @@ struct Replaced {
 }
 
 impl Simplex {
-    /// No variable, no bound.
+    /// Creates a system without variables and bounds.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A new variable that may take any value.
+    /// Adds a variable that may take any value.
     pub fn add_variable(&mut self) -> VariableId {
         let variable = VariableId::from_index(self.variables.len());
         self.variables.push(Variable::default());
@@ -132,7 +132,7 @@ impl Simplex {
         variable
     }
 
-    /// A new variable that equals `Σ coefficient · variable`. Stays when levels are popped.
+    /// Adds a variable that equals `Σ coefficient · variable`. It stays when levels are popped.
     pub fn define(&mut self, row: &Combination) -> VariableId {
         let variable = self.add_variable();
         self.tableau.define(variable, row);
@@ -140,7 +140,7 @@ impl Simplex {
         variable
     }
 
-    /// The number of variables.
+    /// Returns the number of variables.
     pub fn variable_count(&self) -> usize {
         self.variables.len()
     }
@@ -177,13 +177,12 @@ impl Simplex {
         self.replace(variable, Side::Upper, Some(Bound { value: bound, tag }));
     }
 
-    /// Begins a level: what is asserted from now on can be taken back by [`Simplex::pop`].
+    /// Begins a level: [`Simplex::pop`] undoes all assertions made after this call.
     pub fn push(&mut self) {
         self.levels.push(self.replaced.len());
     }
 
-    /// Takes back all bounds asserted since the last push that was not popped yet; without one,
-    /// all bounds there are.
+    /// Undoes all bounds asserted since the last open push; without an open push, all bounds.
     ///
     /// The assignment stays: looser bounds do not break its invariant.
     pub fn pop(&mut self) {
@@ -211,7 +210,7 @@ impl Simplex {
         });
     }
 
-    /// Moves a variable that is not basic; the basic ones follow.
+    /// Moves a variable that is not basic, and updates the basic ones.
     fn set_value(&mut self, variable: VariableId, value: Delta) {
         let step = &value - &self.variables[variable.index()].value;
         for (basic, coefficient) in self.tableau.column(variable) {

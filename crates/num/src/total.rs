@@ -2,10 +2,10 @@
 
 use crate::Rational;
 
-/// A sum under way.
+/// Accumulator for a sum of fractions.
 ///
-/// Adding fractions one by one, each sum is brought to lowest terms; here that is done once, at
-/// the end, as long as the numbers are small.
+/// Repeated addition reduces each partial sum to lowest terms. This type reduces once, at the end,
+/// as long as the numbers are small.
 ///
 /// ```
 /// use elbowroom_num::{Rational, Total};
@@ -17,7 +17,7 @@ use crate::Rational;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Total {
-    /// What did not fit.
+    /// Sum of the terms that did not fit into `numerator / denominator`.
     large: Rational,
     numerator: i128,
     /// Positive.
@@ -47,7 +47,7 @@ impl Total {
         }
     }
 
-    /// Adds a product of small numbers; `None`, and nothing is added, if the sum is not small.
+    /// Adds a product of small numbers. Returns `None` and adds nothing if the sum is not small.
     fn try_add_product(&mut self, left: &Rational, right: &Rational) -> Option<()> {
         let ((a, b), (c, d)) = (left.as_small()?, right.as_small()?);
         let numerator = i128::from(a) * i128::from(c);
@@ -61,8 +61,8 @@ impl Total {
             self.numerator = self.numerator.checked_add(numerator.checked_mul(factor)?)?;
             return Some(());
         }
-        // The product of the denominators may be too large where a smaller one would do; then the
-        // term is added by itself.
+        // The product of the denominators may be too large although a smaller common denominator
+        // exists. The term is then added separately.
         let (own, other) = (i128::from(self.denominator), i128::from(denominator));
         let common = if denominator % self.denominator == 0 {
             denominator
@@ -76,7 +76,7 @@ impl Total {
         Some(())
     }
 
-    /// The sum.
+    /// Returns the sum.
     pub fn value(&self) -> Rational {
         &self.large + &Rational::reduced(self.numerator, i128::from(self.denominator))
     }
@@ -86,7 +86,7 @@ impl Total {
 mod tests {
     use super::{Rational, Total};
 
-    /// Numbers of all sizes, the same each time.
+    /// Returns numbers of all sizes, the same each time.
     fn numbers() -> impl Iterator<Item = Rational> {
         let mut state = 0x2545_f491_4f6c_dd1d_u64;
         std::iter::repeat_with(move || {

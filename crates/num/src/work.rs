@@ -1,7 +1,7 @@
 //! Counts the work of a thread, equally on every machine.
 //!
-//! If a computation has a budget, but its answer must not depend on the speed of the machine, it cannot read a
-//! clock. Slow operations count their work here, and computations with a budget read the sum:
+//! A computation with a budget cannot read a clock if its answer must not depend on the speed of
+//! the machine. Slow operations count their work here, and computations with a budget read the sum:
 //!
 //! ```
 //! use elbowroom_num::work;
@@ -15,8 +15,8 @@
 //!
 //! One unit is about a nanosecond of one core of a machine of 2024.
 //!
-//! Such computations can also be interrupted: they ask [`is_stopped`] now and then, and end early with what they have
-//! once the thread's [`Stop`] has been requested.
+//! Such computations can also be interrupted: they poll [`is_stopped`], and return their
+//! intermediate result once the thread's [`Stop`] has been requested.
 
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;
@@ -27,7 +27,7 @@ thread_local! {
     static STOP: RefCell<Option<Stop>> = const { RefCell::new(None) };
 }
 
-/// A request that computations end early. Clones are the same request.
+/// Request that computations end early. Clones are the same request.
 ///
 /// ```
 /// use elbowroom_num::work::{self, Stop};
@@ -42,7 +42,7 @@ thread_local! {
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Requests that computations of the threads that obey end early. Cannot be undone.
+    /// Requests that the computations of all threads that obey it end early. Cannot be undone.
     pub fn request(&self) {
         self.0.store(true, Ordering::SeqCst);
     }
@@ -52,21 +52,21 @@ impl Stop {
         self.0.load(Ordering::SeqCst)
     }
 
-    /// From now on, computations of this thread obey this request instead of any other.
+    /// Makes computations of this thread obey this request instead of any other.
     ///
     /// Threads that are started later do not inherit it: pass [`Stop::of_this_thread`] on to them.
     pub fn obey(&self) {
         STOP.set(Some(self.clone()));
     }
 
-    /// The request that computations of this thread obey.
+    /// Returns the request that computations of this thread obey.
     pub fn of_this_thread() -> Option<Self> {
         STOP.with_borrow(Clone::clone)
     }
 }
 
 impl PartialEq for Stop {
-    /// Equal if they are the same request.
+    /// Returns `true` if they are the same request.
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
@@ -84,12 +84,13 @@ pub fn spend(units: u64) {
     SPENT.set(SPENT.get().saturating_add(units));
 }
 
-/// The work of this thread so far, since some time in the past. Only differences mean something.
+/// Returns the work of this thread since an arbitrary time in the past. Only differences are
+/// meaningful.
 pub fn spent() -> u64 {
     SPENT.get()
 }
 
-/// A work limit of this thread, which counts from the creation of the budget.
+/// Work limit of this thread, which counts from the creation of the budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     begin: u64,
@@ -97,7 +98,7 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// A budget of this number of units; [`u64::MAX`] has no limit.
+    /// Creates a budget of this number of units; [`u64::MAX`] has no limit.
     pub fn new(units: u64) -> Self {
         Self {
             begin: spent(),
@@ -105,12 +106,12 @@ impl Budget {
         }
     }
 
-    /// The work since the budget was made.
+    /// Returns the work since the budget was created.
     pub fn used(&self) -> u64 {
         spent().saturating_sub(self.begin)
     }
 
-    /// The units that are left.
+    /// Returns the remaining units.
     pub fn left(&self) -> u64 {
         self.units.saturating_sub(self.used())
     }

@@ -1,4 +1,4 @@
-//! Probabilities of intervals, and linear bounds on their logarithms, against plain counting.
+//! Probabilities of intervals, and linear bounds on their logarithms, compared with counting.
 
 use proptest::prelude::*;
 
@@ -51,7 +51,7 @@ fn chances() -> impl Strategy<Value = Chance> {
     ]
 }
 
-/// A cell with a place in it.
+/// Generates a cell with a reach in it.
 fn cells() -> impl Strategy<Value = (Cell, Reach)> {
     let side = || {
         prop::collection::vec((0..7_i64).prop_map(|own| own * 10), 3).prop_map(|mut ends| {
@@ -82,7 +82,7 @@ proptest! {
         let touches = [Touch::At(at.clone()), Touch::Mass(number(3)), Touch::Nowhere];
         for touch in touches {
             let Some(height) = chance.height(&point, &cell, &touch, &slopes) else { continue };
-            // What a cell does not reach is not asked.
+            // Reaches outside the cell are not checked.
             let most = |side: usize, [near, far]: &[Rational; 2]| {
                 if cell.is_open[side] && near < far { 5_i64 } else { 6 }
             };
@@ -159,7 +159,7 @@ proptest! {
 
 #[test]
 fn masses_are_those_of_draws() {
-    // Some ten thousand evenly spread quantiles stand for draws.
+    // Some ten thousand evenly spread quantiles represent random draws.
     let quantile = |density: &Density, share: f64| -> f64 {
         let (mut low, mut high): (f64, f64) = (-100.0, 200.0);
         for _ in 0..60 {
@@ -225,7 +225,7 @@ fn steps_of_values_add_up_to_what_an_interval_has() {
 
 #[test]
 fn what_lies_in_a_short_interval_is_known_to_a_part_of_itself() {
-    // The density in the middle times the width, as the interval is next to nothing.
+    // The probability is the density in the middle times the width, as the interval is very short.
     let bells = [
         Density::Normal {
             mean: Rational::from(10),

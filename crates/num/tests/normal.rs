@@ -1,9 +1,9 @@
-//! The normal distribution and powers of e against their integrals and laws.
+//! The normal distribution and powers of e, compared with their integrals and identities.
 
 use elbowroom_num::Rational;
 use elbowroom_num::enclosed::{exp_of_minus, normal, normal_density};
 
-/// Simpson's rule for the integral of a function.
+/// Integrates a function by Simpson's rule.
 fn integral(from: f64, to: f64, function: &dyn Fn(f64) -> f64) -> f64 {
     let steps = 4000;
     let width = (to - from) / f64::from(steps);
@@ -41,12 +41,12 @@ fn the_normal_distribution_is_enclosed_as_the_integral_of_its_density() {
 
 #[test]
 fn nothing_is_told_more_closely_than_it_is_known() {
-    // The constant has enough digits: all there is adds up to 1, and nearly all is within 9.
+    // The constant has enough digits: the total probability is 1, and nearly all of it is within 9.
     let [below, _] = normal(&Rational::from(9));
     let [_, above] = normal(&Rational::from(9));
     let tiny = Rational::new(1, 1_000_000_000_000_000_000);
     assert!(Rational::ONE - &below < tiny && Rational::ONE - &above < tiny);
-    // Symmetric: what is below -z is what is above z.
+    // Symmetry: the probability below -z equals the probability above z.
     for tenths in 0..90_i64 {
         let at = Rational::new(tenths, 10) + Rational::new(1, 3_000_017);
         let ([a, b], [c, d]) = (normal(&at), normal(&-&at));

@@ -1,5 +1,5 @@
-//! 10,000 nodes and 30,000 constraints, as deordered plans have them: durations, precedences that
-//! lead a little way back, and some deadlines.
+//! Networks of 10,000 nodes and 30,000 constraints, like those of deordered plans: durations,
+//! precedences to nearby nodes, and some deadlines.
 
 use divan::Bencher;
 use elbowroom_num::{Delta, Rational};
@@ -11,7 +11,7 @@ fn main() {
 
 const NODES: u32 = 10_000;
 
-/// A small linear congruential generator: the same networks on each run.
+/// Small linear congruential generator, for the same networks on each run.
 struct Dice(u64);
 
 impl Dice {
@@ -24,7 +24,7 @@ impl Dice {
     }
 }
 
-/// `node` happens at about `node` seconds; times are in thousandths.
+/// Returns a network with `node` at about `node` seconds; times are in thousandths.
 fn network<W: Weight>(node_count: u32, thousandths: impl Fn(i64) -> W) -> Network<W> {
     let mut dice = Dice(7);
     let mut network = Network::with_nodes(node_count as usize);
@@ -49,7 +49,7 @@ fn network<W: Weight>(node_count: u32, thousandths: impl Fn(i64) -> W) -> Networ
             NodeId(later),
             thousandths(length + i64::from(dice.below(2000))),
         ));
-        // Anything else, mostly loose.
+        // Any other constraint, mostly loose.
         let other = dice.below(node_count);
         let difference = times[later as usize] - times[other as usize];
         network.add(Constraint::at_most(
@@ -124,7 +124,7 @@ fn build_one_by_one(bencher: Bencher) {
     });
 }
 
-/// A tightening somewhere in the network, accepted or refused, then undone.
+/// Benchmarks a tightening somewhere in the network, accepted or refused, and its undoing.
 #[divan::bench]
 fn add_and_undo(bencher: Bencher) {
     let mut network = consistent(NODES);
@@ -152,7 +152,7 @@ fn implied(bencher: Bencher, node_count: u32) {
     bencher.bench(|| network.implied(|_| false));
 }
 
-/// A total order given by all its pairs.
+/// Benchmarks a total order given by all its pairs.
 #[divan::bench(args = [100, 500])]
 fn implied_of_all_pairs(bencher: Bencher, node_count: u32) {
     let mut network = Network::with_nodes(node_count as usize);

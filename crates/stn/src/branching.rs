@@ -1,13 +1,14 @@
-//! Values in a box for which a network has no schedule, found without looking at all corners.
+//! Values in a box without a schedule, found without enumerating all corners.
 //!
-//! Bounds of the network depend on quantities, each somewhere in an interval: the durations of
-//! contingent links, or the parameters of a plan. Whether there is a schedule for all their values
-//! is co-NP-complete in general (weak controllability; Vidal & Fargier 1999, Morris & Muscettola
-//! 1999), so nothing avoids branching altogether. But few quantities need it. Each bound is first
-//! taken at its worst, whatever the other bound of its quantity says. If no cycle is negative even
-//! so, all values have a schedule. If one is that takes no quantity at two different values, some
-//! values have none. Only where a negative cycle takes a quantity at both of its ends, that
-//! quantity is set to the one, and then to the other: the values with a schedule form a convex set.
+//! Bounds of the network depend on quantities, each in an interval: the durations of contingent
+//! links, or the parameters of a plan. Whether there is a schedule for all their values is
+//! co-NP-complete in general (weak controllability; Vidal & Fargier 1999, Morris & Muscettola
+//! 1999), so branching cannot be avoided altogether. But few quantities need it. Each bound is
+//! first taken at its worst, independently of the other bound of its quantity. If there is no
+//! negative cycle, all values have a schedule. If a negative cycle uses no quantity at two
+//! different values, some values have none. Only if a negative cycle uses a quantity at both of its
+//! ends, the quantity is set to one end, and then to the other: that is enough because the values
+//! with a schedule form a convex set.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -15,32 +16,33 @@ use elbowroom_num::{Rational, Side};
 
 use crate::NodeId;
 
-/// More branches would be needed than allowed.
+/// The limit on branches was exceeded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooManyBranches;
 
-/// `to - from <= constant + q` for the quantity `q` of the [`Side::Upper`], `constant - q` for that
-/// of the [`Side::Lower`]: it bounds from above, or from below.
+/// `to - from <= constant + q` for the upper end of a quantity `q` ([`Side::Upper`]), `constant -
+/// q` for the lower end ([`Side::Lower`]): the quantity bounds the difference from above, or from
+/// below.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OpenBound<Q> {
     /// The time point that is subtracted.
     pub from: NodeId,
     /// The time point it is subtracted from.
     pub to: NodeId,
-    /// The part of the bound that depends on nothing.
+    /// The part of the bound that does not depend on the quantity.
     pub constant: Rational,
-    /// The quantity, and on which side it stands.
+    /// The quantity, and the side on which it bounds.
     pub quantity: Option<(Q, Side)>,
 }
 
-/// A network whose bounds depend on quantities.
+/// Network whose bounds depend on quantities.
 pub struct Branching<'a, Q> {
-    /// The bounds that lie on cycles; others do no harm, and take time.
+    /// The bounds that lie on cycles; others are allowed, but take time.
     pub bounds: Vec<OpenBound<Q>>,
     /// The number of time points.
     pub node_count: usize,
-    /// Whether a quantity bounds one difference only, from above and from below: no simple cycle
-    /// takes both bounds.
+    /// Returns `true` if a quantity bounds only one difference, from above and from below. No
+    /// simple cycle contains both bounds.
     pub is_pair: &'a dyn Fn(Q) -> bool,
     /// The least and the greatest value of a quantity.
     pub value: &'a dyn Fn(Q, Side) -> Rational,
@@ -52,11 +54,11 @@ pub struct Branching<'a, Q> {
 pub type Corner<Q> = BTreeMap<Q, Side>;
 
 impl<Q: Copy + Ord> Branching<'_, Q> {
-    /// A corner of the box without a schedule: the quantities that matter, and at which end each
-    /// is. `None` if all values have a schedule.
+    /// Returns a corner of the box without a schedule: the relevant quantities, with the end of
+    /// each. `None` if all values have a schedule.
     ///
     /// # Errors
-    /// When that takes too many branches to find out.
+    /// If the limit on branches is exceeded.
     pub fn corner_without_schedule(&self) -> Result<Option<Corner<Q>>, TooManyBranches> {
         let mut branches: Vec<Corner<Q>> = vec![self.points()];
         let mut looked_at = 0;
@@ -94,7 +96,7 @@ impl<Q: Copy + Ord> Branching<'_, Q> {
         Ok(None)
     }
 
-    /// Quantities of which there is one value only.
+    /// Returns the quantities with only one value.
     fn points(&self) -> Corner<Q> {
         let quantities = self.bounds.iter().filter_map(|bound| bound.quantity);
         quantities
@@ -103,7 +105,7 @@ impl<Q: Copy + Ord> Branching<'_, Q> {
             .collect()
     }
 
-    /// A bound at its worst where nothing is chosen.
+    /// Returns the weight of a bound, at its worst unless its quantity is chosen.
     fn weight(&self, bound: &OpenBound<Q>, chosen: &Corner<Q>) -> Rational {
         let Some((quantity, own)) = bound.quantity else {
             return bound.constant.clone();
@@ -116,10 +118,10 @@ impl<Q: Copy + Ord> Branching<'_, Q> {
         }
     }
 
-    /// The ends at which a cycle takes its quantities, beside those chosen before.
+    /// Returns the ends that a cycle uses of its quantities, in addition to those chosen before.
     ///
     /// # Errors
-    /// A quantity that it takes at both.
+    /// A quantity that the cycle uses at both ends.
     fn sides(&self, cycle: &[usize], chosen: &Corner<Q>) -> Result<Corner<Q>, Q> {
         let mut sides = chosen.clone();
         for &edge in cycle {
@@ -138,10 +140,10 @@ impl<Q: Copy + Ord> Branching<'_, Q> {
     }
 }
 
-/// Takes a closed walk apart.
+/// Splits a closed walk into simple cycles.
 fn simple_cycles<Q>(edges: &[OpenBound<Q>], walk: &[usize]) -> Vec<Vec<usize>> {
     let mut cycles = Vec::new();
-    // Where on the path each time point has been left.
+    // Position on the path at which each time point was left.
     let mut path: Vec<usize> = Vec::new();
     let mut at: BTreeMap<usize, usize> = BTreeMap::new();
     for &edge in walk {
@@ -158,24 +160,23 @@ fn simple_cycles<Q>(edges: &[OpenBound<Q>], walk: &[usize]) -> Vec<Vec<usize>> {
     cycles
 }
 
-/// A way to a node.
+/// Walk to a node.
 struct Label {
     node: usize,
     length: Rational,
-    /// The last edge, and the way before it; `None` at the beginning.
+    /// The last edge, and the label before it; `None` at the beginning.
     last: Option<(usize, usize)>,
     depth: usize,
 }
 
-/// Shortest walks from anywhere that never go over both bounds of a quantity straight after each
-/// other.
+/// Shortest walks from any node that never use both bounds of a quantity directly after each other.
 struct Walks<'a, Q> {
     network: &'a Branching<'a, Q>,
     weights: &'a [Rational],
     leaving: Vec<Vec<usize>>,
     labels: Vec<Label>,
-    /// For each node, the shortest way to it, and, if that one may not go on everywhere, the
-    /// shortest with another last quantity.
+    /// For each node, the shortest walk to it. If that walk excludes some continuation, also the
+    /// shortest walk with another last quantity.
     best: Vec<[Option<usize>; 2]>,
 }
 
@@ -202,10 +203,10 @@ impl<'a, Q: Copy + Ord> Walks<'a, Q> {
         }
     }
 
-    /// A closed walk of negative length, as edges.
+    /// Returns a closed walk of negative length, as edges.
     fn negative(mut self) -> Option<Vec<usize>> {
-        // A way over so many edges is at some node three times. Two labels are kept for a node,
-        // so it was shorter the third time than one time before.
+        // A walk with `enough` edges visits some node three times. At most two labels are kept for
+        // a node, so the walk was shorter at the third visit than at an earlier one.
         let enough = 2 * self.network.node_count + 2;
         let mut look_at = 8.min(enough);
         let mut waiting: VecDeque<usize> = (0..self.network.node_count).collect();
@@ -234,14 +235,15 @@ impl<'a, Q: Copy + Ord> Walks<'a, Q> {
         None
     }
 
-    /// The quantity whose other bound may not come next.
+    /// Returns the quantity whose other bound must not come next.
     fn pair(&self, edge: usize) -> Option<Q> {
         let edge = &self.network.bounds[edge];
         let (quantity, _) = edge.quantity.filter(|_| edge.from != edge.to)?;
         (self.network.is_pair)(quantity).then_some(quantity)
     }
 
-    /// Whether the edge may follow, and no better label goes over it.
+    /// Returns `true` if the edge may follow this label, and no better label extends along the
+    /// edge.
     fn may_take(&self, label: usize, edge: usize) -> bool {
         let Label { node, last, .. } = self.labels[label];
         let own = self.pair(edge);
@@ -255,7 +257,7 @@ impl<'a, Q: Copy + Ord> Walks<'a, Q> {
         first == Some(label) || first.is_some_and(|first| is_blocked(self.labels[first].last))
     }
 
-    /// Goes over an edge; the new label, if it is worth keeping.
+    /// Extends a walk by an edge. Returns the new label, if it is worth keeping.
     fn extend(&mut self, label: usize, edge: usize) -> Option<usize> {
         let node = self.network.bounds[edge].to.index();
         let length = &self.labels[label].length + &self.weights[edge];
@@ -294,9 +296,10 @@ impl<'a, Q: Copy + Ord> Walks<'a, Q> {
         Some(new)
     }
 
-    /// The part of a way between two times at the same node, if it is shorter at the second.
+    /// Returns the part of a walk between two visits of the same node, if the walk is shorter at
+    /// the second.
     fn closed_walk(&self, end: usize) -> Option<Vec<usize>> {
-        // From the end backwards: for each node, the shortest label after this point.
+        // Walks backwards from the end: for each node, the shortest label after this point.
         let mut later: BTreeMap<usize, usize> = BTreeMap::new();
         let mut label = end;
         loop {

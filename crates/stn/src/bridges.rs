@@ -1,16 +1,17 @@
-//! Constraints on which it hangs that one node is reached from another.
+//! Strong bridges: constraints without which one node is no longer reachable from another.
 
 use crate::{Network, NodeId, Weight};
 
 impl<W: Weight> Network<W> {
-    /// For each constraint, whether every way along the others, whatever their bounds, from its `from` to its
-    /// `to` is missing while there is one back: without it, the nodes that reach each other fall apart.
+    /// Returns, for each constraint, `true` if it is a strong bridge: there is a path from its `to`
+    /// to its `from`, whatever the bounds, but no path from `from` to `to` without the constraint.
+    /// Removing it splits a strongly connected component.
     ///
-    /// These are the strong bridges of the graph (Italiano, Laura & Santaroni, *Finding strong bridges and
-    /// strong articulation points in linear time*, TCS 2012): an edge is one if all ways from some node of
-    /// its component, or all ways to it, lead through the edge. Such edges dominate what they lead to; the
-    /// dominators are found by Semi-NCA (Georgiadis, Tarjan & Werneck, *Finding dominators in practice*,
-    /// JGAA 2006), in time that hardly grows faster than the network.
+    /// These are the strong bridges of the graph (Italiano, Laura & Santaroni, *Finding strong
+    /// bridges and strong articulation points in linear time*, TCS 2012): an edge is one if all
+    /// paths from some node of its component, or all paths to it, contain the edge. Such an edge
+    /// dominates its target. Dominators are computed with Semi-NCA (Georgiadis, Tarjan & Werneck,
+    /// *Finding dominators in practice*, JGAA 2006), in nearly linear time.
     pub fn strong_bridges(&self) -> Vec<bool> {
         let component = self.components();
         let inner: Vec<bool> = self
@@ -34,16 +35,16 @@ impl<W: Weight> Network<W> {
     }
 }
 
-/// A network with a node in the middle of each constraint that stays inside its component.
+/// Network with an additional node in the middle of each constraint inside a component.
 struct Split {
-    /// How many of the nodes are those of the network; the others are constraints.
+    /// Number of nodes of the network. Higher numbers are constraints.
     node_count: usize,
-    /// Where the nodes begin whose edges lead on from a node: positions in `next`.
+    /// For each node, the position in `next` of its first successor.
     first: Vec<usize>,
     next: Vec<usize>,
-    /// For each constraint, where it comes from.
+    /// Source node of each constraint.
     sources: Vec<usize>,
-    /// For each constraint, where it leads to.
+    /// Target node of each constraint.
     targets: Vec<usize>,
 }
 
@@ -79,7 +80,7 @@ impl Split {
         }
     }
 
-    /// What a node leads on to.
+    /// Returns the successors of a node.
     fn leads_to(&self, node: usize) -> &[usize] {
         match node.checked_sub(self.node_count) {
             None => &self.next[self.first[node]..self.first[node + 1]],
@@ -87,13 +88,14 @@ impl Split {
         }
     }
 
-    /// Marks the constraints that all ways from the root of their component to where they lead to go through.
+    /// Marks the constraints that are on all paths from the root of their component to their
+    /// target.
     fn mark_dominating(&self, roots: &[NodeId], marked: &mut [bool]) {
         let mut tree = Tree::new(self.node_count + self.targets.len());
         for root in roots {
             tree.grow(self, root.index());
         }
-        // Who leads to a node, as numbers of the tree.
+        // Predecessors of each node, as numbers of the tree.
         let mut entering: Vec<Vec<usize>> = vec![Vec::new(); tree.nodes.len()];
         for (constraint, target) in self.targets.iter().enumerate() {
             let own = tree.numbers[self.node_count + constraint];
@@ -114,13 +116,13 @@ impl Split {
     }
 }
 
-/// Nodes in the order in which a depth-first search comes upon them, which numbers them from 1 on.
+/// Depth-first search tree. Nodes are numbered from 1 in order of discovery.
 struct Tree {
-    /// For each node its number; 0 while it is not seen.
+    /// Number of each node; 0 until it is discovered.
     numbers: Vec<usize>,
-    /// For each number its node; the first is nobody's.
+    /// Node of each number; entry 0 is unused.
     nodes: Vec<usize>,
-    /// For each number that of the node from which it was seen; 0 of roots.
+    /// For each number, the number of the node that discovered it; 0 for roots.
     parents: Vec<usize>,
 }
 
@@ -133,9 +135,9 @@ impl Tree {
         }
     }
 
-    /// Sees everything that a root leads to.
+    /// Discovers everything that is reachable from a root.
     fn grow(&mut self, graph: &Split, root: usize) {
-        // Nodes, each with how much of what it leads to has been looked at.
+        // Nodes, each with the number of its successors that have been visited.
         let mut path = vec![(root, 0)];
         self.see(root, 0);
         while let Some((node, looked_at)) = path.last_mut() {
@@ -157,7 +159,7 @@ impl Tree {
         self.parents.push(parent);
     }
 
-    /// For each number that of its immediate dominator; 0 of roots.
+    /// Returns, for each number, the number of its immediate dominator; 0 for roots.
     fn dominators(&self, entering: &[Vec<usize>]) -> Vec<usize> {
         let count = self.nodes.len();
         let mut semi: Vec<usize> = (0..count).collect();
@@ -181,8 +183,8 @@ impl Tree {
     }
 }
 
-/// Among a node and those above it that have been looked at, which are numbered from `looked_at` on, the
-/// one whose semidominator is least; the way up is made shorter.
+/// Returns the node with the least semidominator among `node` and its processed ancestors (those
+/// numbered from `looked_at` on). Compresses the path to them.
 fn lowest(
     node: usize,
     looked_at: usize,
@@ -227,7 +229,7 @@ mod tests {
         network
     }
 
-    /// Whether edges lead from one node to another, without one of them.
+    /// Returns `true` if there is a path from one node to the other without one of the edges.
     fn leads(
         network: &Network<i128>,
         (from, to): (NodeId, NodeId),

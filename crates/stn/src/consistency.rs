@@ -1,4 +1,4 @@
-//! Is there a schedule at all? Bellman, Ford and Moore's algorithm with Tarjan's trick.
+//! Consistency check: the algorithm of Bellman, Ford and Moore with Tarjan's subtree disassembly.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -7,18 +7,18 @@ use elbowroom_num::Rational;
 
 use crate::{ConstraintId, Network, NodeId, Schedule, Weight, spend_step};
 
-/// Why a network is inconsistent: constraints that follow each other in a circle and sum up to
-/// `0 <= total < 0`.
+/// Proof that a network is inconsistent: a cycle of constraints that sum up to `0 <= total < 0`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NegativeCycle<W = Rational> {
-    /// The cycle's edges in the order in which one walks along them.
+    /// Edges of the cycle, in order.
     pub constraints: Vec<ConstraintId>,
     /// The sum of their bounds. At least one of them must be relaxed, by `-total` in all.
     pub total: W,
 }
 
 impl<W: Weight> NegativeCycle<W> {
-    /// Whether these constraints of `network` form a cycle whose bounds sum up to `total < 0`.
+    /// Returns `true` if these constraints of `network` form a cycle whose bounds sum up to `total
+    /// < 0`.
     pub fn holds_in(&self, network: &Network<W>) -> bool {
         let edges = || self.constraints.iter().map(|&id| network.constraint(id));
         let nexts = edges().skip(1).chain(edges().take(1));
@@ -42,10 +42,10 @@ impl<W: fmt::Debug> fmt::Display for NegativeCycle<W> {
 impl<W: fmt::Debug> std::error::Error for NegativeCycle<W> {}
 
 impl<W: Weight> Network<W> {
-    /// A schedule, or a proof that there is none. Worst case nodes · constraints; near linear on
-    /// networks as plans have them.
+    /// Returns a schedule, or a proof that there is none. Worst case nodes · constraints; near
+    /// linear on networks of plans.
     ///
-    /// The schedule is the latest one in which no node comes after time zero.
+    /// The schedule is the latest one with no node after time zero.
     ///
     /// # Errors
     /// A cycle of negative length.
@@ -79,10 +79,11 @@ impl<W: Weight> Network<W> {
         Ok(schedule)
     }
 
-    /// All nodes, so that `from` stands before `to` for as many negative bounds as possible.
+    /// Returns all nodes, ordered so that `from` comes before `to` for as many negative bounds as
+    /// possible.
     ///
-    /// Negative bounds say what precedes what and rarely form cycles; in this order one sweep
-    /// over the nodes settles nearly everything.
+    /// Negative bounds are precedences and rarely form cycles. In this order one sweep over the
+    /// nodes processes nearly everything.
     fn late_nodes_first(&self) -> Vec<NodeId> {
         let is_negative = |id: ConstraintId| self.constraint(id).bound < W::zero();
         let mut finished = self.depth_first_postorder(is_negative);
@@ -91,25 +92,25 @@ impl<W: Weight> Network<W> {
     }
 }
 
-/// The tree of shortest paths so far, under an artificial root that precedes every node.
+/// Tree of shortest paths so far, under an artificial root that precedes every node.
 ///
-/// Invariant: along every edge of the tree, `schedule[to] = schedule[from] + bound`. To keep it,
-/// a node whose time falls loses its subtree (Tarjan 1981): the nodes in it are about to be
-/// improved anyway, and if the cause of the fall is among them, there is a negative cycle.
+/// Invariant: along every edge of the tree, `schedule[to] = schedule[from] + bound`. To keep it, a
+/// node whose time decreases loses its subtree (Tarjan 1981): the nodes in it will be improved
+/// anyway, and if the node that caused the decrease is among them, there is a negative cycle.
 struct Tree {
-    /// The edge by which a node hangs on its parent; `None` below the root.
+    /// Edge from the parent of a node; `None` for children of the root.
     via: Vec<Option<ConstraintId>>,
-    /// The distance from the root; `None` for nodes that are cut off.
+    /// The distance from the root; `None` for detached nodes.
     depth: Vec<Option<u32>>,
     /// The nodes of the tree in depth-first order, as a ring through the root.
     next: Vec<usize>,
     previous: Vec<usize>,
-    /// Whether a node waits to be looked at; those that are cut off need not be.
+    /// `true` if a node is waiting to be processed; detached nodes need not be processed.
     is_queued: Vec<bool>,
 }
 
 impl Tree {
-    /// All nodes hang on the root, and all are queued.
+    /// Creates a tree with all nodes as children of the root, and all of them queued.
     fn star(node_count: usize) -> Self {
         let root = node_count;
         let ring = node_count + 1;
@@ -124,7 +125,7 @@ impl Tree {
         }
     }
 
-    /// Cuts `node` and its subtree off; whether `cause` is in there.
+    /// Detaches `node` and its subtree. Returns `true` if `cause` is in it.
     fn is_cut_off_with(&mut self, node: NodeId, cause: NodeId) -> bool {
         if node == cause {
             return true;
@@ -147,7 +148,7 @@ impl Tree {
         false
     }
 
-    /// Hangs `node`, which is cut off, on `parent`.
+    /// Attaches the detached node `node` to `parent`.
     fn attach(&mut self, node: NodeId, parent: NodeId, via: ConstraintId) {
         let (node, parent) = (node.index(), parent.index());
         let after = std::mem::replace(&mut self.next[parent], node);
@@ -158,7 +159,7 @@ impl Tree {
         self.via[node] = Some(via);
     }
 
-    /// The tree's path from `top` down to `bottom`, then the edge `last`.
+    /// Returns the tree's path from `top` down to `bottom`, then the edge `last`.
     fn path<W: Weight>(
         &self,
         network: &Network<W>,

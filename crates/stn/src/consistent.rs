@@ -7,13 +7,13 @@ use elbowroom_num::Rational;
 
 use crate::{Constraint, ConstraintId, NegativeCycle, Network, NodeId, Schedule, Weight};
 
-/// A network and a schedule in which all its constraints hold.
+/// Network with a schedule that satisfies all its constraints.
 #[derive(Clone, Debug)]
 pub struct ConsistentNetwork<W = Rational> {
     network: Network<W>,
     schedule: Schedule<W>,
     repair: Repair<W>,
-    /// The times that nodes had before they were moved, in order, if these are remembered.
+    /// The previous times of moved nodes, in order, if they are recorded.
     former: Option<Vec<(NodeId, W)>>,
 }
 
@@ -24,7 +24,7 @@ pub struct ConsistentNetwork<W = Rational> {
 pub struct Checkpoint {
     node_count: usize,
     constraint_count: usize,
-    /// How many moves are remembered.
+    /// Number of recorded moves.
     moves: usize,
 }
 
@@ -51,7 +51,7 @@ impl<W: Weight> TryFrom<Network<W>> for ConsistentNetwork<W> {
 }
 
 impl<W: Weight> ConsistentNetwork<W> {
-    /// The network without nodes.
+    /// Creates a network without nodes.
     pub fn new() -> Self {
         Self {
             network: Network::new(),
@@ -61,7 +61,7 @@ impl<W: Weight> ConsistentNetwork<W> {
         }
     }
 
-    /// The network, if this is a schedule of it.
+    /// Creates the network with this schedule; `None` if the schedule violates a constraint.
     pub fn by(network: Network<W>, schedule: Schedule<W>) -> Option<Self> {
         if !schedule.holds_in(&network) {
             return None;
@@ -76,43 +76,44 @@ impl<W: Weight> ConsistentNetwork<W> {
         })
     }
 
-    /// The nodes and constraints.
+    /// Returns the nodes and constraints.
     pub fn network(&self) -> &Network<W> {
         &self.network
     }
 
-    /// Gives up the proof.
+    /// Returns the network without the schedule.
     pub fn into_network(self) -> Network<W> {
         self.network
     }
 
-    /// Some schedule in which every constraint holds. It depends on the order of additions.
+    /// Returns a schedule that satisfies every constraint. It depends on the order of additions.
     pub fn schedule(&self) -> &Schedule<W> {
         &self.schedule
     }
 
-    /// A new time point, free of constraints.
+    /// Adds a time point without constraints.
     pub fn add_node(&mut self) -> NodeId {
         let node = self.network.add_node();
         self.resize();
         node
     }
 
-    /// A new time point, free of constraints, that happens at `time` in the present schedule: where
-    /// constraints that follow leave it, nothing has to move.
+    /// Adds a time point without constraints that happens at `time` in the present schedule. It
+    /// only moves when later constraints require it.
     pub fn add_node_at(&mut self, time: W) -> NodeId {
         let node = self.add_node();
         self.schedule.set(node, time);
         node
     }
 
-    /// Adds a constraint, unless it contradicts the others; then the network stays as it was.
+    /// Adds a constraint, unless it contradicts the others. In that case the network stays as it
+    /// was.
     ///
-    /// Takes time in proportion to what the constraint moves (Cotton & Maler, SAT 2006).
+    /// Takes time in proportion to the nodes that the constraint moves (Cotton & Maler, SAT 2006).
     ///
     /// # Errors
-    /// A cycle of negative length. Its first constraint is the refused one, by the number it
-    /// would have got.
+    /// A cycle of negative length. Its first constraint is the refused one, with the identifier
+    /// that it would have received.
     pub fn add(&mut self, constraint: Constraint<W>) -> Result<ConstraintId, NegativeCycle<W>> {
         let before = self.checkpoint();
         let id = self.network.add(constraint);
@@ -126,7 +127,7 @@ impl<W: Weight> ConsistentNetwork<W> {
         Ok(id)
     }
 
-    /// The present moment, to come back to.
+    /// Returns the current state, for [`undo_to`](Self::undo_to).
     pub fn checkpoint(&self) -> Checkpoint {
         Checkpoint {
             node_count: self.network.node_count(),
@@ -135,32 +136,33 @@ impl<W: Weight> ConsistentNetwork<W> {
         }
     }
 
-    /// Takes back all nodes and constraints added since `checkpoint`.
+    /// Removes all nodes and constraints added since `checkpoint`.
     ///
-    /// The schedule stays as it is: with fewer constraints it is as good as before.
+    /// The schedule does not change: it also satisfies the remaining constraints.
     pub fn undo_to(&mut self, checkpoint: Checkpoint) {
         self.network
             .truncate(checkpoint.node_count, checkpoint.constraint_count);
         self.resize();
     }
 
-    /// Remembers the times that nodes have, from now on, so that it is possible to go [back](Self::go_back_to) to
-    /// them. All earlier checkpoints are void.
+    /// Records the times of nodes from now on, so that [`go_back_to`](Self::go_back_to) can restore
+    /// them. All earlier checkpoints become invalid.
     pub fn remember_times(&mut self) {
         self.former = Some(Vec::new());
     }
 
-    /// The nodes that have moved since times are remembered.
+    /// Returns the nodes that have moved since the recording of times began.
     pub fn moved(&self) -> impl Iterator<Item = NodeId> + '_ {
         self.former.iter().flatten().map(|(node, _)| *node)
     }
 
-    /// Like [`undo_to`](Self::undo_to), and goes back to the times that nodes had at `checkpoint` as well, if they
-    /// were [remembered](Self::remember_times). Takes time in proportion to what has moved since.
+    /// Like [`undo_to`](Self::undo_to), but also restores the times that nodes had at `checkpoint`,
+    /// if they were [remembered](Self::remember_times). Takes time in proportion to the moves since
+    /// then.
     ///
-    /// Without that, times only ever move back, a little with each constraint that is tried; with
-    /// it they stay within what the constraints that are left and those tried since can add up to,
-    /// so that machine integers as weights can be chosen not to overflow.
+    /// Without this call, times only ever decrease, a little with each constraint that is tried.
+    /// With this call, their range is limited by the remaining constraints and those tried since.
+    /// Machine integers can then be used as weights without overflow.
     pub fn go_back_to(&mut self, checkpoint: Checkpoint) {
         for (node, time) in self
             .former
@@ -175,7 +177,7 @@ impl<W: Weight> ConsistentNetwork<W> {
         debug_assert!(self.schedule.holds_in(&self.network));
     }
 
-    /// Moves nodes to other times, at which all constraints have to hold.
+    /// Moves nodes to other times. All constraints have to hold at these times.
     pub fn reschedule(&mut self, times: impl IntoIterator<Item = (NodeId, W)>) {
         for (node, time) in times {
             if let Some(former) = &mut self.former {
@@ -192,18 +194,18 @@ impl<W: Weight> ConsistentNetwork<W> {
     }
 }
 
-/// The workspace of [`ConsistentNetwork::add`], kept to spare allocations.
+/// Workspace of [`ConsistentNetwork::add`], reused to save allocations.
 ///
 /// Invariant: between additions, nothing is proposed and the queue is empty.
 #[derive(Clone, Debug)]
 struct Repair<W> {
-    /// An earlier time for a node, and the constraint that demands it.
+    /// An earlier time for a node, and the constraint that requires it.
     proposed: Vec<Option<(W, ConstraintId)>>,
-    /// Whether the proposed time is final.
+    /// `true` if the proposed time is final.
     is_final: Vec<bool>,
     /// The nodes with a proposal.
     moved: Vec<NodeId>,
-    /// Nodes to look at, by how much they move: the largest step back first.
+    /// Nodes to process, ordered by how much they move: the largest step back first.
     queue: BinaryHeap<Reverse<(W, NodeId)>>,
 }
 
@@ -224,7 +226,7 @@ impl<W: Weight> Repair<W> {
         self.is_final.resize(node_count, false);
     }
 
-    /// Moves nodes back in time until the constraint `added` holds as well, if that can be.
+    /// Moves nodes back in time until the constraint `added` also holds, if that is possible.
     fn after_adding(
         &mut self,
         added: ConstraintId,
@@ -247,9 +249,9 @@ impl<W: Weight> Repair<W> {
         outcome
     }
 
-    /// Dijkstra's algorithm over the slack of the constraints, from the new constraint's `to`.
+    /// Runs Dijkstra's algorithm over the slack of the constraints, from the new constraint's `to`.
     ///
-    /// When it comes to move the new constraint's `from`, the two ends chase each other.
+    /// If the new constraint's `from` has to move, there is a negative cycle.
     fn propose(
         &mut self,
         added: ConstraintId,
@@ -301,7 +303,7 @@ impl<W: Weight> Repair<W> {
         Ok(())
     }
 
-    /// The proposed time, or the present one.
+    /// Returns the proposed time, or the present one.
     fn time<'a>(&'a self, node: NodeId, schedule: &'a Schedule<W>) -> &'a W {
         match &self.proposed[node.index()] {
             Some((time, _)) => time,
@@ -309,7 +311,7 @@ impl<W: Weight> Repair<W> {
         }
     }
 
-    /// The constraints that moved one node after the other, from `anchor` up to `last`.
+    /// Returns the constraints that moved one node after the other, from `anchor` up to `last`.
     fn path(&self, anchor: NodeId, last: ConstraintId, network: &Network<W>) -> Vec<ConstraintId> {
         let mut path = vec![last];
         let mut node = network.constraint(last).from;

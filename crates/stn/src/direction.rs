@@ -1,4 +1,4 @@
-//! Along edges, or against them: [`Direction`].
+//! Direction of paths: along edges, or against them ([`Direction`]).
 
 /// The direction of shortest paths: from one node, or to one node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

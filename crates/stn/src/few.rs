@@ -1,13 +1,13 @@
-//! Maps most of which are small.
+//! Map that is optimised for few entries.
 
 use std::collections::BTreeMap;
 
-/// So many entries stand in a list.
+/// Number of entries up to which a list is used.
 const FEW: usize = 8;
 
-/// A map for searches of which very many are under way at once, each with a few entries: these stand
-/// in a list that is no larger than it has to be, where a search tree has room for eleven from the
-/// beginning. Once there are many, they are moved to a tree.
+/// Map for searches of which very many exist at the same time, each with a few entries. The entries
+/// are in a list of exactly the needed size; a B-tree would allocate space for eleven at once. If
+/// there are many entries, they are moved to a tree.
 #[derive(Clone, Debug)]
 pub(crate) struct Few<K, V> {
     /// Empty once there is a tree.
@@ -43,7 +43,7 @@ impl<K: Copy + Ord, V> Few<K, V> {
         }
     }
 
-    /// Puts a value in, in place of the key's own if it has one.
+    /// Inserts a value, replacing the key's current one if there is one.
     pub(crate) fn insert(&mut self, key: K, value: V) {
         if let Some(own) = self.get_mut(key) {
             *own = value;
@@ -77,7 +77,7 @@ mod tests {
         fn it_holds_what_a_map_holds(steps in prop::collection::vec((0..30_usize, 0..40_u32), 0..80)) {
             let (mut few, mut map) = (Few::default(), BTreeMap::new());
             for (key, value) in steps {
-                // One step in forty begins anew.
+                // One step in forty clears the map.
                 if value == 0 {
                     few.clear();
                     map.clear();

@@ -1,4 +1,4 @@
-//! What stands for time points and constraints.
+//! Identifiers of time points and constraints.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use std::fmt;
 pub struct NodeId(pub u32);
 
 impl NodeId {
-    /// The node's place in a list of all nodes.
+    /// Returns the node's position in a list of all nodes.
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -23,12 +23,12 @@ impl fmt::Display for NodeId {
     }
 }
 
-/// A constraint's place in the order in which the constraints were added.
+/// Identifier of a constraint: its position in the order of addition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ConstraintId(pub u32);
 
 impl ConstraintId {
-    /// The constraint's place in a list of all constraints.
+    /// Returns the constraint's position in a list of all constraints.
     pub fn index(self) -> usize {
         self.0 as usize
     }

@@ -8,24 +8,25 @@ use crate::paths::ShortestPaths;
 use crate::{ConsistentNetwork, ConstraintId, NodeId, Schedule, Weight};
 
 impl<W: Weight> ConsistentNetwork<W> {
-    /// Constraints that can be left out all together without a new schedule becoming possible,
-    /// in ascending order; those for which `keep` holds stay in. Of what stays in, no constraint
-    /// but those of `keep` is implied by the others.
+    /// Returns constraints that can all be removed without adding a schedule, in ascending order.
+    /// Those for which `keep` holds stay. Of the remaining constraints, only those of `keep` may be
+    /// implied by the others.
     ///
-    /// Where several constraints imply each other, the oldest stay in.
+    /// If several constraints imply each other, the oldest stay.
     ///
-    /// Lengths are slacks in a schedule, hence never negative. The nodes on a cycle
-    /// of length zero form a *rigid* group and are contracted (Tsamardinos, Muscettola & Morris,
-    /// AAAI 1998): between groups no cycle has length zero, so it is no matter of order which
-    /// constraints have a detour, and one run of Dijkstra's algorithm per group finds them.
+    /// Lengths are slacks in a schedule, hence never negative. The nodes on a cycle of length zero
+    /// form a *rigid* group and are contracted (Tsamardinos, Muscettola & Morris, AAAI 1998). No
+    /// cycle between groups has length zero, so the set of constraints with a detour does not
+    /// depend on the order of removal, and one run of Dijkstra's algorithm per group finds them.
     pub fn implied(&self, keep: impl Fn(ConstraintId) -> bool) -> Vec<ConstraintId> {
         self.implied_seen_from(self.schedule(), keep)
     }
 
-    /// The same, by slacks in this schedule of the network.
+    /// Computes [`implied`](Self::implied) with slacks in this schedule of the network.
     ///
-    /// Any schedule leads to the same constraints, but not in the same time: a search goes as far as
-    /// the slack of what it is about. Where little happens at once in the schedule, that is near.
+    /// Every schedule gives the same constraints, but not in the same time: the search for a
+    /// constraint explores nodes at distances up to its slack. That is a smaller region if few
+    /// nodes coincide in the schedule.
     pub fn implied_seen_from(
         &self,
         schedule: &Schedule<W>,
@@ -50,8 +51,8 @@ impl<W: Weight> ConsistentNetwork<W> {
         gone.filter(|id| search.is_gone[id.index()]).collect()
     }
 
-    /// The nodes whose differences are fixed, group by group: the strongly connected components
-    /// of the edges without slack (Kosaraju's algorithm).
+    /// Returns the nodes whose differences are fixed, group by group: the strongly connected
+    /// components of the edges without slack (Kosaraju's algorithm).
     fn rigid_groups(&self, slack: &[W]) -> Rigid {
         let network = self.network();
         let is_tight = |id: ConstraintId| slack[id.index()] == W::zero();
@@ -91,17 +92,17 @@ struct Search<'a, W> {
     network: &'a ConsistentNetwork<W>,
     schedule: &'a Schedule<W>,
     slack: Vec<W>,
-    /// Whether the caller allows to leave a constraint out.
+    /// `true` if the caller allows that a constraint is left out.
     can_go: Vec<bool>,
-    /// The constraints left out so far. Those that are not imply all of these.
+    /// `true` for constraints removed so far. The remaining ones imply all of these.
     is_gone: Vec<bool>,
     rigid: Rigid,
 }
 
 impl<W: Weight> Search<'_, W> {
-    /// Leaves out constraints between nodes of one group, newest first.
+    /// Removes constraints between nodes of one group, newest first.
     ///
-    /// Those with slack never matter. Those without must keep the group strongly connected.
+    /// Those with slack are never needed. Those without must keep the group strongly connected.
     fn within_groups(&mut self) {
         let network = self.network.network();
         let mut inner: Vec<ConstraintId> = Vec::new();
@@ -123,7 +124,8 @@ impl<W: Weight> Search<'_, W> {
         let mut mark = vec![None; network.node_count()];
         for id in inner.into_iter().rev() {
             let edge = network.constraint(id);
-            // A node's only way out, or in, is needed; this spares most of the searches.
+            // The only edge out of a node, or into it, is needed. This check saves most of the
+            // searches.
             let is_bridge =
                 tight_leaving[edge.from.index()] < 2 || tight_entering[edge.to.index()] < 2;
             if self.can_go[id.index()] && !is_bridge && self.has_tight_detour(id, &mut mark) {
@@ -134,9 +136,10 @@ impl<W: Weight> Search<'_, W> {
         }
     }
 
-    /// Whether edges without slack lead from the constraint's `from` to its `to` without it.
+    /// Returns `true` if edges without slack lead from the constraint's `from` to its `to` without
+    /// it.
     ///
-    /// `mark` holds for each node the last search that saw it.
+    /// `mark` holds for each node the last search that visited it.
     fn has_tight_detour(&self, avoided: ConstraintId, mark: &mut [Option<ConstraintId>]) -> bool {
         let network = self.network.network();
         let edge = network.constraint(avoided);
@@ -162,12 +165,12 @@ impl<W: Weight> Search<'_, W> {
         false
     }
 
-    /// Leaves out constraints between nodes of different groups.
+    /// Removes constraints between nodes of different groups.
     fn between_groups(&mut self) {
         let group_count = self.rigid.groups.len();
         let mut sources: Vec<usize> = (0..group_count).collect();
-        // Most edges lead back in time. Early sources first: then what a later source looks
-        // through has been thinned out already.
+        // Most edges lead back in time. With early sources first, later sources search through
+        // edges that have already been thinned out.
         sources.sort_by(|&a, &b| {
             let time = |group: usize| &self.schedule[self.rigid.groups[group][0]];
             time(a).cmp(time(b)).then(a.cmp(&b))
@@ -184,9 +187,11 @@ impl<W: Weight> Search<'_, W> {
         }
     }
 
-    /// Of the edges between two groups, keeps the oldest shortest one if there is no detour.
+    /// Keeps the oldest shortest edge between two groups if there is no detour, and removes the
+    /// others.
     fn thin_out(&mut self, edges: &[Edge<W>], has_detour: bool) {
-        // What cannot go counts as older than the rest: it makes the others superfluous.
+        // Constraints that must stay count as older than the rest, because they make the others
+        // redundant.
         let age = |edge: &Edge<W>| (self.can_go[edge.id.index()], edge.id);
         let shortest = edges
             .iter()
@@ -203,7 +208,7 @@ impl<W: Weight> Search<'_, W> {
         self.rigid.group_of[node.index()]
     }
 
-    /// The edges between groups.
+    /// Returns the edges between groups.
     fn outgoing(&self) -> Outgoing<W> {
         let network = self.network.network();
         let mut edges = Vec::new();
@@ -227,8 +232,8 @@ impl<W: Weight> Search<'_, W> {
     }
 }
 
-/// The edges between groups that have not been left out, side by side by the group they leave and
-/// then by the one they lead to: most of the work is to walk along them.
+/// The remaining edges between groups, stored contiguously by source group and then by target
+/// group, because most of the work is to traverse them.
 struct Outgoing<W> {
     edges: Vec<Edge<W>>,
     ranges: Vec<Range<usize>>,
@@ -245,7 +250,7 @@ impl<W> Outgoing<W> {
         &self.edges[self.ranges[group].clone()]
     }
 
-    /// Forgets the edges of a group that have been left out.
+    /// Drops the removed edges of a group.
     fn drop_gone(&mut self, group: usize, is_gone: &[bool]) {
         let range = &mut self.ranges[group];
         let mut end = range.start;
@@ -259,15 +264,17 @@ impl<W> Outgoing<W> {
     }
 }
 
-/// A group with so many edges is a hub.
+/// Number of edges from which a group can be a hub.
 const MANY_EDGES: usize = 8;
 
-/// The group from which most edges lead, and how far it is from everywhere: mostly that of the beginning, to which windows
-/// and deadlines bind all else. A search that went on from there would go everywhere.
+/// Group with the most outgoing edges, and its distances to and from all groups. It usually
+/// contains the beginning of the plan, because windows and deadlines are constraints to the
+/// beginning. A search that continued from the hub would visit the whole network.
 struct Hub<W> {
     group: usize,
-    /// The lengths of the shortest paths from each group to the hub, and from the hub to each, but for the hub's own time:
-    /// it is subtracted from the one and added to the other.
+    /// The lengths of the shortest paths from each group to the hub, and from the hub to each
+    /// group. They omit the hub's own time, which cancels: it is subtracted from one and added to
+    /// the other.
     to: Vec<Option<W>>,
     from: Vec<Option<W>>,
 }
@@ -294,7 +301,7 @@ impl<W: Weight> Hub<W> {
         })
     }
 
-    /// The length of the shortest path between two other groups that leads through the hub.
+    /// Returns the length of the shortest path between two other groups that leads through the hub.
     fn between(&self, source: usize, target: usize) -> Option<W> {
         if self.group == source || self.group == target {
             return None;
@@ -304,11 +311,11 @@ impl<W: Weight> Hub<W> {
     }
 }
 
-/// The groups near a source, kept between searches to spare allocations.
+/// Groups near a source, reused between searches to save allocations.
 struct Reach<W> {
     /// The length of the shortest path found.
     length: Vec<Option<W>>,
-    /// Whether a path of two or more edges is at least as short as the shortest single edge.
+    /// `true` if a path of two or more edges is at least as short as the shortest single edge.
     has_detour: Vec<bool>,
     is_final: Vec<bool>,
     touched: Vec<usize>,
@@ -326,8 +333,8 @@ impl<W: Weight> Reach<W> {
         }
     }
 
-    /// Dijkstra's algorithm from `source`, as far as needed to know which of its edges have a
-    /// detour. How long those through the hub are is known beforehand.
+    /// Runs Dijkstra's algorithm from `source`, until all of its edges with a detour are known. The
+    /// lengths of detours through the hub are known beforehand.
     fn look_for_detours(
         &mut self,
         outgoing: &Outgoing<W>,

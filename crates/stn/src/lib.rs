@@ -1,34 +1,34 @@
-//! Temporal networks: time points, bounds on their differences, and what follows from them.
+//! Temporal networks: time points, bounds on their differences, and implied bounds.
 //!
-//! A simple temporal network (Dechter, Meiri & Pearl 1991) is a set of constraints
-//! `to - from <= bound`. Drawn as edges `from --bound--> to`, all questions about it are
-//! questions about shortest paths: the network is consistent unless it has a cycle of negative
-//! length, and the tightest bound on `b - a` that follows is the distance from `a` to `b`.
+//! A simple temporal network (Dechter, Meiri & Pearl 1991) is a set of constraints `to - from <=
+//! bound`. With constraints as edges `from --bound--> to`, all questions about it are questions
+//! about shortest paths: the network is consistent unless it has a cycle of negative length, and
+//! the tightest implied bound on `b - a` is the distance from `a` to `b`.
 //!
-//! What flows in is a [`Network`]; it may contradict itself. [`Network::consistency`] answers
-//! with a [`Schedule`] or with a [`NegativeCycle`], and [`ConsistentNetwork`] is a network
-//! together with the schedule that proves it consistent. That proof makes every later question
-//! cheap, because it turns all edges non-negative for Dijkstra's algorithm:
+//! A [`Network`] may be inconsistent. [`Network::consistency`] returns a [`Schedule`] or a
+//! [`NegativeCycle`]. A [`ConsistentNetwork`] is a network together with a schedule that proves it
+//! consistent. That schedule makes all queries cheap, because it turns all edges non-negative for
+//! Dijkstra's algorithm:
 //!
-//! - [`ConsistentNetwork::add`] tightens, or refuses and says why; [`ConsistentNetwork::undo_to`]
-//!   takes back;
+//! - [`ConsistentNetwork::add`] adds a constraint, or refuses it with a proof;
+//!   [`ConsistentNetwork::undo_to`] removes constraints;
 //! - [`ConsistentNetwork::windows`], [`ConsistentNetwork::earliest_schedule`],
-//!   [`ConsistentNetwork::latest_schedule`]: when each point may and can happen;
-//! - [`ConsistentNetwork::shortest_paths_from`] and its kin: implied bounds, with the
+//!   [`ConsistentNetwork::latest_schedule`]: the earliest and latest times of each point;
+//! - [`ConsistentNetwork::shortest_paths_from`] and related methods: implied bounds, with the
 //!   constraints that imply them;
-//! - [`ConsistentNetwork::implied`]: the constraints one can leave out;
+//! - [`ConsistentNetwork::implied`]: the redundant constraints;
 //! - [`ConsistentNetwork::minimal`]: all implied bounds at once, for small networks;
-//! - [`MovingWindows`]: windows that follow as one time after another becomes known.
+//! - [`MovingWindows`]: windows that are updated as times become known.
 //!
 //! [`uncertain`] has networks with uncertainty (STNUs), their controllability and dispatch;
-//! [`branching`] decides whether there is a schedule for all values of quantities in the bounds (weak
-//! controllability).
+//! [`branching`] decides whether there is a schedule for all values of quantities in the bounds
+//! (weak controllability).
 //!
-//! Bounds are [`Rational`](elbowroom_num::Rational) unless said otherwise; with
-//! [`Delta`](elbowroom_num::Delta) a bound can be strict, and other exact numbers can be a
-//! [`Weight`] too. Every answer is exact, and the same on each run.
+//! Bounds are [`Rational`](elbowroom_num::Rational) by default. With
+//! [`Delta`](elbowroom_num::Delta) a bound can be strict, and other exact numbers can also be a
+//! [`Weight`]. Every result is exact, and the same on each run.
 //!
-//! This crate knows no actions, and nothing of plans.
+//! This crate contains no actions and no plans.
 //!
 //! ```
 //! use elbowroom_num::Rational;
@@ -86,5 +86,5 @@ fn spend_step() {
     elbowroom_num::work::spend(STEP_WORK);
 }
 
-/// Work that is counted for a step, which visits the edges of a node.
+/// Work counted per step; a step visits the edges of a node.
 const STEP_WORK: u64 = 200;

@@ -1,11 +1,11 @@
-//! Constraints in lists, one for each node.
+//! Lists of constraints, one for each node.
 
 use crate::{ConstraintId, NodeId};
 
 /// The constraints that begin (or end) at each node, in the order they were added.
 ///
-/// The lists are chained through the constraints: however many nodes there are, there are four
-/// allocations.
+/// The lists are linked through the constraints, so that a constant number of allocations is enough
+/// for any number of nodes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Lists {
     /// For each node, its first and its last constraint.
@@ -15,7 +15,7 @@ pub(crate) struct Lists {
 }
 
 impl Lists {
-    /// An empty list for each of `node_count` nodes.
+    /// Creates an empty list for each of `node_count` nodes.
     pub(crate) fn with_nodes(node_count: usize) -> Self {
         Self {
             ends: vec![None; node_count],
@@ -43,7 +43,7 @@ impl Lists {
         self.neighbours.push((last, None));
     }
 
-    /// Takes away the newest constraint, which is the last in its node's list.
+    /// Removes the newest constraint, which is the last in its node's list.
     pub(crate) fn pop(&mut self, node: NodeId) {
         let Some((before, _)) = self.neighbours.pop() else {
             return;
@@ -58,22 +58,22 @@ impl Lists {
         }
     }
 
-    /// Takes away the nodes from that number on, whose lists are empty.
+    /// Removes the nodes from that number on, whose lists are empty.
     pub(crate) fn truncate(&mut self, node_count: usize) {
         self.ends.truncate(node_count);
     }
 
-    /// The first constraint of a node's list.
+    /// Returns the first constraint of a node's list.
     pub(crate) fn first(&self, node: NodeId) -> Option<ConstraintId> {
         self.ends[node.index()].map(|(first, _)| first)
     }
 
-    /// The next constraint in the same list.
+    /// Returns the next constraint in the same list.
     pub(crate) fn after(&self, id: ConstraintId) -> Option<ConstraintId> {
         self.neighbours[id.index()].1
     }
 
-    /// A node's list.
+    /// Returns a node's list.
     pub(crate) fn of(&self, node: NodeId) -> impl Iterator<Item = ConstraintId> + '_ {
         std::iter::successors(self.first(node), |&id| self.after(id))
     }

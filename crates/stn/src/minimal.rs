@@ -4,8 +4,8 @@ use elbowroom_num::Rational;
 
 use crate::{ConsistentNetwork, NodeId, Weight};
 
-/// The tightest bound on the difference of each two nodes. Memory grows with the square of the
-/// number of nodes.
+/// Minimal network: the tightest bound on the difference of each two nodes. Memory grows with the
+/// square of the number of nodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Minimal<W = Rational> {
     node_count: usize,
@@ -14,19 +14,19 @@ pub struct Minimal<W = Rational> {
 }
 
 impl<W: Weight> Minimal<W> {
-    /// The least `d` with `to - from <= d` in every schedule; `None` when there is none.
+    /// Returns the least `d` with `to - from <= d` in every schedule; `None` when there is none.
     pub fn distance(&self, from: NodeId, to: NodeId) -> Option<&W> {
         self.distances[from.index() * self.node_count + to.index()].as_ref()
     }
 
-    /// The number of nodes.
+    /// Returns the number of nodes.
     pub fn node_count(&self) -> usize {
         self.node_count
     }
 }
 
 impl<W: Weight> ConsistentNetwork<W> {
-    /// The minimal network: Johnson's algorithm, one run of Dijkstra's per node.
+    /// Computes the minimal network by Johnson's algorithm, with one run of Dijkstra's per node.
     pub fn minimal(&self) -> Minimal<W> {
         let network = self.network();
         let mut distances = Vec::with_capacity(network.node_count() * network.node_count());

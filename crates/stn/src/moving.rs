@@ -1,4 +1,4 @@
-//! Windows that are kept up to date while one time after another becomes known.
+//! Windows that are updated while times become known.
 
 mod loosen;
 
@@ -13,26 +13,26 @@ use crate::{
     ConsistentNetwork, ConstraintId, Network, NodeId, Schedule, Weight, Window, spend_step,
 };
 
-/// A network, and the [`Window`] of each of its nodes seen from an origin, while limits on single
-/// nodes are added: what executing a plan does to its network.
+/// Network with the [`Window`] of each node relative to an origin, updated while limits on single
+/// nodes are added, as during the execution of a plan.
 ///
 /// Invariant: the windows are exact. Every time in a node's window occurs in some schedule that
-/// satisfies all constraints and limits, so checking one node is checking the whole network.
+/// satisfies all constraints and limits, so it is enough to check one node.
 ///
-/// A limit costs time in proportion to the windows it moves (Dijkstra's algorithm with the
-/// schedule of the [`ConsistentNetwork`] as potential; cf. Cesta & Oddi, TIME 1996).
+/// A limit costs time in proportion to the windows it moves (Dijkstra's algorithm with the schedule
+/// of the [`ConsistentNetwork`] as potential; cf. Cesta & Oddi, TIME 1996).
 #[derive(Clone, Debug)]
 pub struct MovingWindows<W = Rational> {
     network: Network<W>,
-    /// A schedule without the limits: what makes all edges non-negative.
+    /// Schedule without the limits, which makes all edges non-negative.
     potential: Schedule<W>,
     origin: NodeId,
     windows: Vec<Window<W>>,
-    /// For each node, what its earliest and its latest time come from.
+    /// For each node, the origins of its earliest and its latest time.
     sources: Vec<[Source; 2]>,
-    /// For each node, the most that limits on itself say of its earliest and its latest time.
+    /// For each node, the tightest limits on its own earliest and latest time.
     limits: Vec<[Option<W>; 2]>,
-    /// For each constraint, whether it demands nothing any more.
+    /// For each constraint, `true` if it has been lifted.
     is_lifted: Vec<bool>,
     queue: BinaryHeap<Reverse<(W, NodeId)>>,
 }
@@ -40,45 +40,45 @@ pub struct MovingWindows<W = Rational> {
 /// The origin of one end of a time window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
-    /// From nothing: it is infinite, or the node is the origin.
+    /// None: the end is infinite, or the node is the origin.
     Nothing,
-    /// From a limit on this very node.
+    /// A limit on the node itself.
     Limit,
-    /// Through this constraint, from the node at its other end.
+    /// This constraint, from the node at its other end.
     Constraint(ConstraintId),
 }
 
 /// One end of a time window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WindowEnd {
-    /// How early the node may be.
+    /// Earliest time of the node.
     Earliest,
-    /// How late the node may be.
+    /// Latest time of the node.
     Latest,
 }
 
-/// Why one end of a window is where it is.
+/// Explanation of one end of a window: the path of constraints that implies it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grounds {
-    /// The node where it begins: one with a limit of its own, or the origin.
+    /// The node where the path begins: one with a limit of its own, or the origin.
     pub root: NodeId,
-    /// The constraints that carry it from there, beginning at `root`.
+    /// The constraints of the path, beginning at `root`.
     pub constraints: Vec<ConstraintId>,
 }
 
-/// A limit contradicts the others.
+/// Error for a limit that contradicts the others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutOfWindow<W = Rational> {
     /// The node that the limit was for.
     pub node: NodeId,
-    /// The end of its window that is in the way.
+    /// The violated end of its window.
     pub end: WindowEnd,
-    /// By how much the limit misses it; positive.
+    /// Amount of the violation; positive.
     pub by: W,
 }
 
 impl<W: Weight> MovingWindows<W> {
-    /// The windows of a network before anything is known.
+    /// Computes the windows of a network without limits.
     pub fn new(network: ConsistentNetwork<W>, origin: NodeId) -> Self {
         let (after, before) = (
             network.shortest_paths_from(origin),
@@ -107,35 +107,35 @@ impl<W: Weight> MovingWindows<W> {
         }
     }
 
-    /// The constraints, without the limits. Those that were lifted are still among them.
+    /// Returns the constraints, without the limits. Lifted constraints are included.
     pub fn network(&self) -> &Network<W> {
         &self.network
     }
 
-    /// The node that times are relative to.
+    /// Returns the node that times are relative to.
     pub fn origin(&self) -> NodeId {
         self.origin
     }
 
-    /// The time at which the node may happen, relative to the origin.
+    /// Returns the window of the node, relative to the origin.
     pub fn window(&self, node: NodeId) -> &Window<W> {
         &self.windows[node.index()]
     }
 
-    /// `node` happens at `time`.
+    /// Adds the limit that `node` happens at `time`.
     ///
     /// # Errors
-    /// When it cannot; then the windows stay as they were.
+    /// If that is impossible; then the windows stay as they were.
     pub fn fix(&mut self, node: NodeId, time: &W) -> Result<(), OutOfWindow<W>> {
         self.check_earliest(node, time)?;
         self.not_before(node, time)?;
         self.not_after(node, time)
     }
 
-    /// `node` happens at `time` or later.
+    /// Adds the limit that `node` happens at `time` or later.
     ///
     /// # Errors
-    /// When it cannot; then the windows stay as they were.
+    /// If that is impossible; then the windows stay as they were.
     pub fn not_before(&mut self, node: NodeId, time: &W) -> Result<(), OutOfWindow<W>> {
         let window = &self.windows[node.index()];
         if let Some(latest) = window.latest.as_ref().filter(|latest| time > *latest) {
@@ -156,10 +156,10 @@ impl<W: Weight> MovingWindows<W> {
         Ok(())
     }
 
-    /// `node` happens at `time` or earlier.
+    /// Adds the limit that `node` happens at `time` or earlier.
     ///
     /// # Errors
-    /// When it cannot; then the windows stay as they were.
+    /// If that is impossible; then the windows stay as they were.
     pub fn not_after(&mut self, node: NodeId, time: &W) -> Result<(), OutOfWindow<W>> {
         self.check_earliest(node, time)?;
         let limit = &mut self.limits[node.index()][WindowEnd::Latest as usize];
@@ -173,7 +173,7 @@ impl<W: Weight> MovingWindows<W> {
         Ok(())
     }
 
-    /// Why one end of a node's window is where it is; `None` if it is infinite.
+    /// Returns the explanation of one end of a node's window; `None` if that end is infinite.
     pub fn grounds(&self, node: NodeId, end: WindowEnd) -> Option<Grounds> {
         let window = self.window(node);
         match end {
@@ -206,13 +206,13 @@ impl<W: Weight> MovingWindows<W> {
         }
     }
 
-    /// Shortens the distance of one node to `distance`, and with it those of others.
+    /// Shortens the distance of one node to `distance`, and propagates that to others.
     fn spread(&mut self, direction: Direction, node: NodeId, distance: W) {
         self.shorten(direction, node, distance, Source::Limit);
         self.settle(direction);
     }
 
-    /// Hands on the distances of all that are queued.
+    /// Propagates the distances of all queued nodes.
     fn settle(&mut self, direction: Direction) {
         while let Some(Reverse((key, node))) = self.queue.pop() {
             spend_step();
@@ -246,7 +246,7 @@ impl<W: Weight> MovingWindows<W> {
         self.is_lifted[id.index()]
     }
 
-    /// The latest time, or the earliest one negated: the length of a shortest path.
+    /// Returns the latest time, or the earliest one negated: the length of a shortest path.
     fn distance(&self, direction: Direction, node: NodeId) -> Option<W> {
         let window = &self.windows[node.index()];
         match direction {

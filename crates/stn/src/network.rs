@@ -5,27 +5,27 @@ use elbowroom_num::Rational;
 use crate::lists::Lists;
 use crate::{ConstraintId, Direction, NodeId, Schedule, Weight};
 
-/// The constraint `to - from <= bound`, drawn as the edge `from --bound--> to`.
+/// The constraint `to - from <= bound`, or the edge `from --bound--> to`.
 ///
-/// "`to` at most `bound` after `from`"; a negative `bound` reads
-/// "`to` at least `-bound` before `from`".
+/// It means "`to` at most `bound` after `from`", or for a negative `bound`, "`to` at least `-bound`
+/// before `from`".
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Constraint<W = Rational> {
-    /// Where the edge begins: the time that is subtracted.
+    /// Source of the edge: the time point that is subtracted.
     pub from: NodeId,
-    /// Where the edge ends.
+    /// Target of the edge.
     pub to: NodeId,
     /// The upper bound of the difference.
     pub bound: W,
 }
 
 impl<W: Weight> Constraint<W> {
-    /// `to - from <= bound`.
+    /// Returns the constraint `to - from <= bound`.
     pub fn at_most(from: NodeId, to: NodeId, bound: W) -> Self {
         Self { from, to, bound }
     }
 
-    /// `to - from >= bound`, which is `from - to <= -bound`.
+    /// Returns the constraint `to - from >= bound`, which is `from - to <= -bound`.
     #[allow(
         clippy::needless_pass_by_value,
         reason = "both constructors take the bound alike"
@@ -38,15 +38,16 @@ impl<W: Weight> Constraint<W> {
         }
     }
 
-    /// Whether `schedule[to] - schedule[from] <= bound`.
+    /// Returns `true` if `schedule[to] - schedule[from] <= bound`.
     pub fn holds_in(&self, schedule: &Schedule<W>) -> bool {
         schedule[self.to] <= schedule[self.from].plus(&self.bound)
     }
 
-    /// `schedule[from] + bound - schedule[to]`: how far the constraint is from being violated.
+    /// Returns the slack `schedule[from] + bound - schedule[to]`, which is negative if the
+    /// constraint is violated.
     ///
-    /// Measured by a schedule, the length of a path changes only by the times of its two ends;
-    /// where all constraints hold, no edge is negative.
+    /// With slacks as lengths, the length of a path changes only by the times of its two ends. If
+    /// all constraints hold, no length is negative.
     pub fn slack_in(&self, schedule: &Schedule<W>) -> W {
         schedule[self.from]
             .plus(&self.bound)
@@ -54,7 +55,7 @@ impl<W: Weight> Constraint<W> {
     }
 }
 
-/// Time points and constraints `to - from <= bound` between them. May contradict itself.
+/// Time points and constraints `to - from <= bound` between them. May be inconsistent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Network<W = Rational> {
     constraints: Vec<Constraint<W>>,
@@ -75,12 +76,12 @@ impl<W> Default for Network<W> {
 }
 
 impl<W: Weight> Network<W> {
-    /// The network without nodes.
+    /// Creates a network without nodes.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// `node_count` nodes and no constraint.
+    /// Creates a network with `node_count` nodes and no constraints.
     pub fn with_nodes(node_count: usize) -> Self {
         Self {
             constraints: Vec::new(),
@@ -89,7 +90,7 @@ impl<W: Weight> Network<W> {
         }
     }
 
-    /// A new time point, free of constraints.
+    /// Adds a time point without constraints.
     pub fn add_node(&mut self) -> NodeId {
         let node = NodeId::from_index(self.node_count());
         self.leaving.add_node();
@@ -106,52 +107,52 @@ impl<W: Weight> Network<W> {
         id
     }
 
-    /// Changes what a constraint demands.
+    /// Replaces the bound of a constraint.
     pub(crate) fn set_bound(&mut self, id: ConstraintId, bound: W) {
         self.constraints[id.index()].bound = bound;
     }
 
-    /// The number of nodes; the nodes are `NodeId(0)`, `NodeId(1)`, and so on.
+    /// Returns the number of nodes; the nodes are `NodeId(0)`, `NodeId(1)`, and so on.
     pub fn node_count(&self) -> usize {
         self.leaving.node_count()
     }
 
-    /// All nodes.
+    /// Returns all nodes.
     pub fn nodes(&self) -> impl ExactSizeIterator<Item = NodeId> + use<W> {
         (0..self.node_count()).map(NodeId::from_index)
     }
 
-    /// The constraint of that number.
+    /// Returns the constraint with that identifier.
     pub fn constraint(&self, id: ConstraintId) -> &Constraint<W> {
         &self.constraints[id.index()]
     }
 
-    /// All constraints; `ConstraintId` counts along this list.
+    /// Returns all constraints, indexed by `ConstraintId`.
     pub fn constraints(&self) -> &[Constraint<W>] {
         &self.constraints
     }
 
-    /// The numbers of all constraints.
+    /// Returns the identifiers of all constraints.
     pub fn constraint_ids(&self) -> impl ExactSizeIterator<Item = ConstraintId> + use<W> {
         (0..self.constraints.len()).map(ConstraintId::from_index)
     }
 
-    /// The constraints whose `from` is `node`, in the order they were added.
+    /// Returns the constraints whose `from` is `node`, in the order they were added.
     pub fn leaving(&self, node: NodeId) -> impl Iterator<Item = ConstraintId> + '_ {
         self.leaving.of(node)
     }
 
-    /// The constraints whose `to` is `node`, in the order they were added.
+    /// Returns the constraints whose `to` is `node`, in the order they were added.
     pub fn entering(&self, node: NodeId) -> impl Iterator<Item = ConstraintId> + '_ {
         self.entering.of(node)
     }
 
-    /// The first constraint to follow from `node` in that direction.
+    /// Returns the first constraint to follow from `node` in that direction.
     pub(crate) fn first(&self, node: NodeId, direction: Direction) -> Option<ConstraintId> {
         self.lists(direction).first(node)
     }
 
-    /// The next one after `id`.
+    /// Returns the next constraint after `id`.
     pub(crate) fn after(&self, id: ConstraintId, direction: Direction) -> Option<ConstraintId> {
         self.lists(direction).after(id)
     }
@@ -163,7 +164,7 @@ impl<W: Weight> Network<W> {
         }
     }
 
-    /// The network without the constraints `left_out`; the others keep their order.
+    /// Returns the network without the constraints `left_out`; the others keep their order.
     ///
     /// `left_out` is sorted, as [`implied`](crate::ConsistentNetwork::implied) returns it.
     #[must_use]
@@ -178,15 +179,15 @@ impl<W: Weight> Network<W> {
         rest
     }
 
-    /// All nodes in the order in which a depth-first search along the edges for which
-    /// `is_followed` holds leaves them: if no cycle is followed, `to` before `from`.
+    /// Returns all nodes in postorder of a depth-first search along the edges for which
+    /// `is_followed` holds: without cycles of such edges, `to` comes before `from`.
     pub(crate) fn depth_first_postorder(
         &self,
         is_followed: impl Fn(ConstraintId) -> bool,
     ) -> Vec<NodeId> {
         let mut finished = Vec::with_capacity(self.node_count());
         let mut is_seen = vec![false; self.node_count()];
-        // Nodes, each with the next constraint to look at.
+        // Nodes, each with the next constraint to visit.
         let mut path: Vec<(NodeId, Option<ConstraintId>)> = Vec::new();
         for root in self.nodes() {
             if !std::mem::replace(&mut is_seen[root.index()], true) {
@@ -208,10 +209,10 @@ impl<W: Weight> Network<W> {
         finished
     }
 
-    /// For each node, a number that it shares with just those nodes to and from which edges lead,
-    /// whatever their bounds. No edges lead to nodes with smaller numbers.
+    /// Returns the strongly connected component of each node, whatever the bounds. No edges lead to
+    /// components with smaller numbers.
     pub fn components(&self) -> Vec<usize> {
-        // Kosaraju's algorithm: the last one left first, and against the edges.
+        // Kosaraju's algorithm: in reverse postorder, and against the edges.
         let order = self.depth_first_postorder(|_| true);
         let mut component = vec![usize::MAX; self.node_count()];
         for (number, &root) in order.iter().rev().enumerate() {
@@ -226,9 +227,9 @@ impl<W: Weight> Network<W> {
         component
     }
 
-    /// Takes back the last constraints and nodes, until so many are left.
+    /// Removes the last constraints and nodes until these numbers remain.
     ///
-    /// No constraint that stays may mention a node that goes.
+    /// No remaining constraint may mention a removed node.
     pub(crate) fn truncate(&mut self, node_count: usize, constraint_count: usize) {
         while self.constraints.len() > constraint_count {
             if let Some(constraint) = self.constraints.pop() {
@@ -242,7 +243,7 @@ impl<W: Weight> Network<W> {
 }
 
 impl<W: Weight> Schedule<W> {
-    /// Whether every constraint of `network` holds.
+    /// Returns `true` if every constraint of `network` holds.
     pub fn holds_in(&self, network: &Network<W>) -> bool {
         self.times().len() == network.node_count()
             && network

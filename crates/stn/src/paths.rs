@@ -1,4 +1,4 @@
-//! Shortest paths: the tightest bounds that follow, and from which constraints they follow.
+//! Shortest paths: the tightest implied bounds, with the constraints that imply them.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
@@ -15,34 +15,34 @@ pub struct ShortestPaths<W = Rational> {
     root: NodeId,
     direction: Direction,
     distances: Vec<Option<W>>,
-    /// The edge next to each node, and the node at its other end, one step nearer to the root.
+    /// The edge next to each node, and the node at its other end, one step closer to the root.
     steps: Vec<Option<(ConstraintId, NodeId)>>,
 }
 
 impl<W: Weight> ShortestPaths<W> {
-    /// The node where all paths begin or end.
+    /// Returns the node where all paths begin or end.
     pub fn root(&self) -> NodeId {
         self.root
     }
 
-    /// Whether the paths begin or end at the root.
+    /// Returns whether the paths begin or end at the root.
     pub fn direction(&self) -> Direction {
         self.direction
     }
 
-    /// The least `d` with `node - root <= d` (or `root - node <= d`, by direction) in every
+    /// Returns the least `d` with `node - root <= d` (or `root - node <= d`, by direction) in every
     /// schedule; `None` when there is none.
     pub fn distance(&self, node: NodeId) -> Option<&W> {
         self.distances[node.index()].as_ref()
     }
 
-    /// The constraint next to the node on its path.
+    /// Returns the constraint next to the node on its path.
     pub(crate) fn step(&self, node: NodeId) -> Option<ConstraintId> {
         self.steps[node.index()].map(|(id, _)| id)
     }
 
-    /// The constraints whose sum is the bound, in the order of the path from its begin to its
-    /// end; `None` when there is no bound.
+    /// Returns the constraints whose sum is the bound, from the beginning of the path to its end;
+    /// `None` when there is no bound.
     pub fn path(&self, node: NodeId) -> Option<Vec<ConstraintId>> {
         self.distance(node)?;
         let mut path = Vec::new();
@@ -59,19 +59,19 @@ impl<W: Weight> ShortestPaths<W> {
 }
 
 impl<W: Weight> ConsistentNetwork<W> {
-    /// The tightest bounds on `node - root`, for each node.
+    /// Returns the tightest bounds on `node - root`, for each node.
     pub fn shortest_paths_from(&self, root: NodeId) -> ShortestPaths<W> {
         self.shortest_paths(root, Direction::FromRoot, None)
     }
 
-    /// The tightest bounds on `root - node`, for each node.
+    /// Returns the tightest bounds on `root - node`, for each node.
     pub fn shortest_paths_to(&self, root: NodeId) -> ShortestPaths<W> {
         self.shortest_paths(root, Direction::ToRoot, None)
     }
 
-    /// The least `d` with `to - from <= d` in every schedule; `None` when there is none.
+    /// Returns the least `d` with `to - from <= d` in every schedule; `None` when there is none.
     ///
-    /// Takes time for the nodes that are nearer, as the network's schedule measures it, and none for the others.
+    /// Only nodes that are closer, by slacks in the network's schedule, take time.
     pub fn distance(&self, from: NodeId, to: NodeId) -> Option<W> {
         let network = self.network();
         let key = |distance: &W, node| Direction::FromRoot.key(distance, node, self.schedule());
@@ -99,16 +99,17 @@ impl<W: Weight> ConsistentNetwork<W> {
         None
     }
 
-    /// Constraints from `from` to `to` whose bounds sum up to the [`distance`](Self::distance).
+    /// Returns constraints from `from` to `to` whose bounds sum up to the
+    /// [`distance`](Self::distance).
     pub fn shortest_path(&self, from: NodeId, to: NodeId) -> Option<Vec<ConstraintId>> {
         self.shortest_paths(from, Direction::FromRoot, Some(to))
             .path(to)
     }
 
-    /// Dijkstra's algorithm. Distances are final for all nodes, or only for `goal`.
+    /// Runs Dijkstra's algorithm. Distances are final for all nodes, or only for `goal`.
     ///
-    /// The queue is ordered by the length of the path as the network's schedule measures it
-    /// ([`Constraint::slack_in`]), less the root's constant share.
+    /// The queue is ordered by path lengths in slacks ([`Constraint::slack_in`]) of the network's
+    /// schedule, without the constant share of the root.
     fn shortest_paths(
         &self,
         root: NodeId,

@@ -1,4 +1,4 @@
-//! A time for each node.
+//! Schedules: a time for each node.
 
 use std::ops::Index;
 
@@ -13,22 +13,22 @@ pub struct Schedule<W = Rational> {
 }
 
 impl<W: Weight> Schedule<W> {
-    /// The node `NodeId(i)` happens at `times[i]`.
+    /// Creates the schedule with node `NodeId(i)` at `times[i]`.
     pub fn new(times: Vec<W>) -> Self {
         Self { times }
     }
 
-    /// The times, by node.
+    /// Returns the times, by node.
     pub fn times(&self) -> &[W] {
         &self.times
     }
 
-    /// The times, by node.
+    /// Returns the times, by node.
     pub fn into_times(self) -> Vec<W> {
         self.times
     }
 
-    /// The same schedule, moved as a whole so that `origin` happens at zero.
+    /// Returns the same schedule, shifted so that `origin` happens at zero.
     #[must_use]
     pub fn relative_to(&self, origin: NodeId) -> Self {
         let zero = &self[origin];

@@ -6,17 +6,17 @@ use proptest::sample::Index;
 
 use crate::{Constraint, Network, NodeId, Schedule, Weight};
 
-/// A network and a schedule it was built around.
+/// A network and the schedule it was built around.
 pub type Hidden<W = Rational> = (Network<W>, Schedule<W>);
 
-/// Networks built around a hidden schedule, so that they are consistent by construction.
+/// Generates networks around a hidden schedule, so that they are consistent by construction.
 ///
 /// Some bounds leave no slack, so that rigid parts occur.
 pub fn consistent_networks() -> impl Strategy<Value = Hidden> {
     consistent(whole_numbers_and_halves())
 }
 
-/// Like [`consistent_networks`], with strict bounds among the others.
+/// Like [`consistent_networks`], with some strict bounds.
 pub fn consistent_strict_networks() -> impl Strategy<Value = Hidden<Delta>> {
     consistent(whole_numbers_and_halves().prop_map(Delta::from)).prop_flat_map(
         |(network, times)| {
@@ -36,7 +36,7 @@ pub fn consistent_strict_networks() -> impl Strategy<Value = Hidden<Delta>> {
     )
 }
 
-/// Any small networks, many of them inconsistent.
+/// Generates small networks, many of them inconsistent.
 pub fn networks() -> impl Strategy<Value = Network> {
     let edges = prop::collection::vec((any::<Index>(), any::<Index>(), -6..12_i64), 0..30);
     (1..9_usize, edges).prop_map(|(node_count, edges)| {
@@ -52,7 +52,7 @@ pub fn networks() -> impl Strategy<Value = Network> {
     })
 }
 
-/// Networks around times drawn from `times`, and as slack the distance of two of them.
+/// Generates networks around times drawn from `times`; slacks are distances of two such times.
 fn consistent<W: Weight + 'static>(
     times: impl Strategy<Value = W>,
 ) -> impl Strategy<Value = Hidden<W>> {

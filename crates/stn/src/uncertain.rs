@@ -1,22 +1,23 @@
-//! Temporal networks some of whose differences are not chosen but observed.
+//! Temporal networks with differences that are observed, not chosen.
 //!
-//! In a *simple temporal network with uncertainty* (STNU; Morris, Muscettola & Vidal 2001) some
-//! time points are not the executor's to choose: a [contingent link](ContingentLink) says that its
-//! end comes between `lower` and `upper` after its activation, and the world decides when. An
-//! executor learns of the end only when it happens. Three promises can be made about such a
-//! network, each of which implies the next:
+//! In a *simple temporal network with uncertainty* (STNU; Morris, Muscettola & Vidal 2001) the
+//! executor does not choose all time points. The end of a [contingent link](ContingentLink) comes
+//! between `lower` and `upper` after its activation, and the world decides when. The executor
+//! observes the end only when it happens. There are three levels of controllability, each of which
+//! implies the next:
 //!
 //! - *strong* controllability ([`UncertainNetwork::strong`]): times for all other points, fixed
 //!   beforehand, satisfy every constraint whatever the world does;
-//! - *dynamic* controllability ([`UncertainNetwork::dynamic`]): a strategy does that decides with
-//!   nothing but what has been observed so far. It may react at once: a point may fall together
-//!   with the observation that it waits for;
-//! - *weak* controllability: for whatever the world does there are times, perhaps such that had to
-//!   be known beforehand.
+//! - *dynamic* controllability ([`UncertainNetwork::dynamic`]): there is a strategy that satisfies
+//!   every constraint and depends only on past observations. It may react at once: a point may
+//!   happen at the same time as the observation that it waits for;
+//! - *weak* controllability: for every choice of the world there are times that satisfy every
+//!   constraint, but the choice may have to be known beforehand.
 //!
-//! Dynamic controllability comes with its [`Dispatchable`] form, by which a [`Dispatcher`] executes
-//! the network: what an event means for the future shows at its neighbours. If there is none, a
-//! [`Conflict`] says why, and a [`Spoiler`] beats whoever tries.
+//! The check of dynamic controllability returns the [`Dispatchable`] form. A [`Dispatcher`]
+//! executes it by propagating each event to neighbours only. If the network is not dynamically
+//! controllable, a [`Conflict`] is the proof, and a [`Spoiler`] chooses durations that make every
+//! executor fail.
 
 mod conflict;
 mod dispatchable;
@@ -48,10 +49,10 @@ pub use spoiler::Spoiler;
 pub use strong::StrongConflict;
 pub use whole::{Unit, WholeNetwork};
 
-/// `lower <= end - activation <= upper`, where the world decides how much it is.
+/// Contingent link `lower <= end - activation <= upper`; the world chooses the difference.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ContingentLink<W = Rational> {
-    /// The time point from which the difference counts.
+    /// Time point that the difference counts from.
     pub activation: NodeId,
     /// The time point that the world chooses.
     pub end: NodeId,
@@ -61,12 +62,12 @@ pub struct ContingentLink<W = Rational> {
     pub upper: Option<W>,
 }
 
-/// A contingent link, by its place in [`UncertainNetwork::links`].
+/// Identifier of a contingent link: its position in [`UncertainNetwork::links`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LinkId(pub u32);
 
 impl LinkId {
-    /// The link's place in a list of all links.
+    /// Returns the link's position in a list of all links.
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -76,12 +77,12 @@ impl LinkId {
     }
 }
 
-/// A network whose contingent links make no sense.
+/// Error for invalid contingent links.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BadLink {
     /// A link names a node that the network does not have.
     NoSuchNode(LinkId),
-    /// A link ends where it begins, or links depend on each other in a circle.
+    /// A link ends where it begins, or links depend on each other in a cycle.
     Circular(LinkId),
     /// The least difference is negative.
     Negative(LinkId),
@@ -136,11 +137,11 @@ pub struct UncertainNetwork<W = Rational> {
 }
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// A network with these requirements and contingent links. The links need not be repeated
-    /// among the requirements.
+    /// Creates a network with these requirements and contingent links. The links need not be
+    /// repeated as requirements.
     ///
     /// # Errors
-    /// When the links make no sense.
+    /// If the links are invalid.
     pub fn new(requirements: Network<W>, links: Vec<ContingentLink<W>>) -> Result<Self, BadLink> {
         let mut ending: Vec<Option<LinkId>> = vec![None; requirements.node_count()];
         for (index, link) in links.iter().enumerate() {
@@ -173,37 +174,37 @@ impl<W: Weight> UncertainNetwork<W> {
         }
     }
 
-    /// The constraints that have to be satisfied.
+    /// Returns the constraints that have to be satisfied.
     pub fn requirements(&self) -> &Network<W> {
         &self.requirements
     }
 
-    /// The contingent links; [`LinkId`] counts along this list.
+    /// Returns the contingent links, indexed by [`LinkId`].
     pub fn links(&self) -> &[ContingentLink<W>] {
         &self.links
     }
 
-    /// The link of that number.
+    /// Returns the link with that identifier.
     pub fn link(&self, id: LinkId) -> &ContingentLink<W> {
         &self.links[id.index()]
     }
 
-    /// The numbers of all links.
+    /// Returns the identifiers of all links.
     pub fn link_ids(&self) -> impl ExactSizeIterator<Item = LinkId> + use<W> {
         (0..self.links.len()).map(LinkId::from_index)
     }
 
-    /// The link that ends at a node; `None` if the executor chooses when the node happens.
+    /// Returns the link that ends at a node; `None` if the executor chooses when the node happens.
     pub fn ending_at(&self, node: NodeId) -> Option<LinkId> {
         self.ending[node.index()]
     }
 
-    /// Whether the world decides when the node happens.
+    /// Returns `true` if the world decides when the node happens.
     pub fn is_contingent(&self, node: NodeId) -> bool {
         self.ending_at(node).is_some()
     }
 
-    /// A link on a circle of links each of which is activated by the end of the one before.
+    /// Returns a link on a cycle of links, where the end of each link activates the next one.
     fn circle(&self) -> Option<LinkId> {
         let mut is_known = BTreeSet::new();
         for first in self.link_ids() {

@@ -1,23 +1,23 @@
-//! The numbers a bound can be.
+//! Number types for bounds.
 
 use std::fmt::Debug;
 
 use elbowroom_num::{Delta, Rational};
 
-/// An exact number that bounds a difference of times: an ordered group.
+/// Exact number type for bounds on differences of times: an ordered group.
 ///
-/// The order goes well with addition (`a <= b` implies `a + c <= b + c`); every algorithm of this
-/// crate rests on that and on nothing else.
+/// The order is compatible with addition (`a <= b` implies `a + c <= b + c`). The algorithms of
+/// this crate rely on nothing else.
 pub trait Weight: Clone + Ord + Debug {
-    /// The neutral element of [`Weight::plus`].
+    /// Returns the neutral element of [`Weight::plus`].
     fn zero() -> Self;
-    /// `self + other`.
+    /// Returns `self + other`.
     #[must_use]
     fn plus(&self, other: &Self) -> Self;
-    /// `self - other`.
+    /// Returns `self - other`.
     #[must_use]
     fn minus(&self, other: &Self) -> Self;
-    /// `-self`.
+    /// Returns `-self`.
     #[must_use]
     fn negated(&self) -> Self {
         Self::zero().minus(self)
@@ -59,7 +59,7 @@ impl Weight for Delta {
 macro_rules! machine_integer {
     ($($integer:ty),*) => {$(
         /// # Panics
-        /// When a sum does not fit: a wrong answer would be worse.
+        /// If a sum does not fit, because a wrong result would be worse.
         impl Weight for $integer {
             fn zero() -> Self {
                 0

@@ -1,4 +1,4 @@
-//! When each node may happen, seen from an origin.
+//! Time windows of nodes, relative to an origin.
 
 use std::ops::Index;
 
@@ -6,12 +6,12 @@ use elbowroom_num::Rational;
 
 use crate::{ConsistentNetwork, NodeId, Schedule, ShortestPaths, Weight};
 
-/// The times `earliest <= node - origin <= latest` that occur in schedules; exactly those.
+/// Time window: exactly the times `earliest <= node - origin <= latest` occur in schedules.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Window<W = Rational> {
-    /// `None`: as early as one likes.
+    /// Earliest time; `None` if it is unbounded.
     pub earliest: Option<W>,
-    /// `None`: as late as one likes.
+    /// Latest time; `None` if it is unbounded.
     pub latest: Option<W>,
 }
 
@@ -23,12 +23,12 @@ pub struct Windows<W = Rational> {
 }
 
 impl<W: Weight> Windows<W> {
-    /// The node that times are relative to.
+    /// Returns the node that times are relative to.
     pub fn origin(&self) -> NodeId {
         self.origin
     }
 
-    /// All windows, by node.
+    /// Returns all windows, by node.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (NodeId, &Window<W>)> {
         let numbered = self.windows.iter().enumerate();
         numbered.map(|(index, window)| (NodeId::from_index(index), window))
@@ -43,7 +43,7 @@ impl<W> Index<NodeId> for Windows<W> {
 }
 
 impl<W: Weight> ConsistentNetwork<W> {
-    /// When each node may happen relative to `origin`: two runs of Dijkstra's algorithm.
+    /// Computes the window of each node relative to `origin`, by two runs of Dijkstra's algorithm.
     pub fn windows(&self, origin: NodeId) -> Windows<W> {
         let after = self.shortest_paths_from(origin);
         let before = self.shortest_paths_to(origin);
@@ -57,36 +57,38 @@ impl<W: Weight> ConsistentNetwork<W> {
         }
     }
 
-    /// `origin` at zero and every other node as early as it may be.
+    /// Returns the schedule with `origin` at zero and every other node as early as possible.
     ///
-    /// Nodes that may be as early as one likes lie so early that everything holds.
+    /// Nodes without an earliest time are so early that all constraints hold.
     pub fn earliest_schedule(&self, origin: NodeId) -> Schedule<W> {
         self.extreme_schedule(&self.shortest_paths_to(origin), W::negated)
     }
 
-    /// `origin` at zero and every other node as late as it may be.
+    /// Returns the schedule with `origin` at zero and every other node as late as possible.
     ///
-    /// Nodes that may be as late as one likes lie so late that everything holds.
+    /// Nodes without a latest time are so late that all constraints hold.
     pub fn latest_schedule(&self, origin: NodeId) -> Schedule<W> {
         self.extreme_schedule(&self.shortest_paths_from(origin), W::clone)
     }
 
-    /// Bounded nodes at `time(distance)`; the others as in the known schedule, moved as one.
+    /// Puts bounded nodes at `time(distance)`, and shifts the others together from the known
+    /// schedule.
     ///
     /// A constraint between a bounded and an unbounded node can only pull the unbounded one away
-    /// from the origin: if it pushed, both would be bounded. So a long move mends all of them.
+    /// from the origin: if it pushed, both would be bounded. So one long shift satisfies all of
+    /// them.
     fn extreme_schedule(&self, paths: &ShortestPaths<W>, time: fn(&W) -> W) -> Schedule<W> {
         let bounded = |node| paths.distance(node).map(time);
         let mut shift = W::zero();
         for constraint in self.network().constraints() {
             let (from, to) = (bounded(constraint.from), bounded(constraint.to));
             match (from, to) {
-                // `to` must come down to `from + bound`.
+                // `to` must decrease to `from + bound`.
                 (Some(from), None) => {
                     let limit = from.plus(&constraint.bound);
                     shift = shift.min(limit.minus(&self.schedule()[constraint.to]));
                 }
-                // `from` must come up to `to - bound`.
+                // `from` must increase to `to - bound`.
                 (None, Some(to)) => {
                     let limit = to.minus(&constraint.bound);
                     shift = shift.max(limit.minus(&self.schedule()[constraint.from]));

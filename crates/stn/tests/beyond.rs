@@ -1,5 +1,5 @@
-//! What a dispatcher says of the rest when links take longer, or less time, than their bounds say, against a check of
-//! the whole rest from scratch.
+//! A dispatcher's verdict on the remaining network when links violate their bounds, compared with a
+//! check of the whole remaining network from scratch.
 
 #![allow(
     clippy::unwrap_used,
@@ -18,7 +18,7 @@ use elbowroom_stn::{Constraint, Network, NodeId};
 use game::{Board, Random};
 use rows::rows;
 
-/// As many as the variable says, to try more by hand.
+/// Returns the number in the environment variable, for longer manual runs, or the default.
 fn many(default: u64) -> u64 {
     std::env::var("ELBOWROOM_NETWORKS")
         .ok()
@@ -26,31 +26,33 @@ fn many(default: u64) -> u64 {
         .unwrap_or(default)
 }
 
-/// A network under way in a world that does not keep to the bounds of its links.
+/// Running execution of a network in a world that does not keep to the bounds of its links.
 struct Run {
     network: UncertainNetwork<i64>,
     dispatcher: Dispatcher<i64>,
     now: i64,
-    /// Links that may last until another time than their bounds say.
+    /// Prolonged links, with their latest ends.
     prolonged: BTreeMap<LinkId, Option<i64>>,
 }
 
-/// How often the rest worked and did not work, after an end outside its bounds and for an end that is overdue.
+/// Numbers of remaining networks that were and were not executable, after an end outside its bounds
+/// and for an overdue end.
 #[derive(Debug, Default)]
 struct Counts {
     ended: [usize; 2],
     overdue: [usize; 2],
-    /// How often something that is overdue could not be borne any more, and could until some time, which was not always
-    /// the one asked for.
+    /// Number of overdue links that could not be prolonged, and of those that could be prolonged
+    /// until some time, which was not always the requested one.
     furthest: [usize; 2],
     shortened: usize,
-    /// What only a check from scratch finds to work.
+    /// Number of networks that only the check from scratch found executable.
     late: usize,
     finished: usize,
 }
 
 impl Run {
-    /// Whether an executor can be sure of the rest, by a check from scratch.
+    /// Returns `true` if the remaining network is dynamically controllable, by a check from
+    /// scratch.
     fn is_sure(&self) -> bool {
         let happened = |node: NodeId| self.dispatcher.happened(node).copied();
         let requirements = self.network.requirements();
@@ -92,7 +94,7 @@ impl Run {
             .is_dynamically_controllable()
     }
 
-    /// The links under way, with when they began.
+    /// Returns the running links, with their start times.
     fn active(&self) -> Vec<(LinkId, ContingentLink<i64>, i64)> {
         let links = self.network.link_ids().filter_map(|id| {
             let link = self.network.link(id);
@@ -103,7 +105,8 @@ impl Run {
         links.collect()
     }
 
-    /// Whether a time is within the bounds of a link, or what has become of them.
+    /// Returns `true` if the current time is within the bounds of a link, or within its prolonged
+    /// ones.
     fn is_within(&self, id: LinkId, link: &ContingentLink<i64>, begun: i64) -> bool {
         let last = match self.prolonged.get(&id) {
             Some(until) => *until,
@@ -112,7 +115,8 @@ impl Run {
         link.lower <= self.now - begun && last.is_none_or(|last| self.now <= last)
     }
 
-    /// The world lets links end or not; `None` when the rest does not work any more.
+    /// Lets the world end some links. Returns `None` when the remaining network is no longer
+    /// executable.
     fn world(&mut self, random: &mut Random, counts: &mut Counts, told: &str) -> Option<()> {
         loop {
             let mut ending = self.active();
@@ -135,7 +139,7 @@ impl Run {
         }
     }
 
-    /// The latest time by which a link may end is the last one of which that can be said.
+    /// Checks that `prolongable` returns the latest time that `prolong` accepts.
     fn furthest(&self, id: LinkId, most: i64, counts: &mut Counts, told: &str) {
         let does = |until: i64| {
             let mut other = self.dispatcher.clone();
@@ -148,7 +152,7 @@ impl Run {
         counts.shortened += usize::from(found.is_some_and(|found| found < most));
     }
 
-    /// What is overdue by now goes on for ever, or for a while.
+    /// Prolongs each overdue link for ever, or for a while.
     fn overdue(&mut self, random: &mut Random, counts: &mut Counts, told: &str) -> Option<()> {
         for (id, link, begun) in self.active() {
             let is_late = link.lower <= self.now - begun && !self.is_within(id, &link, begun);
@@ -164,7 +168,8 @@ impl Run {
                 link.lower <= self.now - begun && !self.is_within(*other, link, *begun)
             });
             if others.next().is_some() {
-                // It is only known of all together what can be borne.
+                // The check from scratch is only comparable after all overdue links have been
+                // prolonged.
                 if does {
                     continue;
                 }
@@ -189,7 +194,7 @@ impl Run {
         says.then_some(())
     }
 
-    /// Executes the network, point by point, as long as all that happens can be borne.
+    /// Executes the network, point by point, as long as it stays executable.
     fn go(&mut self, random: &mut Random, counts: &mut Counts, told: &str) -> Option<()> {
         let trouble = |missed| panic!("{told}: {missed:?}");
         self.dispatcher
@@ -240,7 +245,7 @@ impl Run {
     }
 }
 
-/// The network without what holds from node 0 to others.
+/// Returns the network without constraints from node 0 to others.
 fn without_horizon(network: &UncertainNetwork<i64>) -> UncertainNetwork<i64> {
     let mut requirements = Network::with_nodes(network.requirements().node_count());
     for constraint in network.requirements().constraints() {

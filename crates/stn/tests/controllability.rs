@@ -1,5 +1,5 @@
-//! Dynamic controllability against a game that is played out in full, and the dispatcher against
-//! worlds of all kinds.
+//! Dynamic controllability compared with a game that is enumerated completely, and the dispatcher
+//! tested in worlds of all kinds.
 
 #![allow(
     clippy::unwrap_used,
@@ -19,7 +19,7 @@ use elbowroom_stn::uncertain::{
 use elbowroom_stn::{Constraint, Network, NodeId, Weight};
 use game::{Board, Random};
 
-/// As many as the variable says, to try more by hand.
+/// Returns the number in the environment variable, for longer manual runs, or the default.
 fn many(default: u64) -> u64 {
     std::env::var("ELBOWROOM_NETWORKS")
         .ok()
@@ -47,7 +47,7 @@ fn the_verdict_is_that_of_the_game() {
         assert_eq!(executable.is_ok(), verdict.is_ok(), "seed {seed}");
         controllable += u64::from(verdict.is_ok());
     }
-    // Neither answer is rare.
+    // Both results are frequent.
     assert!(
         5 * controllable > count && 5 * (count - controllable) > count,
         "{controllable}"
@@ -89,7 +89,8 @@ fn strong_implies_dynamic_and_its_times_satisfy_everything_at_the_corners() {
         assert!(network.is_dynamically_controllable(), "seed {seed}");
         for corner in 0..1 << board.links.len() {
             let mut times = schedule.times().to_vec();
-            // Links are in no order: what others begin with is settled after so many rounds.
+            // Links are in no order, so it takes up to one round per link until all activations are
+            // known.
             for _ in 0..board.links.len() {
                 for (index, &(activation, end, lower, upper)) in board.links.iter().enumerate() {
                     let duration = if corner >> index & 1 == 0 {
@@ -109,7 +110,7 @@ fn strong_implies_dynamic_and_its_times_satisfy_everything_at_the_corners() {
     assert!(both.iter().all(|&count| count > 100), "{both:?}");
 }
 
-/// How the world chooses durations.
+/// Policy of the world for choosing durations.
 #[derive(Clone, Copy, Debug)]
 enum World {
     Early,
@@ -118,7 +119,7 @@ enum World {
     Anyhow,
 }
 
-/// Executes a network, each point as soon as it may (or at random later), and says what happened.
+/// Executes a network, each point as early as possible (or at random later), and returns the times.
 fn execute(
     network: &UncertainNetwork<i64>,
     form: &Arc<Dispatchable<i64>>,
@@ -150,7 +151,7 @@ fn execute(
             .happened(NodeId(u32::try_from(node).unwrap()))
             .is_none()
     }) {
-        // What the world does now, as often as it leads to more.
+        // Executes the world's events until now, which may cause further ones.
         let ends = |dispatcher: &Dispatcher<i64>| {
             let due = network.links().iter().zip(&durations);
             due.filter(|(link, _)| dispatcher.happened(link.end).is_none())
@@ -176,7 +177,7 @@ fn execute(
             .iter()
             .filter(|(earliest, ..)| *earliest == now)
             .min_by_key(|(_, latest, node)| (latest.unwrap_or(i64::MAX), *node));
-        // Nobody may linger beyond the first latest time there is.
+        // No point may be delayed beyond the earliest of all latest times.
         let deadline = ready.iter().filter_map(|(_, latest, _)| *latest).min();
         if let Some(&(_, _, node)) = first
             && (!lingers
@@ -258,7 +259,7 @@ fn a_link_without_an_upper_bound_is_one_with_a_very_large_one() {
     for seed in 0..many(10_000) {
         let board = Board::random(&mut Random(seed));
         let network = board.network();
-        // Without a horizon, or nothing unbounded would ever do.
+        // Removes the horizon, with which no unbounded link would be controllable.
         let mut requirements = Network::with_nodes(board.count);
         for constraint in network.requirements().constraints() {
             if constraint.from != NodeId(0) {
@@ -285,7 +286,7 @@ fn a_link_without_an_upper_bound_is_one_with_a_very_large_one() {
     );
 }
 
-/// The same network with rational bounds.
+/// Returns the same network with rational bounds.
 fn rational(network: &UncertainNetwork<i64>) -> UncertainNetwork {
     let mut requirements = Network::with_nodes(network.requirements().node_count());
     for constraint in network.requirements().constraints() {
@@ -301,7 +302,7 @@ fn rational(network: &UncertainNetwork<i64>) -> UncertainNetwork {
     UncertainNetwork::new(requirements, links.collect()).unwrap()
 }
 
-/// Executes a network against the spoiler; whether every requirement held in the end.
+/// Executes a network against the spoiler. Returns `true` if every requirement held in the end.
 fn survives(board: &Board, network: &UncertainNetwork, random: &mut Random) -> bool {
     let spoiler = Spoiler::new(network.clone(), NodeId(0));
     let mut happened: Vec<Option<Rational>> = vec![None; board.count];

@@ -1,4 +1,4 @@
-//! Small networks with their answers beside them.
+//! Small networks with their expected results.
 
 use elbowroom_num::{Delta, Rational};
 use elbowroom_stn::{ConsistentNetwork, Constraint, ConstraintId, Network, NodeId};

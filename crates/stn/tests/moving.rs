@@ -1,4 +1,4 @@
-//! Windows that move, against windows computed from scratch.
+//! Incremental windows, compared with windows computed from scratch.
 
 use elbowroom_num::Rational;
 use elbowroom_stn::testing::consistent_networks;
@@ -8,7 +8,7 @@ use elbowroom_stn::{
 use proptest::prelude::*;
 use proptest::sample::Index;
 
-/// What a test asks of one node.
+/// Kind of limit that a test sets on a node.
 #[derive(Clone, Copy, Debug)]
 enum Limit {
     Fix,
@@ -25,7 +25,7 @@ fn limits() -> impl Strategy<Value = Vec<(Limit, Index, i64)>> {
     prop::collection::vec((limit, any::<Index>(), -25..25_i64), 1..20)
 }
 
-/// The plainly right way: the limit as a constraint, or two, and everything from scratch.
+/// Computes the result from scratch, with the limit as one or two constraints.
 fn plainly(
     network: &ConsistentNetwork,
     limit: Limit,
@@ -85,7 +85,8 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 
-    /// Limits and constraints that bind less, mixed: as if both had been so from the beginning.
+    /// Limits and loosened constraints, mixed, give the same result as if they had held from the
+    /// beginning.
     #[test]
     fn loosened_windows_are_those_of_the_loosened_network(
         (network, _) in consistent_networks(),
@@ -144,7 +145,8 @@ proptest! {
     }
 }
 
-/// Along the constraints named, the bounds add up from the root's own end to the node's.
+/// Checks that the bounds of the explanation's constraints add up from the root's own end to the
+/// node's.
 fn every_end_has_its_grounds(moving: &MovingWindows) -> Result<(), TestCaseError> {
     let bound = |id: &ConstraintId| moving.network().constraint(*id).bound.clone();
     for node in moving.network().nodes() {

@@ -1,4 +1,5 @@
-//! Every answer against a plain Bellman-Ford, or against its own certificate.
+//! Every result compared with a simple Bellman-Ford implementation, or checked by its own
+//! certificate.
 
 use elbowroom_num::{Delta, Rational};
 use elbowroom_stn::testing::{consistent_networks, consistent_strict_networks, networks};
@@ -152,7 +153,7 @@ proptest! {
             }
             prop_assert!(network.schedule().holds_in(network.network()));
         }
-        // All times a little later, which no constraint forbids.
+        // Shifts all times a little, which no constraint forbids.
         let later: Vec<_> = network.network().nodes().collect();
         let later = later.into_iter().map(|node| (node, &network.schedule()[node] + &Rational::ONE));
         let later: Vec<_> = later.collect();
@@ -189,7 +190,7 @@ proptest! {
     }
 }
 
-/// Verdict, cycle and all-pairs distances.
+/// Checks the verdict, the cycle and the all-pairs distances.
 fn agrees_with_the_oracle<W: Weight>(network: &Network<W>) -> TestCaseResult {
     match (
         ConsistentNetwork::try_from(network.clone()),
@@ -217,7 +218,7 @@ fn agrees_with_the_oracle<W: Weight>(network: &Network<W>) -> TestCaseResult {
     Ok(())
 }
 
-/// A path, if there is a distance, that leads from one end to the other and adds up to it.
+/// Checks that a path, if there is a distance, leads from one end to the other and adds up to it.
 fn leads(
     network: &ConsistentNetwork,
     path: Option<&[ConstraintId]>,
@@ -240,7 +241,8 @@ fn leads(
     Ok(())
 }
 
-/// What `implied` names may go, and of the rest only what `keep` holds in may go too.
+/// Checks that the constraints of `implied` can be removed, and that of the others only those of
+/// `keep` could be removed as well.
 fn thins_out_to_the_least<W: Weight>(
     network: &Network<W>,
     keep: impl Fn(ConstraintId) -> bool,
@@ -248,7 +250,7 @@ fn thins_out_to_the_least<W: Weight>(
     let consistent = ConsistentNetwork::try_from(network.clone()).expect("consistent");
     let implied = consistent.implied(&keep);
     prop_assert!(implied.is_sorted());
-    // Whatever schedule it is looked at from.
+    // The result does not depend on the schedule.
     for root in network.nodes() {
         for schedule in [
             consistent.earliest_schedule(root),

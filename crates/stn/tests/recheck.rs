@@ -1,4 +1,4 @@
-//! Checking again after one link has changed, against checking from scratch.
+//! Incremental checks after one link has changed, compared with checks from scratch.
 
 #![allow(
     clippy::unwrap_used,
@@ -69,7 +69,7 @@ fn the_verdict_is_that_of_a_check_from_scratch() {
     assert!(counts.iter().all(|&count| count > 5_000), "{counts:?}");
 }
 
-/// The same network in other units, by way of whole numbers and without.
+/// The same network in other units gives the same results, with and without whole numbers.
 #[test]
 fn whole_numbers_change_nothing() {
     let mut controllable = 0;

@@ -1,4 +1,4 @@
-//! Refutations hold for whatever bounds they add up with.
+//! Refutations hold for all bounds with a negative sum.
 
 #![allow(
     clippy::unwrap_used,
@@ -12,8 +12,8 @@ use elbowroom_stn::uncertain::{ContingentLink, Part, Refutation, Refuted, Uncert
 use elbowroom_stn::{Constraint, Network, NodeId};
 use game::{Board, Random};
 
-/// The length of a way with a network's bounds, and whether it may be taken with them: what follows
-/// a lower-case edge is negative.
+/// Returns the length of a way with a network's bounds, and `true` if the way is valid with them:
+/// the part after a lower-case edge is negative.
 fn length(way: &Way, network: &UncertainNetwork<i64>) -> (i64, bool) {
     let mut length = 0;
     let mut is_legal = true;
@@ -47,7 +47,7 @@ fn refutes(refutation: &Refutation, network: &UncertainNetwork<i64>) -> bool {
     total < 0 && is_legal
 }
 
-/// The same requirements, with links of other lengths.
+/// Returns the same requirements, with links of other lengths.
 fn changed(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNetwork<i64> {
     let links = network.links().iter().map(|link| {
         let lower = (link.lower + random.whole(-2, 2)).max(0);
@@ -107,8 +107,8 @@ fn a_network_that_a_refutation_still_fits_is_not_controllable() {
     );
 }
 
-/// Each link may take a little longer than the time until the next one's earliest start, so that the last one ends too late: what
-/// follows from what lies as deep as there are links.
+/// Each link may take a little longer than the time until the next one's earliest start, so that
+/// the last one ends too late. The derivation is nested as deeply as there are links.
 #[test]
 fn a_conflict_along_many_windows_is_told_flat() {
     let (period, more, room) = (10_000, 1, 2_000);

@@ -1,4 +1,4 @@
-//! About the best values of a concave objective, and exact ones near them.
+//! Approximately best values of a concave objective, and exact ones near them.
 
 use std::ops::ControlFlow;
 
@@ -13,13 +13,14 @@ use super::master::{Master, Solved, Span};
 pub(super) struct InCase<'a> {
     /// The rows that hold in it.
     pub(super) chosen: &'a [(usize, usize)],
-    /// Between which two numbers each variable lies; none if they may have all values.
+    /// The range of each variable; empty if they may have all values.
     pub(super) spans: &'a [Span],
     /// The values of a box inside the envelope.
     pub(super) known: &'a [Rational],
 }
 
-/// About the best values in a case, rounded; `None` if they are not found, or if nobody wants to wait.
+/// Returns approximately the best values in a case, rounded; `None` if they are not found, or if
+/// `flow` ends the search.
 pub(super) fn guess(
     function: &dyn Concave,
     master: &mut Master,
@@ -58,7 +59,7 @@ pub(super) fn guess(
     let mut starts = vec![inner, vec![0.0; scales.len()]];
     let is_cut = !case.chosen.is_empty() || least.iter().any(Rational::is_positive);
     if is_cut || !case.spans.is_empty() {
-        // The alternative may hold nowhere near the boxes that are known.
+        // The chosen alternatives may not hold near any known box.
         let even: Vec<Rational> = vec![Rational::ONE; scales.len()];
         if let Solved::Best { values, .. } = master.solve(case.chosen, case.spans, &even) {
             starts.push(in_scale(&values));
@@ -85,7 +86,7 @@ pub(super) fn guess(
     rounded.collect()
 }
 
-/// The least and the greatest value of each variable.
+/// Returns the least and the greatest value of each variable.
 fn spans(variables: &Variables, spans: &[Span]) -> (Vec<Rational>, Vec<Rational>) {
     if spans.is_empty() {
         let least = vec![Rational::ZERO; variables.count()];
@@ -97,7 +98,7 @@ fn spans(variables: &Variables, spans: &[Span]) -> (Vec<Rational>, Vec<Rational>
     both.unzip()
 }
 
-/// The same values with fewer digits, if they are as good.
+/// Returns the same values with fewer digits, if they are as good.
 pub(super) fn tidied(
     values: Vec<Rational>,
     master: &Master,
@@ -126,7 +127,7 @@ pub(super) fn tidied(
     }
 }
 
-/// The greatest power of ten that is at most this number; 1 for what is not positive.
+/// Returns the greatest power of ten that is at most this number; 1 if the number is not positive.
 pub(super) fn power_of_ten(number: &Rational) -> Rational {
     let ten = Rational::from(10);
     let mut power = Rational::ONE;

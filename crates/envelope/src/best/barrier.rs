@@ -1,33 +1,32 @@
-//! The greatest value of a concave function of the ends of a box, approximately: Newton's method
-//! with a logarithmic barrier (Boyd & Vandenberghe 2004, chapter 11), in floating-point numbers.
+//! Approximate maximum of a concave function of the ends of a box: Newton's method with a
+//! logarithmic barrier (Boyd & Vandenberghe 2004, chapter 11), in floating-point numbers.
 //!
-//! What is found here is nothing but a proposal: whoever uses it works out with exact numbers what
-//! it is good for.
+//! The result is only a proposal: the caller computes its exact value.
 
 use std::ops::ControlFlow;
 
-/// All bounds are loosened by so much, so that something lies strictly inside of them.
+/// All bounds are loosened by this, so that there is an interior point.
 const LOOSE: f64 = 1e-10;
-/// The sum of what the barriers of all bounds cost in the end.
+/// Total error from the barriers of all bounds at the end.
 const GAP: f64 = 2e-8;
-/// By how much the barriers count less in each round.
+/// Factor by which the barriers become weaker in each round.
 const SHARPER: f64 = 20.0;
-/// Full steps are taken without measuring what they gain once they promise so little.
+/// Expected gain of a Newton step below which full steps are taken without a line search.
 const NEAR: f64 = 0.05;
 /// The limit on Newton steps in one round.
 const MOST_IN_ROUND: usize = 60;
 /// The limit on Newton steps in all rounds together.
 const MOST_STEPS: usize = 600;
 
-/// After about so many multiplications somebody is asked whether to go on: some ten milliseconds.
+/// Number of multiplications, about ten milliseconds, after which `flow` is polled.
 const ASKED_AFTER: usize = 10_000_000;
 
-/// A concave function that is a sum over few variables each.
+/// Concave function that is a sum of functions of few variables each.
 pub(super) trait Concave {
-    /// Adds the gradient, and minus the second derivatives, where they are not zero; its value.
+    /// Adds the gradient, and the negated second derivatives that are not zero. Returns the value.
     fn derive(&self, at: &[f64], gradient: &mut [f64], curvature: &mut [Vec<f64>]) -> f64;
 
-    /// Its value; minus infinity where it is not defined.
+    /// Returns the value; minus infinity outside the domain.
     fn value(&self, at: &[f64]) -> f64;
 }
 
@@ -39,7 +38,7 @@ pub(super) struct Polytope {
 }
 
 impl Polytope {
-    /// By how much each bound is not reached.
+    /// Returns the slack of each bound.
     fn slacks(&self, at: &[f64]) -> Vec<f64> {
         let rows = self.rows.iter().map(|(factors, bound)| {
             let sum: f64 = factors.iter().map(|(index, f)| f * at[*index]).sum();
@@ -56,8 +55,8 @@ impl Polytope {
         self.slacks(at).into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// About the point where the function is greatest; from the best one of these points to begin
-    /// with. `None` if none of them is inside, or if nobody wants to wait.
+    /// Returns approximately the maximum of the function, searched from the best of these starting
+    /// points. `None` if none of them is inside, or if `flow` ends the search.
     pub(super) fn maximize(
         &self,
         function: &dyn Concave,
@@ -95,7 +94,7 @@ impl Polytope {
         }
     }
 
-    /// What is made as large as possible: the function, and the barriers.
+    /// Returns the maximised value: the function plus the barriers.
     fn merit(&self, function: &dyn Concave, sharpness: f64, at: &[f64]) -> f64 {
         let slacks = self.slacks(at);
         if slacks.iter().any(|slack| *slack <= 0.0) {
@@ -104,7 +103,7 @@ impl Polytope {
         sharpness * function.value(at) + slacks.iter().map(|slack| slack.ln()).sum::<f64>()
     }
 
-    /// One step; `false` if there is nothing left to gain.
+    /// Takes one Newton step. Returns `false` if there is nothing left to gain.
     fn newton(&self, function: &dyn Concave, sharpness: f64, at: &mut Vec<f64>) -> bool {
         let count = at.len();
         let mut gradient = vec![0.0; count];
@@ -134,7 +133,7 @@ impl Polytope {
             return false;
         };
         let promise: f64 = direction.iter().zip(&gradient).map(|(d, g)| d * g).sum();
-        // Half of it is what the step would gain if the function were quadratic.
+        // Half of it would be the gain of the step if the function were quadratic.
         if promise.is_nan() || promise < 1e-9 {
             return false;
         }
@@ -143,7 +142,8 @@ impl Polytope {
             moved.map(|(value, step)| value + length * step).collect()
         };
         if promise < NEAR {
-            // So near, full steps converge, whose gains are too small to be measured.
+            // This close to the optimum, full steps converge, and their gains are too small to be
+            // measured.
             let full = moved(1.0);
             let is_inside = self.least_slack(&full) > 0.0;
             if is_inside {
@@ -165,8 +165,8 @@ impl Polytope {
     }
 }
 
-/// The solution of `matrix · x = right`, for a matrix that is symmetric and positive definite
-/// (Cholesky, after all rows and columns are brought to the same size).
+/// Solves `matrix · x = right` for a symmetric, positive definite matrix (Cholesky, after scaling
+/// all rows and columns to the same size).
 fn solve(mut matrix: Vec<Vec<f64>>, right: &[f64]) -> Option<Vec<f64>> {
     let count = right.len();
     let sizes: Vec<f64> = (0..count).map(|i| matrix[i][i].sqrt()).collect();
@@ -231,7 +231,8 @@ mod tests {
 
     #[test]
     fn the_greatest_product_shares_a_budget_by_prices() {
-        // x + 2 y + 4 z <= 12 and z <= 1/2: z takes its most, the others half of the rest each.
+        // x + 2 y + 4 z <= 12 and z <= 1/2: z is at its upper bound, the others share the rest
+        // equally.
         let polytope = Polytope {
             rows: vec![(vec![(0, 1.0), (1, 2.0), (2, 4.0)], 12.0)],
             least: vec![0.0; 3],

@@ -1,5 +1,5 @@
 //! The box with the greatest sum or product of widths: branch and bound over the cuts with
-//! alternatives, the most promising case first, each case a linear program, or nearly so.
+//! alternatives, the most promising case first. Each case is a linear program, or nearly so.
 
 use std::ops::ControlFlow;
 
@@ -18,25 +18,25 @@ use crate::oracle::Oracle;
 use crate::ray::{Ray, place};
 use crate::row::Row;
 
-/// How closely a refused box is shrunk where nothing linear is known: halvings of each end.
+/// Number of halvings of each end when a refused box is shrunk because no linear cut is known.
 const HALVINGS: usize = 16;
-/// How many boxes are shrunk so before the search settles for what it has.
+/// Limit on boxes that are shrunk before the search stops with its current result.
 const MOST_SHRUNK: usize = 24;
 
-/// A case that has not been split.
+/// Case that has not been split.
 struct Leaf {
-    /// Its place in the tree.
+    /// Position in the tree.
     case: usize,
     /// The rows that hold in it.
     chosen: Vec<(usize, usize)>,
-    /// Between which numbers the variables lie in it; none if they may have all values.
+    /// Ranges of the variables in it; empty if they may have all values.
     spans: Vec<Span>,
     /// An upper bound on the objective.
     bound: Rational,
-    /// Whether the bound was worked out from all cuts that are known.
+    /// `true` if the bound was computed from all known cuts.
     is_fresh: bool,
     values: Vec<Rational>,
-    /// For a probability, where its bound touches.
+    /// For a probability, the points of contact of its bound.
     touches: Vec<Touch>,
 }
 
@@ -55,7 +55,7 @@ struct Search<'a> {
     is_cancelled: bool,
 }
 
-/// The box that is best by a goal.
+/// Searches for the best box by a goal.
 pub(super) fn branch(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,
@@ -86,7 +86,7 @@ pub(super) fn branch(
     let spans = search.goal.spans(variables);
     search.open((Vec::new(), spans), search.goal.most(variables));
     let mut steps = 0_u64;
-    // What is left of cases in which nothing more could be told.
+    // Greatest bound of the cases that were closed undecided.
     let mut left: Option<Rational> = None;
     while let (false, Some(at)) = (search.is_cancelled, search.most_promising()) {
         if search.leaves[at].bound <= &search.best.0 + &tolerance {
@@ -109,7 +109,7 @@ pub(super) fn branch(
             Learnt::Nothing => {
                 search.take(values);
                 if search.leaves[at].bound > &search.best.0 + &tolerance && !search.divide(at) {
-                    // As close as this case can be approached.
+                    // The bound of this case cannot be approached any closer.
                     let leaf = search.leaves.remove(at);
                     left = left.max(Some(leaf.bound));
                 }
@@ -154,7 +154,7 @@ pub(super) fn branch(
 }
 
 impl Search<'_> {
-    /// Tells the best box so far, and asks whether to go on.
+    /// Reports the best box so far, and returns the caller's answer.
     fn goes_on(&mut self) -> ControlFlow<()> {
         let step = BestStep {
             envelope: &self.variables.envelope(self.plan, &self.best.1),
@@ -165,7 +165,8 @@ impl Search<'_> {
         flow
     }
 
-    /// Takes the box with these values, which is inside the envelope, if it is better.
+    /// Replaces the best box by the one with these values, which is inside the envelope, if it is
+    /// better.
     fn take(&mut self, values: Vec<Rational>) {
         let worth = self.goal.worth(&values);
         if worth > self.best.0 {
@@ -173,7 +174,7 @@ impl Search<'_> {
         }
     }
 
-    /// The values of the variables with which the box lies in another one.
+    /// Returns values of the variables whose box lies inside another one.
     fn values_in(&self, envelope: &DecoupledEnvelope) -> Vec<Rational> {
         let point = DecoupledEnvelope::point(&self.plan.nominal());
         let variables = self.variables.ends.iter().zip(&self.variables.most);
@@ -188,7 +189,7 @@ impl Search<'_> {
         values.collect()
     }
 
-    /// A new case; its bound is that of the one it comes from until it is worked out.
+    /// Adds a case, with the bound of its parent until it is solved.
     fn open(
         &mut self,
         (chosen, spans): (Vec<(usize, usize)>, Vec<Span>),
@@ -217,7 +218,7 @@ impl Search<'_> {
 
     fn most_promising(&self) -> Option<usize> {
         let leaves = self.leaves.iter().enumerate();
-        // Of several the first, whatever the order of the list.
+        // Ties go to the first case, so that the result does not depend on the order of the list.
         let best = leaves.max_by(|(_, one), (_, other)| {
             one.bound
                 .cmp(&other.bound)
@@ -226,7 +227,7 @@ impl Search<'_> {
         best.map(|(index, _)| index)
     }
 
-    /// Solves a case with all that is known.
+    /// Solves a case with all known cuts.
     fn work_out(&mut self, at: usize) {
         let leaf = &mut self.leaves[at];
         let known = &self.best.1;
@@ -274,7 +275,8 @@ impl Search<'_> {
         }
     }
 
-    /// Splits a case by a cut none of whose rows holds in its best box; whether there is one.
+    /// Splits a case by a cut without a row that holds in its best box. Returns `false` if there is
+    /// none.
     fn split(&mut self, at: usize) -> bool {
         let leaf = &self.leaves[at];
         let candidate = self.variables.envelope(self.plan, &leaf.values);
@@ -299,8 +301,8 @@ impl Search<'_> {
         true
     }
 
-    /// Splits a case in two parts in which the objective can be bounded more closely; whether there
-    /// are any.
+    /// Splits a case into two parts with tighter bounds on the objective. Returns `false` if that
+    /// is not possible.
     fn divide(&mut self, at: usize) -> bool {
         let leaf = &self.leaves[at];
         let Some((variable, place)) = self.goal.divide(&leaf.spans, &leaf.touches) else {
@@ -332,7 +334,8 @@ impl Search<'_> {
         }
     }
 
-    /// Whether the master has taken the cut into account: it holds but for being strict.
+    /// Returns `true` if the master already contains the cut: the cut holds, except for being
+    /// strict.
     fn is_known(&self, cut: &Cut, values: &[Rational]) -> bool {
         let candidate = self.variables.envelope(self.plan, values);
         let holds = |row: &Row| {
@@ -342,7 +345,7 @@ impl Search<'_> {
         cut.rows.iter().any(holds)
     }
 
-    /// Looks for a better box between the nominal values and one that was refused.
+    /// Searches for a better box between the nominal values and one that was refused.
     fn improve(&mut self, values: &[Rational]) -> Result<(), Refusal> {
         let mut ray = Ray::new(self.plan);
         for (ends, value) in self.variables.ends.iter().zip(values) {
@@ -363,8 +366,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// That one end of a box that is refused, and as small as it could be made, has to be nearer: a
-    /// cut where nothing linear is known. `None` after too many of them.
+    /// Shrinks a refused box as far as possible, and returns the cut that one of its ends has to be
+    /// nearer. Used if no linear cut is known. `None` after too many of them.
     fn shrink(&mut self, refused: &DecoupledEnvelope) -> Result<Option<Cut>, Refusal> {
         self.shrunk += 1;
         if self.shrunk > MOST_SHRUNK {

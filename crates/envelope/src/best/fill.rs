@@ -1,10 +1,10 @@
-//! The fairest box: all variables grow together, in relation to their nominal values, until some
-//! are stopped; then the others go on.
+//! The fairest box: all variables grow together, relative to their nominal values, until some are
+//! stopped; the others continue.
 //!
-//! Boxes inside an envelope have all their sub-boxes there, too. So where all that still grow have
-//! the same slack, and those that were stopped keep theirs, a variable that cannot grow alone can
-//! have no more slack unless one with no more gets less: it is stopped for good. That is the box
-//! whose least slack is greatest, then the second least, and so on.
+//! If a box is inside an envelope, so are all its sub-boxes. All growing variables have the same
+//! slack, and the stopped ones keep theirs. So a variable that cannot grow alone can only gain
+//! slack if a variable with no more slack loses some: it is stopped for good. The resulting box has
+//! the greatest least slack, then the greatest second least slack, and so on.
 
 use std::ops::ControlFlow;
 
@@ -24,14 +24,14 @@ struct Fill<'a> {
     variables: &'a Variables,
     on_step: &'a mut dyn FnMut(&BestStep<'_>) -> ControlFlow<()>,
     cuts: Vec<Cut>,
-    /// The slack of each variable that was stopped, and by which cut.
+    /// Slack of each stopped variable, with the cut that stopped it.
     stopped: Vec<Option<(Rational, Option<usize>)>>,
     order: Vec<usize>,
     is_cancelled: bool,
     is_proved: bool,
 }
 
-/// The fairest box.
+/// Searches for the fairest box.
 pub(super) fn fill(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,
@@ -61,7 +61,7 @@ pub(super) fn fill(
         }
         if !fill.stop(&level, &reached)? {
             fill.is_proved = false;
-            // Some grow alone, but not all of them together: the first one gives way.
+            // Some can grow alone, but not all of them together: the first one is stopped.
             let first = fill.stopped.iter().position(Option::is_none);
             fill.halt(first.expect("some still grow"), &level, None);
         }
@@ -76,7 +76,7 @@ pub(super) fn fill(
         .map(|(s, w)| s * w)
         .collect();
     let value = slacks.iter().min().cloned().unwrap_or_default();
-    // The least slack is no more than any variable can have at all.
+    // The least slack is no more than the greatest possible slack of any variable.
     let far = variables.most.iter().zip(&variables.scales);
     let far = far
         .filter_map(|(most, scale)| most.checked_div(scale))
@@ -104,8 +104,8 @@ pub(super) fn fill(
 }
 
 impl Fill<'_> {
-    /// How much slack all that still grow can have, or one alone while the others stay where they
-    /// are.
+    /// Computes the greatest slack of all growing variables, or of one of them while the others
+    /// stay.
     fn grow(&mut self, alone: Option<usize>, level: &Rational) -> Result<Reached, Refusal> {
         let mut ray = Ray::new(self.plan);
         let mut most = level.clone();
@@ -149,7 +149,7 @@ impl Fill<'_> {
         )
     }
 
-    /// Stops the variables that cannot grow beyond the level; whether there are any.
+    /// Stops the variables that cannot grow beyond the level. Returns `true` if there are any.
     fn stop(&mut self, level: &Rational, reached: &Reached) -> Result<bool, Refusal> {
         let mut any = false;
         for variable in 0..self.variables.count() {
@@ -160,7 +160,7 @@ impl Fill<'_> {
                 any = true;
             }
         }
-        // Every variable in the only row that stops them all is stopped by it.
+        // The only row that stops them all stops every variable in it.
         if let Some(index) = reached.cut
             && reached.inside == reached.outside
             && let [row] = &self.cuts[index].rows[..]

@@ -1,4 +1,4 @@
-//! What a box is to be the greatest of, for the search by cases ([`branch`](super::branch)).
+//! Objectives of the search by cases ([`branch`](super::branch)).
 
 use std::ops::ControlFlow;
 
@@ -11,9 +11,9 @@ use super::probability::Probability;
 use super::volume::Volume;
 use super::{Source, Touch, Variables};
 
-/// An objective over the ends of a box.
+/// Objective over the ends of a box.
 pub(super) enum Goal {
-    /// The sum of the variables, each so many times.
+    /// The sum of the variables, each with its weight.
     Sum(Vec<Rational>),
     /// The product of the widths.
     Volume(Volume),
@@ -21,29 +21,28 @@ pub(super) enum Goal {
     Probability(Probability),
 }
 
-/// The best values of a case, or about the best ones.
+/// The best values of a case, possibly approximate.
 pub(super) enum Outcome {
-    /// Of these values.
+    /// The best values.
     Best {
         values: Vec<Rational>,
-        /// Nothing in this case is worth more than this.
+        /// Upper bound on the objective in this case.
         bound: Rational,
-        /// Why.
+        /// Proof of the bound.
         proof: Vec<(Source, Rational)>,
-        /// Of each parameter the slope of the tangent that the proof is about; none if the
-        /// objective is linear itself.
+        /// The slope of the proof's tangent for each parameter; empty if the objective is linear.
         slopes: Vec<Rational>,
-        /// For probabilities, where these touch.
+        /// For probabilities, the points of contact of the tangents.
         touches: Vec<Touch>,
     },
-    /// There are none, because of this.
+    /// There are no values; with the proof.
     Impossible(Vec<(Source, Rational)>),
-    /// Nobody wanted to wait for them.
+    /// The caller ended the search.
     Unknown,
 }
 
 impl Goal {
-    /// The weighted sum of widths.
+    /// Creates the weighted sum of widths.
     pub(super) fn widths(plan: &ParametrizedPlan, variables: &Variables) -> Self {
         let worths = variables.ends.iter().map(|ends| {
             let weights = ends.iter().map(|end| &plan.parameter(end.parameter).weight);
@@ -52,7 +51,8 @@ impl Goal {
         Self::Sum(worths.collect())
     }
 
-    /// A box is as good as the best one if it is worth at most so much less.
+    /// Returns the tolerance: a box counts as best if its value is at most this much below the best
+    /// one.
     pub(super) fn tolerance(&self) -> Rational {
         match self {
             Self::Sum(_) => Rational::ZERO,
@@ -60,7 +60,7 @@ impl Goal {
         }
     }
 
-    /// What a box is worth, at least.
+    /// Returns a lower bound on the value of a box.
     pub(super) fn worth(&self, values: &[Rational]) -> Rational {
         match self {
             Self::Sum(worths) => worths.iter().zip(values).map(|(w, v)| w * v).sum(),
@@ -69,7 +69,7 @@ impl Goal {
         }
     }
 
-    /// What no box can be worth more than, whatever the cuts.
+    /// Returns an upper bound on the value of any box, without cuts.
     pub(super) fn most(&self, variables: &Variables) -> Rational {
         match self {
             Self::Sum(_) => self.worth(&variables.most),
@@ -79,8 +79,8 @@ impl Goal {
         }
     }
 
-    /// Between which numbers the variables lie where the objective can be told, or gains anything;
-    /// none if that is everywhere.
+    /// Returns the ranges of the variables in which the objective is defined, or still increases;
+    /// empty if there are no limits.
     pub(super) fn spans(&self, variables: &Variables) -> Vec<Span> {
         match self {
             Self::Sum(_) | Self::Volume(_) => Vec::new(),
@@ -88,8 +88,8 @@ impl Goal {
         }
     }
 
-    /// The variable, and at which of its values, by which a case is split, in two parts in which the
-    /// objective can be bounded more closely; `None` if there is none.
+    /// Returns a variable and a value that split a case into two parts with tighter bounds on the
+    /// objective; `None` if there is none.
     pub(super) fn divide(&self, spans: &[Span], touches: &[Touch]) -> Option<(usize, Rational)> {
         match self {
             Self::Sum(_) | Self::Volume(_) => None,
@@ -97,7 +97,7 @@ impl Goal {
         }
     }
 
-    /// The best values in a case.
+    /// Computes the best values in a case.
     pub(super) fn solve(
         &self,
         master: &mut Master,

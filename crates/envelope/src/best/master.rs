@@ -1,4 +1,4 @@
-//! The best box that satisfies what is known so far: a linear program.
+//! Master problem: a linear program for the best box that satisfies all known cuts.
 
 use std::collections::BTreeMap;
 
@@ -10,20 +10,21 @@ use super::approach::InCase;
 use super::{Source, Variables};
 use crate::cut::Cut;
 
-/// Between which two numbers a variable lies.
+/// Range of a variable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) least: Rational,
     pub(super) most: Rational,
-    /// The same for what the objective has there, whatever the range of the parameter.
+    /// Like `most`, but for the values that the objective distinguishes, whatever the range of the
+    /// parameter.
     pub(super) far: Rational,
-    /// Whether it is less than `far`; linear programs let it be `most`.
+    /// `true` if the variable is strictly less than `far`; linear programs allow it to be `most`.
     pub(super) is_open: bool,
 }
 
 /// The best values of the variables in a case, or the proof that there are none.
 pub(super) enum Solved {
-    /// They are worth so much, and nothing in this case is worth more.
+    /// The best values, with a proof that no other values in this case are better.
     Best {
         values: Vec<Rational>,
         worth: Rational,
@@ -37,12 +38,12 @@ pub(super) struct Known {
     pub(super) factors: Vec<(usize, Rational)>,
     pub(super) bound: Rational,
     is_strict: bool,
-    /// The sum as a variable of the linear program; none if it has no terms.
+    /// The sum as a variable of the linear program; `None` if it has no terms.
     sum: Option<VariableId>,
 }
 
 impl Known {
-    /// Whether the row holds, strictly where it has to.
+    /// Returns `true` if the row holds, strictly if it is strict.
     pub(super) fn holds(&self, values: &[Rational]) -> bool {
         let terms = self
             .factors
@@ -53,7 +54,7 @@ impl Known {
     }
 }
 
-/// `max Σ worth · variable` over the cuts of one row, and, in a case, over a row each of some
+/// `max Σ worth · variable` over all cuts with one row and, in a case, over one row each of some
 /// others.
 pub(super) struct Master {
     simplex: Simplex,
@@ -61,7 +62,7 @@ pub(super) struct Master {
     /// The sources of the bounds, by the tags of the linear program.
     sources: Vec<Source>,
     rows: BTreeMap<(usize, usize), Known>,
-    /// Those that hold in all cases.
+    /// The rows that hold in all cases.
     everywhere: Vec<(usize, usize)>,
 }
 
@@ -89,7 +90,7 @@ impl Master {
         }
     }
 
-    /// Makes a cut known; if it has one row only, that holds in all cases.
+    /// Adds a cut. If it has only one row, the row holds in all cases.
     pub(super) fn add(
         &mut self,
         plan: &ParametrizedPlan,
@@ -113,13 +114,13 @@ impl Master {
             self.rows.insert((index, place), known);
         }
         if cut.rows.len() == 1 {
-            // Every box inside the envelope satisfies it, the nominal values among them.
+            // Every box inside the envelope satisfies the row, including the nominal values.
             self.assert(index, 0);
             self.everywhere.push((index, 0));
         }
     }
 
-    /// The rows that hold in a case.
+    /// Returns the rows that hold in a case.
     pub(super) fn rows<'a>(
         &'a self,
         chosen: &'a [(usize, usize)],
@@ -128,7 +129,7 @@ impl Master {
         all.filter_map(|place| self.rows.get(place))
     }
 
-    /// Asserts between which numbers the variables lie.
+    /// Asserts the ranges of the variables.
     fn assert_spans(&mut self, spans: &[Span]) {
         for (index, (id, span)) in self.variables.iter().zip(spans).enumerate() {
             let tag = self.sources.len();
@@ -141,7 +142,7 @@ impl Master {
         }
     }
 
-    /// Asserts a row; `false` if it cannot hold.
+    /// Asserts a row. Returns `false` if it cannot hold.
     fn assert(&mut self, cut: usize, row: usize) -> bool {
         let Some(known) = self.rows.get(&(cut, row)) else {
             return true;
@@ -156,8 +157,8 @@ impl Master {
         true
     }
 
-    /// The best values in the case in which these rows hold, too, and the variables lie between
-    /// these numbers, if there are any.
+    /// Computes the best values in the case where these rows hold as well, and the variables lie
+    /// within these spans.
     pub(super) fn solve(
         &mut self,
         chosen: &[(usize, usize)],
@@ -183,15 +184,15 @@ impl Master {
         solved
     }
 
-    /// The best values in that case of those that are at most, or at least, these; strict rows are
-    /// kept with a little to spare. `None` if there are none.
+    /// Returns the best values in that case that are at most, or at least, these. Strict rows are
+    /// satisfied with a small margin. `None` if there are none.
     pub(super) fn beside(
         &mut self,
         case: InCase<'_>,
         (side, limits): (Side, &[Rational]),
         worths: &[Rational],
     ) -> Option<Vec<Rational>> {
-        // As a share of the bound.
+        // Margin as a share of the bound.
         let spared = Rational::new(1, 1_000_000_000);
         let chosen = case.chosen;
         self.simplex.push();
@@ -217,7 +218,7 @@ impl Master {
             self.simplex
                 .assert_upper(sum, Delta::from(bound), self.sources.len());
         }
-        // What stops it is not asked, so that all these bounds may have one name.
+        // No proof is needed here, so all these bounds may share one source.
         self.sources.push(Source::Most(0));
         let found = is_possible.then(|| self.optimum(worths));
         self.simplex.pop();

@@ -1,10 +1,11 @@
-//! The box in which independent durations most likely stay.
+//! The box that independent durations most likely stay in.
 //!
 //! The logarithm of the probability is a sum over the parameters. Each term is a jointly concave
-//! function of the ends of an interval if the logarithm of the density is concave (Prékopa 1973), so it
-//! lies below its tangents, as that of a volume does. What has a probability of its own (where values
-//! are cut, and values that were measured) is inside or not: a case counts it as a share of the way
-//! there, and is split where that is too much. The numbers are those of [`elbowroom_num::chance`].
+//! function of the ends of an interval if the logarithm of the density is concave (Prékopa 1973),
+//! so it lies below its tangents, like the logarithm of a volume. Values with a probability of
+//! their own (at cuts, and measured values) are either inside or outside. A case counts such a
+//! probability proportionally to the distance, and is split if that is too imprecise. The numbers
+//! are those of [`elbowroom_num::chance`].
 
 use std::ops::ControlFlow;
 
@@ -27,10 +28,10 @@ struct Term {
     chance: Option<Chance>,
 }
 
-/// What follows from tangents that touch at one place.
+/// Bound that follows from tangents at one point.
 struct Bounded {
     bound: Rational,
-    /// Where their sum is greatest.
+    /// Point with the greatest sum of the tangents.
     corner: Vec<Rational>,
     proof: Vec<(Source, Rational)>,
     slopes: Vec<Rational>,
@@ -40,9 +41,9 @@ struct Bounded {
 /// `Σ ln P(the duration is inside its interval)`.
 pub(super) struct Probability {
     terms: Vec<Term>,
-    /// What gains nothing is moved out by this measure.
+    /// Weights of the variables when ends are moved out that do not change the probability.
     even: Vec<Rational>,
-    /// How far each variable counts at most, whatever its parameter's range.
+    /// Greatest value of each variable that counts, whatever its parameter's range.
     counted: Vec<Rational>,
 }
 
@@ -80,7 +81,8 @@ impl Probability {
         }
     }
 
-    /// Between which numbers the variables lie where there is any probability, and where they gain any.
+    /// Returns the ranges of the variables in which there is any probability, and in which it
+    /// increases.
     pub(super) fn spans(&self, variables: &Variables) -> Vec<Span> {
         let mut limits: Vec<(Rational, Option<Option<Rational>>)> =
             vec![(Rational::ZERO, None); variables.count()];
@@ -92,7 +94,7 @@ impl Probability {
             for (variable, (least, most)) in term.ends.into_iter().zip(own) {
                 let limit = &mut limits[variable];
                 limit.0 = limit.0.clone().max(least);
-                // Where one variable moves both ends, it gains as long as one of them does.
+                // If one variable moves both ends, it gains as long as one of them does.
                 limit.1 = Some(match limit.1.take() {
                     None => most,
                     Some(other) => other.zip(most).map(|(one, other)| one.max(other)),
@@ -117,7 +119,7 @@ impl Probability {
         term.ends.map(|variable| values[variable].clone())
     }
 
-    /// What a box is worth, rounded down to a billionth.
+    /// Returns the value of a box, rounded down to a billionth.
     pub(super) fn worth(&self, values: &[Rational]) -> Rational {
         let mut sum = Rational::ZERO;
         for term in &self.terms {
@@ -176,7 +178,7 @@ impl Probability {
                 .map(|(value, span)| value.clone().max(span.least.clone()).min(span.most.clone()))
                 .collect()
         });
-        // Rounding makes boxes simpler, but slopes are best where nothing has been rounded.
+        // Rounding makes boxes simpler, but unrounded values give better slopes.
         let mut best: Option<Bounded> = None;
         for at in guess.iter().chain([&at]) {
             let (touches, slopes) = self.tangents(case.spans, at);
@@ -206,7 +208,7 @@ impl Probability {
             return Outcome::Unknown;
         };
         let values = near.unwrap_or(best.corner);
-        // What gains nothing moves out all the same, beyond this case if it can.
+        // Ends that do not change the probability also move out, beyond this case if possible.
         let free = InCase { spans: &[], ..case };
         let filled = master.beside(free, (Side::Lower, &values), &self.even);
         Outcome::Best {
@@ -218,7 +220,8 @@ impl Probability {
         }
     }
 
-    /// Where tangents touch, nearly at these values, and their slopes, two for each parameter.
+    /// Returns tangents at these values (approximately): the points where they touch, and their
+    /// slopes, two for each parameter.
     fn tangents(&self, spans: &[Span], values: &[Rational]) -> (Vec<Touch>, Vec<Rational>) {
         let mut touches = Vec::new();
         let mut slopes = Vec::new();
@@ -230,7 +233,7 @@ impl Probability {
                     Chance::Dense(dense) => {
                         let seen = dense.seen(&term.nominal, &cell)?;
                         let (_, rises) = dense.tangent(&term.nominal, &seen, &at)?;
-                        // Where nothing rises any more, it does not matter where a tangent touches.
+                        // If nothing increases any more, the point of contact does not matter.
                         let nothing = Rational::new(1, 1_000_000_000_000_000);
                         let far = [&cell.below[1], &cell.above[1]];
                         for ((at, [_, high]), far) in at.iter_mut().zip(&rises).zip(far) {
@@ -263,7 +266,7 @@ impl Probability {
         (touches, slopes)
     }
 
-    /// What each variable counts in the tangents.
+    /// Returns the coefficient of each variable in the tangents.
     fn worths(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
         let mut worths = vec![Rational::ZERO; variables.count()];
         for (term, slopes) in self.terms.iter().zip(slopes.chunks(2)) {
@@ -274,7 +277,8 @@ impl Probability {
         worths
     }
 
-    /// How far the logarithm of the probability of each interval is at most above its slopes.
+    /// Returns, for each parameter, an upper bound on the difference of the logarithm of its
+    /// interval's probability and the linear function with these slopes.
     fn heights(&self, spans: &[Span], (slopes, touches): (&[Rational], &[Touch])) -> Vec<Rational> {
         let terms = self.terms.iter().zip(slopes.chunks(2)).zip(touches);
         terms
@@ -293,7 +297,8 @@ impl Probability {
             .collect()
     }
 
-    /// Which variable to split a case at, and where: where a jump is counted in part that is worth most.
+    /// Returns the variable and the value to split a case at: the jump with the largest gap between
+    /// its partial count and its probability.
     pub(super) fn divide(&self, spans: &[Span], touches: &[Touch]) -> Option<(usize, Rational)> {
         let mut widest: Option<(f64, usize, Rational)> = None;
         for (term, touch) in self.terms.iter().zip(touches) {
@@ -313,15 +318,15 @@ impl Probability {
     }
 }
 
-/// The cut that a case counts in part and that adds most where its bound touches: how much, on which
-/// side, and at which distance.
+/// Returns the partially counted cut that adds most at the point of contact: the amount, the side,
+/// and the distance.
 fn open_cut(
     term: &Term,
     dense: &Dense,
     cell: &Cell,
     touch: &Touch,
 ) -> Option<(f64, usize, Rational)> {
-    /// Less does not keep a box from being proved the best.
+    /// Amount that does not prevent the proof that a box is the best.
     const LITTLE: f64 = 1e-9;
     let seen = dense.seen(&term.nominal, cell)?;
     let cuts = seen.into_iter().enumerate().filter_map(|(side, seen)| {
@@ -339,8 +344,9 @@ fn open_cut(
     cuts.max_by(|one, other| one.0.total_cmp(&other.0))
 }
 
-/// Of the values that some intervals of a case have and others do not, the one in the middle of the
-/// longer side: how far the logarithms of what they have differ, which side, and its distance.
+/// Returns the middle one of the values that only some intervals of a case contain, on the side
+/// with more of them: the range of the logarithm of the probability in the case, the side, and the
+/// distance.
 fn middle_jump(
     term: &Term,
     chance: &Chance,
@@ -357,12 +363,12 @@ fn middle_jump(
     let (place, _) = longer.get(longer.len() / 2)?;
     let far = [cell.below[1].clone(), cell.above[1].clone()];
     let [_, most] = chance.mass(&term.nominal, &far);
-    // All that is left if intervals may have nothing at all.
+    // Lower bound for cases with intervals that contain no value.
     let least = steps.center.to_f64().max(1e-12);
     Some(((most.to_f64() / least).ln(), side, place.clone()))
 }
 
-/// The cell of a parameter's intervals in a case.
+/// Returns the cell of a parameter's intervals in a case.
 fn cell(term: &Term, spans: &[Span]) -> Cell {
     let [below, above] = term.ends.map(|variable| &spans[variable]);
     Cell {
@@ -372,7 +378,7 @@ fn cell(term: &Term, spans: &[Span]) -> Cell {
     }
 }
 
-/// A slope with some fourteen digits.
+/// Rounds a slope to some fourteen digits.
 fn short(slope: &Rational) -> Rational {
     let grid = power_of_ten(&(slope * &Rational::new(1, 10_000_000_000_000)));
     if slope.is_positive() {

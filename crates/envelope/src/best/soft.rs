@@ -1,12 +1,11 @@
-//! The logarithm of an interval's probability in floating-point numbers: a proposal is all that follows
-//! from it.
+//! The logarithm of an interval's probability in floating-point numbers, used for proposals only.
 
 use elbowroom_num::Rational;
 use elbowroom_num::chance::{Cell, Chance, Cut, Dense, Density, Reach, Steps};
 
 use super::barrier::Concave;
 
-/// One parameter's interval in a case; lengths are in relation to its scale.
+/// One parameter's interval in a case; lengths are relative to its scale.
 pub(super) struct Soft {
     ends: [usize; 2],
     scale: f64,
@@ -20,19 +19,19 @@ enum Kind {
         shape: Density,
         nominal: f64,
         margin: f64,
-        /// Where the lower and the upper end stop to move, and whether that side counts as a whole.
+        /// Limits of the lower and the upper end, and flags for sides that count as a whole.
         stops: [f64; 2],
         is_whole: [bool; 2],
-        /// What a unit of length gains beside the density.
+        /// Gain per unit of length, in addition to the density.
         gains: [f64; 2],
     },
-    /// What all intervals have of some values, and for each side the corners of the least concave
-    /// function that is not below what they may have.
+    /// Share of the values that all intervals contain, and for each side the corners of the concave
+    /// hull of the share that they may contain in addition.
     Values {
         center: f64,
         hulls: [Vec<(f64, f64)>; 2],
     },
-    /// Nothing can be told of it.
+    /// No approximation is available.
     Untold,
 }
 
@@ -69,8 +68,8 @@ impl Soft {
         }
     }
 
-    /// For a list of values: what an interval may have of them, or nearly so, and how fast the logarithm
-    /// of that rises with its ends. `None` without such a list.
+    /// Returns approximately the share of a list of values that an interval contains, and the
+    /// derivatives of its logarithm by the ends. `None` without such a list.
     pub(super) fn hull_at(&self, at: &Reach) -> Option<(Rational, Reach)> {
         let Kind::Values { center, hulls } = &self.kind else {
             return None;
@@ -94,8 +93,8 @@ impl Soft {
         Some((mass, [one?, other?]))
     }
 
-    /// The logarithm, how it rises with either end, and minus how that rises: of the lower end, of
-    /// both, of the upper one. The unit is that of the plan.
+    /// Returns the logarithm, its derivatives by either end, and the negated second derivatives: of
+    /// the lower end, mixed, of the upper end. The unit is that of the plan.
     fn at(&self, reach: [f64; 2]) -> (f64, [f64; 2], [f64; 3]) {
         match &self.kind {
             Kind::Untold => (0.0, [0.0; 2], [0.0; 3]),
@@ -178,7 +177,7 @@ fn dense_kind(dense: &Dense, nominal: &Rational, cell: &Cell) -> Option<Kind> {
     })
 }
 
-/// The corners of the least concave function that is not below any of these, which rise.
+/// Returns the corners of the concave hull of these points, which are increasing.
 fn concave(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut hull: Vec<(f64, f64)> = Vec::new();
     for point in points {
@@ -198,7 +197,7 @@ fn concave(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     hull
 }
 
-/// The value of such a function, and its slope to the right.
+/// Returns the value of such a function, and its slope to the right.
 fn on_hull(hull: &[(f64, f64)], at: f64) -> (f64, f64) {
     for pair in hull.windows(2) {
         let [(x, y), (next, more)] = [pair[0], pair[1]];
@@ -221,7 +220,7 @@ fn numbers(density: &Density) -> [f64; 3] {
     }
 }
 
-/// The probability of at most this.
+/// Returns the probability of at most `at`.
 fn at_most((shape, [a, b, c]): (&Density, &[f64; 3]), at: f64) -> f64 {
     match shape {
         Density::Uniform { .. } => ((at - a) / (b - a)).clamp(0.0, 1.0),
@@ -243,7 +242,7 @@ fn at_most((shape, [a, b, c]): (&Density, &[f64; 3]), at: f64) -> f64 {
     }
 }
 
-/// The density, and how it rises.
+/// Returns the density, and its derivative.
 fn density_at((shape, [a, b, c]): (&Density, &[f64; 3]), at: f64) -> (f64, f64) {
     let bell = |z: f64| (-z * z / 2.0).exp() / std::f64::consts::TAU.sqrt();
     match shape {
@@ -278,9 +277,9 @@ fn density_at((shape, [a, b, c]): (&Density, &[f64; 3]), at: f64) -> (f64, f64) 
     }
 }
 
-/// The normal distribution.
+/// Returns the normal distribution function.
 fn normal(at: f64) -> f64 {
-    /// Nothing is beyond that.
+    /// Distance beyond which the tail is 0 in floating-point numbers.
     const FAR: f64 = 9.0;
     if at.abs() > FAR {
         return if at > 0.0 { 1.0 } else { 0.0 };

@@ -2,9 +2,9 @@
 //!
 //! The logarithm of the product is a concave function of the ends, and lies below each of its
 //! tangents: `ln x <= ln(1/c) - 1 + c·x` for every slope `c`. So the greatest sum of tangents in a
-//! case, a linear program, is an upper bound in this case, and a close one if the tangents touch
-//! where the logarithm is greatest. Where that is, Newton's method finds out ([`barrier`]); what
-//! follows from it is worked out with exact numbers.
+//! case, a linear program, is an upper bound in this case, and a tight one if the tangents touch at
+//! the maximum of the logarithm. Newton's method approximates the maximum ([`barrier`]), and the
+//! bound is computed with exact numbers.
 //!
 //! [`barrier`]: super::barrier
 
@@ -21,7 +21,7 @@ use super::{Source, Variables};
 
 /// One parameter.
 struct Width {
-    /// The variables that move its ends, and how many ends each moves.
+    /// The variables that move its ends, each with the number of ends it moves.
     variables: Vec<(usize, i64)>,
     weight: Rational,
     scale: Rational,
@@ -33,12 +33,12 @@ type Proof = Vec<(Source, Rational)>;
 /// `Σ weight · ln(width / scale + foot)`.
 pub(super) struct Volume {
     widths: Vec<Width>,
-    /// The power of ten of which slopes are multiples, for each parameter.
+    /// For each parameter, the power of ten that slopes are rounded to.
     grids: Vec<Rational>,
 }
 
-/// What is added to each width, in relation to its scale, before the product is taken: a millionth.
-/// So a box in which one interval has no width can still be compared with others.
+/// Returns the constant added to each width, relative to its scale, before the product is computed:
+/// a millionth. It makes boxes with an interval of width 0 comparable.
 pub fn foot() -> Rational {
     Rational::new(1, 1_000_000)
 }
@@ -71,7 +71,7 @@ impl Volume {
         }
     }
 
-    /// The widths in relation to their scales, each a foot wider.
+    /// Returns the widths relative to their scales, each with the constant [`foot`] added.
     fn footed<'a>(&'a self, values: &'a [Rational]) -> impl Iterator<Item = Rational> + 'a {
         self.widths.iter().map(|width| {
             let own = width.variables.iter();
@@ -82,7 +82,7 @@ impl Volume {
         })
     }
 
-    /// Between which two numbers lies what a box is worth.
+    /// Returns bounds on the value of a box.
     fn enclosed(&self, values: &[Rational]) -> [Rational; 2] {
         let mut sums = [Rational::ZERO, Rational::ZERO];
         for (width, footed) in self.widths.iter().zip(self.footed(values)) {
@@ -94,12 +94,12 @@ impl Volume {
         sums
     }
 
-    /// What a box is worth, rounded down to a billionth.
+    /// Returns the value of a box, rounded down to a billionth.
     pub(super) fn worth(&self, values: &[Rational]) -> Rational {
         enclosed::billionths_below(&self.enclosed(values)[0])
     }
 
-    /// The same, rounded up.
+    /// Returns the value of a box, rounded up to a billionth.
     pub(super) fn most(&self, values: &[Rational]) -> Rational {
         enclosed::billionths_above(&self.enclosed(values)[1])
     }
@@ -128,11 +128,12 @@ impl Volume {
         let values = master.beside(case, (Side::Upper, &guess), &worths);
         let values = values.map(|values| {
             let values = tidied(values, master, variables, case, &|own| self.worth(own));
-            // What is left by rounding, and where the objective is flat.
+            // Fills the room that rounding has left, and moves variables that do not change the
+            // objective.
             let filled = master.beside(case, (Side::Lower, &values), &worths);
             filled.unwrap_or(values)
         });
-        // Rounding makes boxes simpler, but slopes are best where nothing has been rounded.
+        // Rounding makes boxes simpler, but unrounded values give better slopes.
         let rounded = values.as_ref().map(|values| self.slopes(values));
         let mut best: Option<(Rational, Vec<Rational>, Proof, Vec<Rational>)> = None;
         for slopes in std::iter::once(near).chain(rounded) {
@@ -162,8 +163,8 @@ impl Volume {
         }
     }
 
-    /// What the objective is at most if that is what the tangents with these slopes add up to
-    /// without what they are at 0.
+    /// Returns an upper bound on the objective. `sum` is the greatest value of the tangents with
+    /// these slopes, without their constants.
     fn bound(&self, slopes: &[Rational], sum: Rational) -> Rational {
         let heights = self.widths.iter().zip(slopes).filter_map(|(width, slope)| {
             let touches = width.weight.checked_div(&(slope * &width.scale))?;
@@ -174,7 +175,7 @@ impl Volume {
         enclosed::billionths_above(&(heights.sum::<Rational>() + sum))
     }
 
-    /// Of each parameter the slope of the tangent that touches there.
+    /// Returns the slope of each parameter's tangent at these values.
     fn slopes(&self, values: &[Rational]) -> Vec<Rational> {
         let all = self.widths.iter().zip(&self.grids).zip(self.footed(values));
         all.map(|((width, grid), footed)| {
@@ -185,7 +186,7 @@ impl Volume {
         .collect()
     }
 
-    /// What each variable counts in the tangents.
+    /// Returns the coefficient of each variable in the tangents.
     fn worths(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
         let mut worths = vec![Rational::ZERO; variables.count()];
         for (width, slope) in self.widths.iter().zip(slopes) {
@@ -197,7 +198,7 @@ impl Volume {
     }
 }
 
-/// The same for values in relation to their scales, in floating-point numbers.
+/// The same objective for values relative to their scales, in floating-point numbers.
 struct InScale<'a>(&'a Volume);
 
 impl InScale<'_> {

@@ -9,7 +9,7 @@ use elbowroom_num::{Delta, Rational};
 
 use super::{ExactError, RegionSource};
 
-/// From so many half-spaces on, those that follow from others are looked for on the way.
+/// Number of half-spaces above which redundant ones are removed during elimination.
 const MANY_ROWS: usize = 64;
 /// The limit on half-spaces.
 const MOST_ROWS: usize = 512;
@@ -25,7 +25,7 @@ pub(super) struct Halfspace {
 }
 
 impl Halfspace {
-    /// The rest of the space.
+    /// Returns the complement.
     pub(super) fn negated(&self) -> Self {
         let factors = self.factors.iter();
         Self {
@@ -36,7 +36,7 @@ impl Halfspace {
         }
     }
 
-    /// The sum of both, each times a positive factor that makes the coordinate go.
+    /// Returns the sum of both, each times a positive factor, so that the coordinate is eliminated.
     fn combined(&self, other: &Self, coordinate: usize) -> Self {
         let (one, two) = (&self.factors[&coordinate], &other.factors[&coordinate]);
         let (one, two) = (two.abs(), one.abs());
@@ -55,14 +55,15 @@ impl Halfspace {
         }
     }
 
-    /// The same with whole factors without a common divisor.
+    /// Scales the factors to whole numbers without a common divisor.
     fn normalized(mut self) -> Self {
         let Some(first) = self.factors.values().next() else {
             return self;
         };
         let mut scale = first.abs();
-        // Whole numbers once divided by the first and multiplied by the denominators that are left;
-        // few steps, since factors are sums of ones nearly always.
+        // The factors become whole numbers when divided by the first and multiplied by the
+        // remaining denominators. That takes few steps, because nearly all factors are sums of
+        // ones.
         for factor in self.factors.values() {
             let own = factor.checked_div(&scale).unwrap_or_default();
             if let Some(denominator) = own.denominator()
@@ -82,7 +83,7 @@ impl Halfspace {
         self
     }
 
-    /// Whether it lies inside another one with the same factors.
+    /// Returns `true` if the half-space lies inside another one with the same factors.
     fn is_tighter(&self, other: &Self) -> bool {
         self.bound < other.bound || (self.bound == other.bound && self.is_strict)
     }
@@ -92,9 +93,9 @@ impl Halfspace {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polyhedron {
     rows: Vec<Halfspace>,
-    /// For each row, whether it is known not to follow from the others.
+    /// For each row, `true` if it is known to be irredundant.
     is_needed: Vec<bool>,
-    /// Whether a row without coordinates cannot hold.
+    /// `true` if some row without coordinates cannot hold.
     is_absurd: bool,
 }
 
@@ -104,12 +105,12 @@ impl Polyhedron {
     }
 
     pub(super) fn push(&mut self, row: Halfspace) {
-        // Any row may follow from the new one.
+        // The new row may make any row redundant.
         self.is_needed.fill(false);
         self.add(row);
     }
 
-    /// Adds a row from which none that is known to be needed follows, together with the others.
+    /// Adds a row. The caller guarantees that the rows marked as needed stay needed.
     fn add(&mut self, row: Halfspace) {
         if row.factors.is_empty() {
             self.is_absurd |= row.bound.is_negative() || (row.bound.is_zero() && row.is_strict);
@@ -148,12 +149,12 @@ impl Polyhedron {
         self.is_needed.retain(|_| kept.next() == Some(&true));
     }
 
-    /// Whether there is a point in it.
+    /// Returns `true` if the polyhedron is not empty.
     pub(super) fn is_feasible(&self) -> bool {
         !self.is_absurd && Program::new(&self.rows).is_feasible(|_| Some(false))
     }
 
-    /// The shadow without the coordinates below `count`.
+    /// Eliminates the coordinates below `count`.
     pub(super) fn without(
         mut self,
         count: usize,
@@ -174,7 +175,7 @@ impl Polyhedron {
         Ok(self)
     }
 
-    /// The coordinate below `count` whose elimination makes the fewest rows.
+    /// Returns the coordinate below `count` whose elimination creates the fewest rows.
     fn cheapest(&self, count: usize) -> Option<usize> {
         let mut uses: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
         for row in &self.rows {
@@ -198,8 +199,8 @@ impl Polyhedron {
         uses.iter().map(cost).min().map(|(_, index)| index)
     }
 
-    /// Two rows that say together that a sum with this coordinate is one number: that from above
-    /// and that from below.
+    /// Returns two rows that together fix a sum with this coordinate: the one from above and the
+    /// one from below.
     fn equality(&self, coordinate: usize) -> Option<(usize, usize)> {
         let uses = |row: &Halfspace| row.factors.contains_key(&coordinate) && !row.is_strict;
         self.rows.iter().enumerate().find_map(|(index, row)| {
@@ -226,7 +227,8 @@ impl Polyhedron {
             match row.factors.get(&coordinate) {
                 None => {
                     self.rows.push(row.clone());
-                    // A point that breaks this row only has a shadow that breaks this row only.
+                    // A point that violates only this row has a projection that violates only this
+                    // row.
                     self.is_needed.push(was_needed[index]);
                 }
                 Some(factor) if factor.is_positive() => above.push(index),
@@ -237,7 +239,7 @@ impl Polyhedron {
             for &lower in &below {
                 let is_needed = match equality {
                     None => true,
-                    // The others follow from those with one of the two.
+                    // The combinations with one of the two imply the others.
                     Some((up, down)) => (upper == up) != (lower == down),
                 };
                 if is_needed {
@@ -247,7 +249,7 @@ impl Polyhedron {
         }
     }
 
-    /// Drops rows that follow from others.
+    /// Drops redundant rows.
     pub(super) fn reduce(
         &mut self,
         flow: &mut dyn FnMut() -> ControlFlow<()>,
@@ -257,7 +259,8 @@ impl Polyhedron {
         }
         let mut program = Program::new(&self.rows);
         let mut is_kept = vec![true; self.rows.len()];
-        // Those from most sources first: what is left is told by what it comes from.
+        // Rows with the most sources first, because the remaining rows are explained by their
+        // sources.
         let is_open = |index: &usize| !self.is_needed[*index];
         let mut order: Vec<usize> = (0..self.rows.len()).filter(is_open).collect();
         order.sort_by_key(|&index| std::cmp::Reverse(self.rows[index].sources.len()));
@@ -279,7 +282,7 @@ impl Polyhedron {
         Ok(())
     }
 
-    /// What is left of it without another one, in parts without a common point.
+    /// Returns the difference of this polyhedron and another one, in disjoint parts.
     pub(super) fn minus(self, other: &Self) -> Vec<Self> {
         let mut common = self.clone();
         for row in &other.rows {
@@ -330,8 +333,8 @@ impl<'a> Program<'a> {
         }
     }
 
-    /// Whether there is a point for which these rows hold: each that `negated` knows, negated if it
-    /// says so.
+    /// Returns `true` if there is a point that satisfies the selected rows. `negated` returns
+    /// `None` for rows to ignore, and `Some(true)` for rows to negate.
     fn is_feasible(&mut self, negated: impl Fn(usize) -> Option<bool>) -> bool {
         self.simplex.push();
         for (index, (row, sum)) in self.rows.iter().zip(&self.sums).enumerate() {

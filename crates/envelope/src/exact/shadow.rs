@@ -1,4 +1,4 @@
-//! Two parameters of a region: a cut through it, or its shadow on their plane.
+//! Two parameters of a region: a slice, or its projection on their plane.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -16,7 +16,7 @@ pub struct Flat {
     pub rows: Vec<FlatRow>,
 }
 
-/// One side of a [`Flat`]: the factors of both parameters, the bound of the sum, and whether the
+/// One side of a [`Flat`]: the factors of both parameters, the bound of the sum, and `true` if the
 /// bound itself is excluded.
 type FlatRow = ([Rational; 2], Rational, bool);
 
@@ -24,8 +24,8 @@ type FlatRow = ([Rational; 2], Rational, bool);
 pub(super) type Point = [Rational; 2];
 
 impl Region {
-    /// The cut through some values: what both parameters may be when all others have these. Pieces
-    /// that the cut does not meet are left out.
+    /// Returns the slice for some values of the other parameters: the possible values of both
+    /// parameters. Pieces that do not intersect the slice are left out.
     pub fn slice(
         &self,
         axes: [ParameterId; 2],
@@ -35,11 +35,11 @@ impl Region {
         self.pieces.iter().filter_map(cut).collect()
     }
 
-    /// The shadow: what both parameters may be with some values of the others. The parts overlap
-    /// where pieces lie one behind the other.
+    /// Returns the projection: the values of both parameters that are possible with some values of
+    /// the others. The parts may overlap.
     ///
     /// # Errors
-    /// When `flow` says no, or it takes too many inequalities.
+    /// If `flow` breaks, or if there are too many inequalities.
     pub fn projection(
         &self,
         axes: [ParameterId; 2],
@@ -87,7 +87,7 @@ impl Piece {
     ) -> Result<Flat, ExactError> {
         let last = |row: &RegionRow| row.factors.keys().next_back().copied();
         let ids = self.rows.iter().filter_map(last).chain(axes);
-        // The axes behind all others, which are eliminated.
+        // The axes come after all other coordinates, which are eliminated.
         let others = ids.map(ParameterId::index).max().unwrap_or(0) + 1;
         let place = |id: ParameterId| match axes.iter().position(|axis| *axis == id) {
             Some(place) => others + place,
@@ -121,7 +121,7 @@ impl Piece {
 }
 
 impl Flat {
-    /// Whether a point belongs to it.
+    /// Returns `true` if a point belongs to it.
     pub fn contains(&self, point: &[Rational; 2]) -> bool {
         self.rows.iter().all(|(factors, bound, is_strict)| {
             let sum = &factors[0] * &point[0] + &factors[1] * &point[1];
@@ -129,8 +129,8 @@ impl Flat {
         })
     }
 
-    /// The corners of what lies inside a window `[lower, upper]`, around it in one direction; none
-    /// if there is nothing. Sides that do not belong to it are drawn as if they did.
+    /// Returns the corners of the part inside a window `[lower, upper]`, in circular order; empty
+    /// if there is none. Sides that do not belong to the part are drawn as if they did.
     pub fn polygon(&self, lower: &[Rational; 2], upper: &[Rational; 2]) -> Vec<[Rational; 2]> {
         let corner = |x: &Rational, y: &Rational| [x.clone(), y.clone()];
         let mut corners = vec![
@@ -150,7 +150,7 @@ impl Flat {
     }
 }
 
-/// The part of a convex polygon on one side of a line (Sutherland & Hodgman).
+/// Returns the part of a convex polygon on one side of a line (Sutherland & Hodgman).
 fn clipped(corners: &[Point], factors: &Point, bound: &Rational) -> Vec<Point> {
     let excess = |point: &Point| &factors[0] * &point[0] + &factors[1] * &point[1] - bound;
     let mut kept = Vec::with_capacity(corners.len() + 1);
@@ -179,7 +179,7 @@ mod tests {
         Rational::from(value)
     }
 
-    /// `x + y <= 10`, `2 x - y < 4`, `z <= x`.
+    /// Returns the region `x + y <= 10`, `2 x - y < 4`, `z <= x`.
     fn region() -> Region {
         let row = |factors: &[(usize, i64)], bound: i64, is_strict| RegionRow {
             factors: factors

@@ -1,9 +1,9 @@
-//! The volume of a region, exactly.
+//! The exact volume of a region.
 //!
 //! By Lasserre's formula ("An analytical expression and an algorithm for the volume of a convex
 //! polyhedron in R^n", JOTA 1983): the volume of `{x : a_i x <= b_i}` in `n` dimensions is the sum
 //! over the sides of `b_i / (n |a_ij|)` times the volume of side `i`, whose coordinate `j` is
-//! eliminated. Parameters that no inequality connects are measured apart.
+//! eliminated. Groups of parameters without common inequalities are measured separately.
 
 use std::ops::ControlFlow;
 
@@ -13,10 +13,10 @@ use elbowroom_plan::ParameterId;
 
 use super::{Piece, Region, RegionRow};
 
-/// What a region has inside a box, as products of parts of few parameters.
+/// Part of a region inside a box, as products of components with few parameters each.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Body {
-    /// For each piece, its components: its volume is the product of theirs.
+    /// The components of each piece; its volume is the product of theirs.
     pub pieces: Vec<Vec<Component>>,
 }
 
@@ -30,7 +30,7 @@ pub struct Component {
 }
 
 impl Region {
-    /// The smallest box around the region, by parameter. Infinite where nothing bounds it.
+    /// Returns the smallest box around the region, by parameter; infinite if unbounded.
     pub fn extent(&self, parameters: usize) -> Vec<Interval> {
         let mut extent: Vec<Option<Interval>> = vec![None; parameters];
         for piece in &self.pieces {
@@ -47,8 +47,8 @@ impl Region {
         extent.into_iter().map(found).collect()
     }
 
-    /// What the region has inside a frame, `[lower, upper]` of each parameter. Where a side belongs
-    /// to it does not matter for volumes, and is forgotten.
+    /// Returns the part of the region inside a frame, `[lower, upper]` of each parameter. The
+    /// distinction of open and closed sides does not matter for volumes, and is dropped.
     pub fn body(&self, frame: &[(Rational, Rational)]) -> Body {
         let pieces = self.pieces.iter().map(|piece| components(piece, frame));
         Body {
@@ -57,7 +57,7 @@ impl Region {
     }
 }
 
-/// The smallest interval around two.
+/// Returns the smallest interval around two.
 fn around(one: &Interval, two: &Interval) -> Interval {
     let lower = match (one.lower.value(), two.lower.value()) {
         (Some(a), Some(b)) => End::Closed(a.min(b).clone()),
@@ -70,7 +70,7 @@ fn around(one: &Interval, two: &Interval) -> Interval {
     Interval { lower, upper }
 }
 
-/// How far each parameter reaches in a piece.
+/// Linear program for the range of each parameter in a piece.
 struct Extremes {
     simplex: Simplex,
     variables: Vec<VariableId>,
@@ -107,7 +107,7 @@ impl Extremes {
     }
 }
 
-/// The parameters of a piece in groups that share no inequality.
+/// Splits the parameters of a piece into groups without common inequalities.
 fn components(piece: &Piece, frame: &[(Rational, Rational)]) -> Vec<Component> {
     let mut group: Vec<usize> = (0..frame.len()).collect();
     for row in &piece.rows {
@@ -156,8 +156,8 @@ fn components(piece: &Piece, frame: &[(Rational, Rational)]) -> Vec<Component> {
 }
 
 impl Component {
-    /// The volume; `None` if it takes more than `most` sides of sides to measure, or `flow` says
-    /// no.
+    /// Returns the volume; `None` if the recursion visits more than `most` sides, or if `flow`
+    /// breaks.
     pub fn volume(
         &self,
         most: usize,
@@ -171,8 +171,8 @@ impl Component {
         volume(self.parameters.len(), self.rows.clone(), &mut go_on)
     }
 
-    /// The middle and half the widths of a box inside, large in relation to the frame; `None` if
-    /// the component has no inside.
+    /// Returns the center and half the widths of an inner box that is large relative to the frame;
+    /// `None` if the component has no interior.
     pub fn inscribed(&self) -> Option<(Vec<Rational>, Vec<Rational>)> {
         let count = self.parameters.len();
         let half = |place: usize| {
@@ -229,7 +229,7 @@ fn volume(dimension: usize, rows: Rows, go_on: &mut dyn FnMut() -> Option<()>) -
         if bound.is_zero() {
             continue;
         }
-        // One whose factor is one or minus one if there is one: numbers stay short.
+        // Prefers a factor of one or minus one, which keeps numbers short.
         let unit = factors
             .iter()
             .position(|factor| factor.abs() == Rational::ONE);
@@ -244,7 +244,7 @@ fn volume(dimension: usize, rows: Rows, go_on: &mut dyn FnMut() -> Option<()>) -
     Some(sum.checked_div(&count).unwrap_or_default())
 }
 
-/// The other rows on the side where this one is tight, without the coordinate `pivot`.
+/// Returns the other rows on the side where this one is tight, without the coordinate `pivot`.
 fn substituted(rows: &Rows, side: usize, pivot: usize) -> Rows {
     let (tight, level) = &rows[side];
     let mut others = Vec::with_capacity(rows.len());
@@ -264,8 +264,8 @@ fn substituted(rows: &Rows, side: usize, pivot: usize) -> Rows {
     others
 }
 
-/// The rows that the box which single coordinates are bounded by does not imply, each direction
-/// once; `None` if nothing satisfies them.
+/// Returns the rows that the bounds of single coordinates do not imply, each direction once; `None`
+/// if nothing satisfies them.
 fn needed(dimension: usize, rows: Rows) -> Option<Rows> {
     let mut kept: Rows = Vec::with_capacity(rows.len());
     for (mut factors, mut bound) in rows {
@@ -288,7 +288,7 @@ fn needed(dimension: usize, rows: Rows) -> Option<Rows> {
             None => kept.push((factors, bound)),
         }
     }
-    // Only single coordinates: their bounds are the sides of a box.
+    // The rows on single coordinates are the sides of a box.
     let mut sides: Vec<[Option<Rational>; 2]> = vec![[None, None]; dimension];
     for (factors, bound) in &kept {
         let mut nonzero = (0..dimension).filter(|place| !factors[*place].is_zero());
@@ -325,7 +325,7 @@ fn needed(dimension: usize, rows: Rows) -> Option<Rows> {
     Some(needed)
 }
 
-/// The length of an interval, whose factors are one or minus one; zero if it is empty.
+/// Returns the length of an interval with factors one or minus one; zero if it is empty.
 fn length(rows: &Rows) -> Rational {
     let (mut lower, mut upper): (Option<Rational>, Option<Rational>) = (None, None);
     for (factors, bound) in rows {
@@ -388,7 +388,7 @@ mod tests {
             let simplex = component(dimension, 4, &[(&ones[..dimension], 1)]);
             assert_eq!(volume(simplex), Rational::new(1, factorial), "{dimension}");
         }
-        // A cube whose corner is cut off, with a row that says nothing and one twice.
+        // A cube with a corner cut off, with a redundant row and a duplicate.
         let cut = component(3, 1, &[(&[1, 1, 1], 2), (&[2, 2, 2], 4), (&[1, 1, 0], 5)]);
         assert_eq!(volume(cut), Rational::new(5, 6));
         // Empty, and flat.
@@ -415,8 +415,8 @@ mod tests {
     }
 
     proptest! {
-        /// Cut along a line into two, a body has the volume of both together; and the count of the
-        /// small cubes inside it and around it bounds it.
+        /// The volume of a body is the sum of the volumes of its two parts along a line, and lies
+        /// between the counts of the small cubes inside it and around it.
         #[test]
         fn the_volume_is_that_of_its_parts_and_between_counts_of_cubes(
             rows in prop::collection::vec((prop::array::uniform3(-2_i64..3), -2_i64..9), 0..4),
@@ -432,7 +432,7 @@ mod tests {
             two.push((&negated, -cut.1));
             let mut part = |rows: &[(&[i64], i64)]| component(3, 4, rows).volume(1_000_000, on);
             let both = part(&one).expect("few sides") + part(&two).expect("few sides");
-            // All of it lies on both sides of a cut that says nothing.
+            // With a cut without coordinates, both parts may be the whole body.
             if cut.0 != [0, 0, 0] || cut.1 != 0 {
                 prop_assert_eq!(&whole, &both);
             }

@@ -1,11 +1,12 @@
-//! Schedules for all values in a box, as rules by which times follow from values.
+//! Schedules for all values in a box, as rules that compute times from values.
 //!
-//! A parameter that is the difference of two times, and by which constraints are only broken if it
-//! is too small, can grow: its later time, and all that bounds the latest time of this one, move by as
-//! much. Nothing is broken by that, because what does not move is only later than something else
-//! by less. The other way round, the later time and what has to come soon after it can move back. So from a
-//! schedule at the worst ends of these parameters follows one for all of their values. Of the other
-//! parameters both ends are looked at: between two schedules lie those for the values between.
+//! Let a parameter be the difference of two times, and let constraints only be violated if it is
+//! too small. It can grow: its later time, and all times that bound the latest value of this time,
+//! move by the same amount. That violates nothing, because times that do not move are only exceeded
+//! by less. In the other direction, the later time and the times that have to follow it soon can
+//! move back. So a schedule at the worst ends of these parameters yields one for all of their
+//! values. For the other parameters, both ends are examined: schedules for the values between them
+//! are interpolated.
 
 use std::collections::BTreeMap;
 
@@ -18,12 +19,12 @@ use crate::cycles::Role;
 use crate::proved::{ScheduleCase, TimeRule};
 use crate::reduction::{Edge, Reduction};
 
-/// The limit on parameters of which both ends are looked at.
+/// Limit on parameters with both ends examined.
 const MOST_SPLITS: usize = 6;
 
 impl Feasibility {
-    /// Rules for all values in a box, which has a schedule for each of them; `None` if there are
-    /// too many cases, or an end whose two sides both matter is infinite.
+    /// Returns rules for all values in a box with a schedule for each value; `None` if there are
+    /// too many cases, or if an end is infinite and both ends of its parameter matter.
     pub(crate) fn rules(
         &self,
         reduction: &Reduction,
@@ -46,7 +47,8 @@ impl Feasibility {
         Some(cases)
     }
 
-    /// Appends the cases of the parameters that are still to be split; the position of the first.
+    /// Appends the cases of the parameters that are still to be split. Returns the position of the
+    /// first.
     fn split(
         &self,
         reduction: &Reduction,
@@ -73,14 +75,14 @@ impl Feasibility {
         Some(place)
     }
 
-    /// A rule for all values of the parameters that are not fixed.
+    /// Computes a rule for all values of the parameters that are not fixed.
     fn rule(
         &self,
         reduction: &Reduction,
         envelope: &DecoupledEnvelope,
         fixed: &BTreeMap<ParameterId, Rational>,
     ) -> Option<Vec<TimeRule>> {
-        // What the schedule that all others follow from is for, and which end moves times.
+        // The values of the base schedule, and the ends whose parameters move times.
         let mut base = fixed.clone();
         let mut moving = Vec::new();
         for (index, role) in self.roles.iter().enumerate() {
@@ -124,7 +126,7 @@ impl Feasibility {
         for (parameter, side) in moving {
             let moves = self.moved_by(parameter, side);
             for (class, rule) in classes.iter_mut().enumerate() {
-                // Times count from time zero.
+                // Times are relative to time zero.
                 let factor = i64::from(moves[class]) - i64::from(moves[0]);
                 if factor != 0 {
                     let factor = Rational::from(factor);
@@ -142,8 +144,8 @@ impl Feasibility {
         Some(rules.collect())
     }
 
-    /// Of each class whether it moves with a parameter that is a difference of times: as its value
-    /// moves away from that end.
+    /// Returns, for each class, `true` if it moves with a parameter that is a difference of times,
+    /// as its value moves away from that end.
     fn moved_by(&self, parameter: ParameterId, side: Side) -> Vec<bool> {
         let mut moves = vec![false; self.class_count];
         let is_own = |edge: &&Edge| edge.end.is_some_and(|end| end.parameter == parameter);
@@ -151,7 +153,7 @@ impl Feasibility {
             let mut own = self.edges().filter(is_own);
             own.find(|edge| edge.end.is_some_and(|end| end.side == wanted))
         };
-        // One that only bounds a difference from one side has nothing to move.
+        // A parameter that bounds a difference from one side only moves nothing.
         let (Some(most), Some(_)) = (own(Side::Upper), own(Side::Lower)) else {
             return moves;
         };

@@ -1,10 +1,10 @@
-//! The steps of the search, several at a time: [`Ahead`].
+//! Batched steps of the search: [`Ahead`].
 //!
-//! A box inside the envelope has all boxes inside it there, too. So a sequence of widenings that
-//! were all taken to be right is right if the last box is, and one check does for all of them.
-//! A box that is refused is refused for a reason that says something about others
-//! ([`Cut`](crate::Cut)): steps against which something is known need no check either. The steps are
-//! those that one check after the other leads to.
+//! If a box is inside the envelope, so are all boxes inside it. So a sequence of widenings that
+//! were assumed to succeed is correct if the last box is inside, and one check is enough for all of
+//! them. The reason that refuses a box also refuses others ([`Cut`](crate::Cut)), so steps that a
+//! known reason refuses need no check either. The resulting steps are those of one check after the
+//! other.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 
-/// So many cuts at once are taken for most of what there is to know.
+/// Number of cuts from one check from which they are assumed to be most of the relevant ones.
 const MANY: usize = 2;
 
 /// A search in progress.
@@ -32,18 +32,18 @@ pub(super) struct Ahead<'a> {
     plan: Arc<ParametrizedPlan>,
     settings: &'a Settings,
     frontier: Frontier,
-    /// Known to be inside the envelope.
+    /// Box that is known to be inside the envelope.
     envelope: DecoupledEnvelope,
     known: Known,
-    /// The number of boxes decided about, the first one included.
+    /// The number of decided boxes, including the first one.
     checks: usize,
-    /// The number of boxes of which nothing can be told.
+    /// Number of undecided boxes.
     undecided: usize,
-    /// How many steps to take before the next check.
+    /// Number of steps to take before the next check.
     length: usize,
-    /// What is known beforehand of how far ends can go, where the oracle is not asked.
+    /// Known limits on the ends, used instead of the oracle's if present.
     bounds: Option<OwnBounds>,
-    /// What is made of conflicts that grow, if they are to be divided.
+    /// Division of growing conflicts, if enabled.
     pieces: Option<Pieces>,
 }
 
@@ -51,11 +51,11 @@ pub(super) struct Ahead<'a> {
 struct Step {
     /// The end that was moved, if one was.
     moved: Option<(BoxEnd, Reach)>,
-    /// The number of boxes decided about by then.
+    /// The number of decided boxes so far.
     checks: usize,
 }
 
-/// How far an end reaches; `None` is infinitely far.
+/// Reach of an end; `None` is infinitely far.
 #[derive(Clone)]
 struct Reach(Option<Rational>);
 
@@ -65,12 +65,12 @@ struct Leap {
     envelope: DecoupledEnvelope,
     steps: Vec<Step>,
     checks: usize,
-    /// Why there are no more steps.
+    /// Reason why there are no more steps.
     end: Option<StopReason>,
 }
 
 impl<'a> Ahead<'a> {
-    /// From the box of the nominal values.
+    /// Creates a search from the box of the nominal values.
     pub(super) fn new(
         oracle: &'a mut Oracle,
         settings: &'a Settings,
@@ -78,8 +78,8 @@ impl<'a> Ahead<'a> {
         envelope: DecoupledEnvelope,
     ) -> Self {
         Self {
-            // Where little is in the way, a check for each power of two would be most of the work; where
-            // much is, what a long leap comes up against has to be found out anyway.
+            // If there are few obstacles, checks at each power of two would be most of the work. If
+            // there are many, the obstacles of a long leap have to be found anyway.
             length: oracle.plan().parameters.len().max(1),
             plan: Arc::clone(oracle.plan()),
             oracle,
@@ -94,13 +94,14 @@ impl<'a> Ahead<'a> {
         }
     }
 
-    /// What stands against the box that the search begins with.
+    /// Checks the initial box, and returns the objection to it, if any.
     pub(super) fn start(&mut self) -> Result<Option<Objection>, Refusal> {
         self.oracle.start(&self.envelope)
     }
 
-    /// Takes all steps that there are before anything is checked. That little is in the way is seen at
-    /// once so; where something is, nothing has happened. Whether anything is left to do.
+    /// Takes all steps before the first check. If there are few obstacles, that succeeds at once.
+    /// Otherwise the steps are discarded, and the result is `None`. Returns the reason why the
+    /// search ended.
     pub(super) fn run_at_once(
         &mut self,
         on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
@@ -122,18 +123,18 @@ impl<'a> Ahead<'a> {
         leap.end
     }
 
-    /// The number of boxes decided about.
+    /// Returns the number of decided boxes.
     pub(super) fn checks(&self) -> usize {
         self.checks
     }
 
-    /// The box. What was found out about others is left with the oracle.
+    /// Returns the box, and hands the knowledge about other boxes to the oracle.
     pub(super) fn finish(self) -> DecoupledEnvelope {
         self.oracle.remember(self.known);
         self.envelope
     }
 
-    /// Searches until nothing can be gained, or somebody wants no more.
+    /// Searches until nothing can be gained, a limit is reached, or the caller cancels.
     pub(super) fn run(
         &mut self,
         on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
@@ -154,8 +155,8 @@ impl<'a> Ahead<'a> {
                 }
                 Confirmed::No(cuts) => {
                     end = None;
-                    // What is known now may be most of what there is to know; where one thing comes up
-                    // after the other, it is found sooner in narrower boxes.
+                    // Several cuts are probably most of the relevant ones. Few cuts suggest that
+                    // one conflict hides the next, and these are found sooner in narrower boxes.
                     if cuts.len() < MANY {
                         self.length = (leap.steps.len() / 2).max(1);
                     }
@@ -179,7 +180,7 @@ impl<'a> Ahead<'a> {
         }
     }
 
-    /// The box after a leap is refused, and that is what is known now.
+    /// Discards a leap whose box was refused, and records the cuts.
     fn refused(&mut self, cuts: Vec<Cut>) {
         self.known.undo();
         if let Some(pieces) = &mut self.pieces {
@@ -192,7 +193,7 @@ impl<'a> Ahead<'a> {
         }
     }
 
-    /// Takes steps, each of which is right as far as anything is known.
+    /// Takes steps that nothing known refuses, without checks.
     fn leap(&mut self) -> Leap {
         let plan = Arc::clone(&self.plan);
         let mut leap = Leap {
@@ -230,7 +231,7 @@ impl<'a> Ahead<'a> {
         leap
     }
 
-    /// How far an end reaches after a step; `None` if it cannot be moved.
+    /// Returns the reach of an end after a step; `None` if it cannot be moved.
     fn reach(
         &mut self,
         leap: &mut Leap,
@@ -255,7 +256,7 @@ impl<'a> Ahead<'a> {
         Some(Reach(Some(reach)))
     }
 
-    /// Whether the box with that end moved is known not to be inside.
+    /// Returns `true` if the box with that end moved is known to be refused.
     fn is_refused(&self, end: BoxEnd, from: &Rational, to: Option<&Rational>) -> bool {
         let is_too_far = match &self.bounds {
             Some(bounds) => bounds.exclude(end, to),
@@ -264,8 +265,8 @@ impl<'a> Ahead<'a> {
         is_too_far || self.known.refuses(end, from, to)
     }
 
-    /// Whether the box after these steps is inside the envelope; if not, what that says about
-    /// others.
+    /// Checks the box after these steps. If it is not inside the envelope, the result contains cuts
+    /// that apply to other boxes.
     fn confirmed(&mut self, leap: &Leap) -> Confirmed {
         let moved = leap.steps.iter().filter(|step| step.moved.is_some());
         let answer = match moved.count() {
@@ -279,7 +280,7 @@ impl<'a> Ahead<'a> {
         }
     }
 
-    /// Tells of the steps, which have been found right, one by one.
+    /// Reports the confirmed steps one by one.
     fn tell(
         &mut self,
         leap: &Leap,
@@ -299,7 +300,7 @@ impl<'a> Ahead<'a> {
                 None => on_step(None),
             };
             if flow.is_break() {
-                // What comes after is not wanted any more.
+                // The remaining steps are discarded.
                 self.oracle.narrow(&self.envelope);
                 return flow;
             }
@@ -307,7 +308,7 @@ impl<'a> Ahead<'a> {
         ControlFlow::Continue(())
     }
 
-    /// One step by one check.
+    /// Takes one step with a check of its own.
     fn step(
         &mut self,
         on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
@@ -345,7 +346,7 @@ impl<'a> Ahead<'a> {
         }))
     }
 
-    /// Whether the box with an end moved out is inside the envelope; if nothing can be told, it
+    /// Returns `true` if the box with an end moved out is inside the envelope. An undecided box
     /// counts as refused.
     fn is_inside(&mut self, end: BoxEnd, reach: Option<Rational>) -> bool {
         self.checks += 1;
@@ -354,13 +355,13 @@ impl<'a> Ahead<'a> {
         answer.unwrap_or(false)
     }
 
-    /// Whether there have been as many checks as were wanted.
+    /// Returns `true` if the limit on checks is reached.
     fn is_enough(&self, checks: usize) -> bool {
         self.settings.most_checks.is_some_and(|most| checks >= most)
     }
 
-    /// Whether an end is so far out that it need not go further. Of a fixed schedule, any limit on a
-    /// duration may be asked, but not none.
+    /// Returns `true` if an end is so far out that it need not move further. A fixed schedule may
+    /// tolerate any finite duration, but not an infinite one.
     fn is_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
         reach.is_none_or(|reach| *reach > farthest(self.plan.parameter(end.parameter)))
     }
@@ -369,11 +370,11 @@ impl<'a> Ahead<'a> {
 /// The outcome of a check of several steps.
 enum Confirmed {
     Yes,
-    /// What is known now about other boxes, if anything.
+    /// Refused, with cuts that apply to other boxes, if any.
     No(Vec<Cut>),
 }
 
-/// How far an end would reach after a step; `None` if that is outside its parameter's range.
+/// Returns the reach of an end after a step; `None` if it is outside its parameter's range.
 fn wanted(from: &Rational, end: BoxEnd, range: &Interval, step: &Rational) -> Option<Rational> {
     let reach = from + step;
     range.contains(&end.side.at_reach(&reach)).then_some(reach)

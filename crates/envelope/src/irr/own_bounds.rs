@@ -1,14 +1,14 @@
-//! Bounds on the very differences that parameters are.
+//! Bounds on the differences that parameters are.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, BoxEnd, Constraint, NodeId, ParameterId, ParametrizedPlan, Side};
 
-/// How far out the ends of parameters may lie at most because of single constraints of the plan.
+/// Limits on the reach of ends from single constraints of the plan.
 ///
-/// A parameter that is the difference of two times cannot be where another bound on this difference forbids it. This
-/// is read off the plan in no time, and where nothing else is in the way, it is all that has to be known.
+/// If a parameter is the difference of two times, other bounds on this difference limit it. These
+/// limits are quick to compute, and often they are the only ones.
 pub(super) struct OwnBounds {
-    /// By parameter: how far its lower and its upper end can reach.
+    /// By parameter: the greatest reach of its lower and its upper end.
     most: Vec<[Option<Rational>; 2]>,
 }
 
@@ -38,7 +38,7 @@ impl OwnBounds {
         bounds
     }
 
-    /// The end can reach no further.
+    /// Limits the reach of an end.
     fn add(&mut self, parameter: ParameterId, side: Side, reach: Option<Rational>) {
         let Some(reach) = reach else { return };
         let most = &mut self.most[parameter.index()][side.index()];
@@ -47,7 +47,7 @@ impl OwnBounds {
         }
     }
 
-    /// Whether no value so far out has a schedule; `None` is infinitely far.
+    /// Returns `true` if no value at that reach has a schedule; `None` is infinitely far.
     pub(super) fn exclude(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
         let most = &self.most[end.parameter.index()][end.side.index()];
         most.as_ref()
@@ -55,14 +55,15 @@ impl OwnBounds {
     }
 }
 
-/// The parameter that a constraint says to be the difference of its nodes' times.
+/// Returns the parameter that a constraint defines as the difference of its nodes' times.
 fn difference(constraint: &Constraint) -> Option<(NodeId, NodeId, ParameterId)> {
     let parameter = constraint.lower.parameter()?;
     let is_whole = constraint.upper.parameter() == Some(parameter);
     is_whole.then_some((constraint.from, constraint.to, parameter))
 }
 
-/// The parameters that are the difference of these times, of those that each node is the later one of.
+/// Returns the parameters that are the difference of these times. `differences` lists, for each
+/// node, those with the node as the later one.
 fn with_ends(
     differences: &[Vec<(NodeId, ParameterId)>],
     (from, to): (NodeId, NodeId),

@@ -1,9 +1,10 @@
-//! From long conflicts to conditions on few ends each: [`Pieces`].
+//! Division of long conflicts into conditions on few ends each: [`Pieces`].
 //!
-//! Where one window follows the other, a plan may be late by a little more in each of them, until it is too late in
-//! one. Of these conflicts there are as many as pairs of windows, and the longer they are, the less each of them says.
-//! They all hold where each piece, from one window to the next, keeps to a share of the room that there is. That asks
-//! for more than need be, so the box may become a little smaller, and it is found after a few looks.
+//! If windows follow each other, a plan may be late by a little more in each of them, until it is
+//! too late in one. There are as many such conflicts as pairs of windows, and the longer they are,
+//! the weaker each of them is. They all hold if each piece, from one window to the next, uses at
+//! most a share of the available slack. That is more than necessary, so the box may become a little
+//! smaller, but it is found after a few checks.
 
 use std::collections::BTreeSet;
 
@@ -13,19 +14,20 @@ use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, NodeId, Origin, Parametri
 use crate::cut::{Cut, Ends, Ground, Length};
 use crate::row::Row;
 
-/// A conflict of more ends than these is long.
+/// Number of ends above which a conflict counts as long.
 const LONG: usize = 10;
 
-/// The points of a plan at which conflicts are divided, and what has come of that so far.
+/// State of the division of conflicts: the points where they are divided, and the known pieces.
 pub(super) struct Pieces {
     bounds: Option<Bounds>,
-    /// How many parameters looks that come across long conflicts are still to go through before these are divided.
+    /// Work limit that is left, in parameters, for checks with long conflicts before these are
+    /// divided.
     left: usize,
-    /// By their ends: the pieces that are known.
+    /// The known pieces, by their ends.
     known: BTreeSet<Vec<Vec<BoxEnd>>>,
 }
 
-/// How early and how late points are, as single constraints say.
+/// Earliest and latest times of points by single constraints.
 struct Bounds {
     least: Times,
     most: Times,
@@ -35,7 +37,7 @@ struct Bounds {
 type Times = Vec<Option<Rational>>;
 
 impl Pieces {
-    /// Conflicts are divided after looks have gone through so many parameters.
+    /// Divides conflicts after checks with long conflicts have processed `left` parameters.
     pub(super) fn after(left: usize) -> Self {
         Self {
             bounds: None,
@@ -44,8 +46,9 @@ impl Pieces {
         }
     }
 
-    /// Conditions that hold in the box, which is inside the envelope; where they go on to hold, the long ones among these
-    /// conflicts do not come up. None as long as it does not seem that more and more of them will.
+    /// Returns conditions that hold in `envelope`, which is inside the robustness envelope. Boxes
+    /// that satisfy them do not have the long ones among these conflicts. Returns none until the
+    /// work limit is used up.
     pub(super) fn of(
         &mut self,
         plan: &ParametrizedPlan,
@@ -64,7 +67,7 @@ impl Pieces {
         let bounds = self.bounds.get_or_insert_with(|| Bounds::of(plan));
         let mut rows = Vec::new();
         for cut in long {
-            // The others are about waits, and say little.
+            // The others involve waits, and are weak.
             let Ground::Cycle(origins) = &cut.ground else {
                 continue;
             };
@@ -111,7 +114,7 @@ impl Bounds {
         bounds
     }
 
-    /// The node comes at this time or later (or earlier).
+    /// Adds the bound that the node comes at this time or later (or earlier).
     fn add(&mut self, node: NodeId, is_least: bool, time: Rational) {
         let side = if is_least {
             &mut self.least
@@ -124,8 +127,8 @@ impl Bounds {
         }
     }
 
-    /// A conflict divided at the points that have a bound on the side on which more of them have one; `None` if it is not
-    /// about fixed times.
+    /// Divides a conflict at the points that have a bound, on the side with more such points.
+    /// `None` if no point has a fixed time.
     fn divided(
         &self,
         plan: &ParametrizedPlan,
@@ -148,7 +151,7 @@ impl Bounds {
         };
         let is_least = count(&self.least) >= count(&self.most);
         let side = if is_least { &self.least } else { &self.most };
-        // How much longer each piece is than the time between its bounds, but for the sign.
+        // Each piece is the amount by which it exceeds the time between its bounds, up to the sign.
         let mut pieces = Vec::new();
         let mut piece = Ends::constant(time(side, steps[first].1)?);
         for offset in 1..=steps.len() {
@@ -162,8 +165,8 @@ impl Bounds {
         if is_least {
             pieces.reverse();
         }
-        // Where a piece is longer, the next one begins so much too late (or the one before has to end so much too early): in
-        // the box, and so it may remain.
+        // If a piece is too long, the next one begins too late by the same amount (or the previous
+        // one has to end too early). That is so in the current box, and may remain so.
         let mut late = Rational::ZERO;
         let mut rows = Vec::with_capacity(pieces.len());
         for mut piece in pieces {
@@ -176,7 +179,7 @@ impl Bounds {
     }
 }
 
-/// How long a step of a cycle is, and where it leads.
+/// Returns the length of a step of a cycle, and its target.
 fn step(plan: &ParametrizedPlan, origin: Origin) -> Option<(Length, NodeId)> {
     let (index, side) = match origin {
         Origin::Beginning => return Some((Length::Fixed(Rational::ZERO), NodeId::ZERO)),

@@ -1,9 +1,9 @@
 //! From a long conflict to shorter ones: [`Shortcuts`].
 //!
-//! Windows and deadlines bind time points to the beginning. A cycle along many of them is one conflict, the most
-//! violated one, and says little about narrower boxes: when these are looked at, a slightly shorter cycle is in
-//! the way, and so on. Cut at the points that are bound to the beginning, it falls into short ones, which have fewer ends
-//! and often imply it.
+//! Windows and deadlines bind time points to the beginning. A cycle along many of them is one
+//! conflict, the most violated one, and says little about narrower boxes: these are refused by
+//! slightly shorter cycles, one after the other. Divided at the points that are bound to the
+//! beginning, the cycle yields short ones, which have fewer ends and often imply it.
 
 use std::ops::RangeInclusive;
 
@@ -15,25 +15,25 @@ use elbowroom_stn::{ConstraintId, NodeId};
 use super::{Reader, steps, whole};
 use crate::cut::Cut;
 
-/// How many steps a cycle may go back from the point at which it is cut.
+/// Limit on the steps from the point where a cycle is divided back to its beginning.
 const FARTHEST: usize = 64;
 
-/// A bound on the difference of a node and the beginning, and what it comes from.
+/// Bound on the difference of a node and the beginning, with the parts that imply it.
 #[derive(Clone)]
 struct Chord {
     length: Rational,
     parts: Vec<Part>,
 }
 
-/// The bounds between nodes and the beginning, by way of no other node that the network leaves open.
+/// Bounds between nodes and the beginning, through no other node whose time is open.
 pub(super) struct Shortcuts {
-    /// By node: at most so long after the beginning.
+    /// By node: the greatest distance after the beginning.
     after: Vec<Option<Chord>>,
-    /// At most minus so long before it.
+    /// By node: the negated least distance after the beginning.
     before: Vec<Option<Chord>>,
 }
 
-/// A step of a cycle: how long it is, and what it says.
+/// Step of a cycle, with its length and target.
 struct Step {
     to: NodeId,
     part: Part,
@@ -81,8 +81,9 @@ impl Shortcuts {
         all
     }
 
-    /// The shortest cycles that are left when a conflict is cut at nodes that are bound to the beginning, as far as they
-    /// leave no schedule at all; none if it is one of these itself.
+    /// Returns the cuts of the shortest cycles that result from dividing a conflict at nodes that
+    /// are bound to the beginning, provided that they exclude all schedules; none if the conflict
+    /// is one of these itself.
     pub(super) fn of(
         &self,
         reader: &Reader<'_>,
@@ -94,7 +95,7 @@ impl Shortcuts {
         };
         let mut found = Vec::new();
         let mut ranges = Vec::new();
-        // Where the last one that was found begins: what begins there or before includes it.
+        // The beginning of the last range found; ranges that begin there or before include it.
         let mut beginning = 0;
         for end in 0..steps.len() {
             let Some(back) = &self.before[steps[end].to.index()] else {
@@ -120,9 +121,9 @@ impl Shortcuts {
         found
     }
 
-    /// What cycles say that go along two of these ranges one after the other, along four of them, eight and so on. A longer
-    /// cycle often leaves a little less room for each step than a shorter one; without these, a cycle along one range more
-    /// would come up each time that a box is looked at.
+    /// Returns the cuts of cycles along two consecutive ranges, four, eight and so on. A longer
+    /// cycle often leaves a little less slack for each step than a shorter one. Without these cuts,
+    /// each check would find a cycle with one range more.
     fn joined(
         &self,
         reader: &Reader<'_>,
@@ -147,7 +148,7 @@ impl Shortcuts {
         found
     }
 
-    /// What the cycle says that goes from the beginning along these steps, and back.
+    /// Returns the cut of the cycle from the beginning along these steps, and back.
     fn cut_out(
         &self,
         reader: &Reader<'_>,
@@ -163,7 +164,7 @@ impl Shortcuts {
     }
 }
 
-/// The node at which a step of a cycle begins.
+/// Returns the node at which a step of a cycle begins.
 fn node_before(steps: &[Step], index: usize) -> NodeId {
     steps[index.checked_sub(1).unwrap_or(steps.len() - 1)].to
 }
@@ -178,7 +179,8 @@ fn keep_least(chords: &mut [Option<Chord>], node: NodeId, chord: Chord) {
     }
 }
 
-/// The nodes whose distance from the beginning is fixed: the bounds that fix it from both sides.
+/// Returns the nodes whose distance from the beginning is fixed, with the bounds that fix it from
+/// both sides.
 fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<(NodeId, Chord, Chord)> {
     let network = &reader.network.network;
     let requirements = network.requirements();
@@ -211,7 +213,7 @@ fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<(NodeId, Chord, Chord
     fixed.chain(links).collect()
 }
 
-/// The steps of a cycle one after the other; `None` if one of them is endless.
+/// Returns the steps of a cycle with their lengths; `None` if one of them is infinite.
 fn measured(reader: &Reader<'_>, cycle: &[Way], envelope: &DecoupledEnvelope) -> Option<Vec<Step>> {
     let network = &reader.network.network;
     let step = |part: &Part| {

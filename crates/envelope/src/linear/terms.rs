@@ -1,12 +1,12 @@
-//! Coefficients by what they are multiplied with.
+//! Sparse coefficients of a linear expression.
 
 use elbowroom_num::Rational;
 
-/// Coefficients, none zero, in the order of what they belong to.
+/// Coefficients with their keys, sorted by key; none is zero.
 ///
-/// Nearly all expressions of a plan have one or two, and a long plan has a hundred thousand
-/// expressions. So they stand in one sorted list, which is no larger than it has to be: a search
-/// tree has room for eleven from the beginning.
+/// Nearly all expressions of a plan have one or two coefficients, and a long plan has a hundred
+/// thousand expressions. So they are stored in one sorted list of exactly the needed size; a B-tree
+/// would allocate space for eleven at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Terms<K>(Vec<(K, Rational)>);
 
@@ -17,33 +17,33 @@ impl<K> Default for Terms<K> {
 }
 
 impl<K: Copy + Ord> Terms<K> {
-    /// One coefficient, which is not zero.
+    /// Creates a single coefficient, which must not be zero.
     pub(crate) fn one(key: K, coefficient: Rational) -> Self {
         debug_assert!(!coefficient.is_zero(), "no coefficient is zero");
         Self(vec![(key, coefficient)])
     }
 
-    /// How many there are.
+    /// Returns the number of coefficients.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there is none.
+    /// Returns `true` if there are no coefficients.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The coefficient, if there is one.
+    /// Returns the coefficient, if there is one.
     pub fn get(&self, key: K) -> Option<&Rational> {
         self.place(key).ok().map(|place| &self.0[place].1)
     }
 
-    /// What they belong to, in order.
+    /// Returns the keys, in order.
     pub fn keys(&self) -> impl Iterator<Item = K> + '_ {
         self.0.iter().map(|(key, _)| *key)
     }
 
-    /// All, in order.
+    /// Returns all keys with their coefficients, in order.
     pub fn iter(&self) -> std::slice::Iter<'_, (K, Rational)> {
         self.0.iter()
     }
@@ -70,18 +70,19 @@ impl<K: Copy + Ord> Terms<K> {
         }
     }
 
-    /// Takes a coefficient out.
+    /// Removes a coefficient and returns it.
     pub(crate) fn remove(&mut self, key: K) -> Option<Rational> {
         let place = self.place(key).ok()?;
         Some(self.0.remove(place).1)
     }
 
-    /// Takes all out.
+    /// Removes all coefficients.
     pub(crate) fn clear(&mut self) {
         self.0.clear();
     }
 
-    /// Where it stands, or would stand. Most are added behind all others.
+    /// Returns the position of a key, or the position to insert it at. Most keys are appended at
+    /// the end.
     fn place(&self, key: K) -> Result<usize, usize> {
         if self.0.last().is_none_or(|(last, _)| *last < key) {
             return Err(self.0.len());
@@ -90,7 +91,7 @@ impl<K: Copy + Ord> Terms<K> {
     }
 }
 
-/// From coefficients in the order of what they belong to, none zero.
+/// Collects coefficients that are sorted by key, none zero.
 impl<K: Copy + Ord> FromIterator<(K, Rational)> for Terms<K> {
     fn from_iter<I: IntoIterator<Item = (K, Rational)>>(terms: I) -> Self {
         let mut all = Vec::from_iter(terms);

@@ -1,4 +1,4 @@
-//! The symbolic run.
+//! Symbolic execution of a plan.
 
 mod changes;
 mod guards;
@@ -29,17 +29,17 @@ use elbowroom_plan::{
     InstanceId, Node, NodeId, ParameterKind, ParametrizedPlan, Schedule, Valuation,
 };
 
-/// How many combinations of outcomes of conditional effects are followed.
+/// Limit on combinations of outcomes of conditional effects.
 const MOST_RUNS: usize = 256;
 
 impl Obligations {
-    /// All obligations of a plan.
+    /// Compiles all obligations of a plan.
     ///
-    /// `nominal` gives each node its time in some schedule at the values `around`;
-    /// `substitution` the parameters that are differences of times.
+    /// `nominal` gives each node its time in some schedule at the values `around`; `substitution`
+    /// contains the parameters that are differences of times.
     ///
     /// # Errors
-    /// When something in the plan is beyond exact linear reasoning; the message names it.
+    /// If something in the plan is beyond exact linear reasoning; the message names it.
     pub fn compile(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -85,20 +85,20 @@ impl Obligations {
                 });
             }
         }
-        // They are kept as long as the plan is.
+        // The obligations live as long as the plan.
         obligations.direct.shrink_to_fit();
         obligations.over_all.shrink_to_fit();
         Ok(obligations)
     }
 }
 
-/// One combination of outcomes of conditional effects, followed up to a position.
+/// One combination of outcomes of conditional effects, executed up to a position.
 #[derive(Clone)]
 struct Run {
     position: usize,
     timeline: Timeline,
     outcomes: BTreeMap<GuardId, bool>,
-    /// The events that have happened without a plan.
+    /// The events that have happened.
     occurred: Vec<Occurrence>,
 }
 
@@ -117,7 +117,7 @@ struct Compiler<'a> {
     /// The actions whose durations are open.
     open: BTreeSet<InstanceId>,
     substitution: Arc<Substitution>,
-    /// What goes on without a plan, if anything does.
+    /// Processes, events and constraints on all states, if there are any.
     nature: Option<Nature>,
 }
 
@@ -140,7 +140,7 @@ impl Compiler<'_> {
         Ok(Progress::Finished)
     }
 
-    /// The requirements and changes of the happening at a node.
+    /// Adds the requirements of the happening at a node, and applies its changes.
     fn happen(
         &self,
         run: &mut Run,
@@ -191,7 +191,8 @@ impl Compiler<'_> {
                 let since = self.plan.plan.start(id);
                 let first = body.start.effects.len() + body.end.effects.len();
                 // Values on arrival include the drift up to now, so it ends after the effects are
-                // read; increases commute with it, assignments begin from zero drift either way.
+                // read. Increases commute with it, and assignments begin from zero drift in either
+                // case.
                 let read = self.read_changes(run, node, effects.into_iter(), obligations)?;
                 for (index, effect) in body.continuous.iter().enumerate() {
                     if run.outcomes.get(&(id, first + index, GuardPart::AtStart)) != Some(&false) {
@@ -205,7 +206,7 @@ impl Compiler<'_> {
         }
     }
 
-    /// The conditions of a happening.
+    /// Adds the conditions of a happening.
     fn require(
         &self,
         run: &Run,
@@ -226,7 +227,7 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// The duration constraints read at the start or at the end.
+    /// Adds the duration constraints read at the start or at the end.
     fn require_duration(
         &self,
         run: &Run,
@@ -275,7 +276,7 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// The obligations that need the whole timeline: over-all conditions and goal.
+    /// Adds the obligations that need the whole timeline: over-all conditions and goal.
     fn finish(&self, run: Run, obligations: &mut Obligations) -> Result<(), Refusal> {
         let plan = &self.plan.plan;
         let all = Arc::new(Happenings {
@@ -290,7 +291,7 @@ impl Compiler<'_> {
                 continue;
             };
             for condition in body.over_all.conjuncts() {
-                // Those have been looked at on the way.
+                // Conditions that depend on nature were compiled during the symbolic run.
                 if self
                     .nature
                     .as_ref()
@@ -336,7 +337,7 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// Reading everything recorded so far, at a node.
+    /// Returns the context for evaluation at a node, after everything recorded so far.
     fn reading<'r>(&'r self, timeline: &'r Timeline, node: NodeId) -> Reading<'r> {
         let plan = &self.plan.plan;
         let (action, place) = match plan.nodes[node.index()] {

@@ -7,25 +7,25 @@ use super::timeline::Reading;
 use super::{Inequality, Refusal};
 use crate::linear::Linear;
 
-/// Alternatives, each a conjunction: none is never, an empty one is always.
+/// Disjunction of conjunctions: the empty disjunction is false, an empty conjunction is true.
 pub(crate) type Alternatives = Vec<Vec<Inequality>>;
 
-/// How many alternatives a condition may unfold into.
+/// Limit on the alternatives of a condition.
 const MOST_ALTERNATIVES: usize = 4096;
 
-/// The truth value that is asked of a condition.
+/// Wanted truth value of a condition.
 ///
-/// A comparison with an undefined number says nothing: it is neither true nor false, and so are
-/// the conditions around it, unless their other parts decide.
+/// A comparison with an undefined number is neither true nor false (silent), and so are the
+/// conditions around it, unless their other parts decide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wanted {
     /// It is true.
     True,
     /// It is false.
     False,
-    /// It is false or says nothing: then it is broken where it is needed.
+    /// It is false or silent: a required condition is then violated.
     NotTrue,
-    /// It is true or says nothing.
+    /// It is true or silent.
     NotFalse,
 }
 
@@ -45,7 +45,7 @@ impl Wanted {
 }
 
 impl Reading<'_> {
-    /// The alternatives in which the condition is as wanted.
+    /// Returns the alternatives that give the condition the wanted truth value.
     pub(crate) fn alternatives(
         &self,
         condition: &Condition,
@@ -64,7 +64,7 @@ impl Reading<'_> {
         }
     }
 
-    /// The alternatives in which the condition says nothing.
+    /// Returns the alternatives that make the condition neither true nor false.
     pub(crate) fn silent(&self, condition: &Condition) -> Result<Alternatives, Refusal> {
         let mut expressions = Vec::new();
         condition.visit_expressions(&mut |expression| expressions.push(expression.clone()));
@@ -136,7 +136,7 @@ impl Reading<'_> {
     }
 }
 
-/// The alternatives in which `left comparison right` is true (`wanted`) or false.
+/// Returns the alternatives that make `left comparison right` true (`wanted`) or false.
 pub(crate) fn compared(
     comparison: Comparison,
     left: &Linear,
@@ -166,7 +166,7 @@ pub(crate) fn compared(
     alternatives.into_iter().filter_map(settled).collect()
 }
 
-/// Drops inequalities between constants that hold; `None` if one does not.
+/// Drops inequalities between constants that hold. Returns `None` if one does not.
 pub(crate) fn settled(mut conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
     let is_broken = |inequality: &Inequality| {
         let value = inequality.expression.as_constant();

@@ -1,4 +1,4 @@
-//! The goal holds after all actions and all timed initials.
+//! The goal, which must hold after all actions and all timed initials.
 
 use std::cell::OnceCell;
 
@@ -10,10 +10,10 @@ use super::timeline::{Reading, Timeline};
 use super::{BadCase, Refusal, Substitution};
 use elbowroom_plan::NodeId;
 
-/// How one conjunct of the goal can be violated.
+/// Returns the ways to violate one conjunct of the goal.
 ///
-/// Everything has happened by then. Which change of a fact or fluent was the last is decided,
-/// because changes that do not commute interfere, and so keep their order
+/// All happenings are over by then. The last change of a fact or fluent is known, because changes
+/// that do not commute interfere, and so keep their order
 /// ([`Requirement::Separation`](super::Requirement::Separation)).
 pub(super) fn goal_cases(
     task: &Task,
@@ -25,7 +25,7 @@ pub(super) fn goal_cases(
         task,
         timeline,
         cut: None,
-        // Nothing drifts any more, so the moment of reading does not matter.
+        // There are no drifts any more, so the moment of reading does not matter.
         moment: NodeId::ZERO,
         action: None,
         substitution,

@@ -1,4 +1,4 @@
-//! Over-all conditions: what must hold at every moment of an action's open interval.
+//! Over-all conditions, which must hold at every moment of an action's open interval.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -14,11 +14,12 @@ use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Inequality, Refusal, Substitution};
 use elbowroom_plan::{InstanceId, NodeId, StnPlan};
 
-/// A numeric or compound over-all condition of one action.
+/// Numeric or compound over-all condition of one action.
 ///
-/// It is violated if there is a moment strictly between `start` and `end`, with some of
-/// [its events](Self::events) up to it and the others after it, at which the condition is false. Which events
-/// come before the moment depends on the schedule; [`OverAll::cases`] gives the inequalities for one choice.
+/// It is violated if there is a moment strictly between `start` and `end`, with some of [its
+/// events](Self::events) up to it and the others after it, at which the condition is false. The
+/// events before the moment depend on the schedule; [`OverAll::cases`] gives the inequalities for
+/// one choice.
 #[derive(Clone, Debug)]
 pub struct OverAll {
     /// The action.
@@ -29,28 +30,28 @@ pub struct OverAll {
     pub end: NodeId,
     /// The condition, one conjunct.
     pub condition: Condition,
-    /// Under which outcomes of conditional effects all this applies.
+    /// Outcomes of conditional effects that the condition applies to.
     pub assumptions: Vec<Inequality>,
-    /// Stands for the moment in differences and inequalities.
+    /// Node that represents the moment in differences and inequalities.
     pub moment: NodeId,
-    /// What the condition reads.
+    /// Facts that the condition reads.
     facts: Vec<FactId>,
     fluents: Vec<FluentId>,
     near: Near,
     all: Arc<Happenings>,
 }
 
-/// What is known of the places of a moment as long as the parameters' values are in their ranges, and all
-/// interfering happenings keep their order.
+/// Possible places of a moment among the events, provided that the parameters' values are in their
+/// ranges, and all interfering happenings keep their order.
 #[derive(Clone, Debug)]
 struct Near {
     /// The events that can be on either side of it, in nominal order.
     events: Vec<NodeId>,
-    /// These, and those that have happened.
+    /// The changes by these events, and by past ones.
     timeline: Timeline,
 }
 
-/// All that happens in a plan.
+/// All happenings of a plan.
 #[derive(Debug)]
 pub(super) struct Happenings {
     pub(super) timeline: Timeline,
@@ -94,9 +95,9 @@ impl OverAll {
         }
     }
 
-    /// The nodes that change what the condition reads, and may come before the moment or after it, in nominal
-    /// order. Where interfering happenings keep their order, and the parameters' values are in their ranges, these
-    /// are few.
+    /// Returns the nodes that change what the condition reads, and may come before the moment or
+    /// after it, in nominal order. There are few of them if interfering happenings keep their
+    /// order, and the parameters' values are in their ranges.
     pub fn events(&self, is_in_ranges: bool) -> Cow<'_, [NodeId]> {
         if is_in_ranges {
             return Cow::Borrowed(&self.near.events);
@@ -114,11 +115,11 @@ impl OverAll {
         )
     }
 
-    /// The alternatives in which the condition is false at the moment, when exactly the events
-    /// for which `cut` is true have happened, of those that [may have](Self::events).
+    /// Returns the alternatives in which the condition is false at the moment. Of the
+    /// [events](Self::events), exactly those for which `cut` is true have happened by then.
     ///
     /// # Errors
-    /// When a value is not linear.
+    /// If a value is not linear.
     pub fn cases(
         &self,
         task: &Task,
@@ -146,12 +147,12 @@ impl OverAll {
     }
 }
 
-/// How an over-all condition on a single basic fact is violated: the fact is wrong from some
-/// event (or from the beginning) until all events that right it, and that time overlaps the
-/// action's open interval.
+/// Returns the ways to violate an over-all condition on a single basic fact: the fact is wrong from
+/// some event (or from the beginning) until the first event that corrects it, and that time
+/// overlaps the action's open interval.
 ///
-/// This is exact without any case split: events that make a fact true interfere with those that
-/// make it false, so each wrong event has a fixed set of righting events after it, and the first
+/// This is exact without any case split. Events that make a fact true interfere with those that
+/// make it false, so each wrong event has a fixed set of correcting events after it, and the first
 /// of these to happen ends the wrong time.
 pub(super) fn literal_cases(
     timeline: &Timeline,
@@ -188,7 +189,7 @@ pub(super) fn literal_cases(
             .take_while(|event| event.1 == wanted)
             .map(|event| event.0);
         let righting: Vec<NodeId> = righting.collect();
-        // Righted at the action's own start, or as it began to be wrong: never inside.
+        // Corrected at the action's own start, or as it became wrong, so never wrong inside.
         if righting
             .iter()
             .any(|&right| right == start || Some(right) == since)

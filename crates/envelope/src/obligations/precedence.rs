@@ -1,23 +1,23 @@
-//! Which nodes of a plan come first whatever the values: [`Precedence`].
+//! Order of nodes that is the same for all values: [`Precedence`].
 
 use std::collections::BTreeSet;
 
 use elbowroom_num::End;
 use elbowroom_plan::{Bound, NodeId, ParametrizedPlan, Schedule};
 
-/// The nodes that come no later than others in all schedules, for all values in the parameters'
-/// ranges: those from which bounds of at least zero lead there. There may be more of them.
+/// Nodes that come no later than others in all schedules, for all values in the parameters' ranges,
+/// by chains of bounds of at least zero. The relation may be incomplete.
 #[derive(Debug)]
 pub(super) struct Precedence {
     before: Vec<Vec<NodeId>>,
     after: Vec<Vec<NodeId>>,
-    /// The place of each node's time among all times of a schedule for values in the ranges, which keeps all
+    /// The rank of each node's time in a schedule for values in the ranges, which satisfies all
     /// these bounds.
     ranks: Vec<usize>,
 }
 
 impl Precedence {
-    /// That of a plan with this schedule, in which nodes come in this order.
+    /// Computes the relation of a plan with this schedule and the order of its nodes.
     pub(super) fn of(plan: &ParametrizedPlan, order: &[NodeId], schedule: &Schedule) -> Self {
         let count = plan.plan.nodes.len();
         let mut ranks = vec![0; count];
@@ -55,14 +55,14 @@ impl Precedence {
         precedence
     }
 
-    /// Nodes in the order of their times.
+    /// Sorts nodes by their times.
     pub(super) fn in_order(&self, nodes: BTreeSet<NodeId>) -> Vec<NodeId> {
         let mut nodes = Vec::from_iter(nodes);
         nodes.sort_by_key(|node| (self.ranks[node.index()], *node));
         nodes
     }
 
-    /// What is known of the moments inside an action.
+    /// Returns the nodes known to be before or after the moments inside an action.
     pub(super) fn around(&self, start: NodeId, end: NodeId) -> Around<'_> {
         let cone = |next, from: NodeId| Cone {
             next,
@@ -85,8 +85,8 @@ pub(super) enum Side {
     After,
 }
 
-/// What comes no later than the start of an action, and what no earlier than its end; looked for as far from
-/// these as is asked.
+/// Nodes that come no later than the start of an action, and nodes that come no earlier than its
+/// end. Computed lazily, as far as queries need.
 pub(super) struct Around<'a> {
     ranks: &'a [usize],
     start: NodeId,
@@ -95,7 +95,7 @@ pub(super) struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// The side that the node is on in every schedule, if bounds say so.
+    /// Returns the side that the node is on in every schedule, if bounds imply one.
     pub(super) fn side(&mut self, node: NodeId) -> Option<Side> {
         let ranks = self.ranks;
         let rank = ranks[node.index()];
@@ -121,17 +121,17 @@ impl Around<'_> {
         to_come.reached.contains(&node).then_some(Side::After)
     }
 
-    /// Whether the node comes no later than the action's start in the schedule that nodes are ordered by.
+    /// Returns `true` if the node comes no later than the action's start in the reference schedule.
     pub(super) fn is_early(&self, node: NodeId) -> bool {
         self.ranks[node.index()] <= self.ranks[self.start.index()]
     }
 }
 
-/// The nodes that bounds lead to from one node, all in one direction of time.
+/// Nodes that are reachable by bounds from one node, in one direction of time.
 struct Cone<'a> {
     next: &'a [Vec<NodeId>],
     reached: BTreeSet<NodeId>,
-    /// Those reached that were not followed yet, by rank.
+    /// Reached nodes that have not been expanded yet, by rank.
     open: BTreeSet<(usize, NodeId)>,
 }
 

@@ -1,4 +1,4 @@
-//! Interfering happenings must be ε apart.
+//! Separation of interfering happenings by ε.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,11 +8,11 @@ use elbowroom_model::{Footprint, Task};
 use super::{BadCase, Difference, Obligation, Requirement};
 use elbowroom_plan::{Bound, Node, NodeId, StnPlan};
 
-/// The separation of every two interfering happenings, less those implied by others.
+/// Returns the separations of all pairs of interfering happenings, except those implied by others.
 ///
 /// `order` lists all nodes in nominal order. If `a` is ε before `b` and `b` is ε before `c`, then
-/// `a` is before `c`: only pairs without such a detour are obligations of their own. Nor are pairs
-/// of timed initials at fixed times: the plan is not to blame for when they happen.
+/// `a` is before `c`: only pairs without such a detour are obligations of their own. Pairs of timed
+/// initials at fixed times are left out as well, because the plan does not decide when they happen.
 pub(super) fn separations(task: &Task, plan: &StnPlan, order: &[NodeId]) -> Vec<Obligation> {
     let fixed = fixed(plan);
     interfering_in_order(task, plan, order)
@@ -33,7 +33,7 @@ pub(super) fn separations(task: &Task, plan: &StnPlan, order: &[NodeId]) -> Vec<
         .collect()
 }
 
-/// The groups of timed initials at times that depend on no parameter.
+/// Returns the groups of timed initials at times that depend on no parameter.
 fn fixed(plan: &StnPlan) -> BTreeSet<NodeId> {
     let at_fixed_times = plan.constraints.iter().filter(|constraint| {
         constraint.from == NodeId::ZERO
@@ -44,7 +44,7 @@ fn fixed(plan: &StnPlan) -> BTreeSet<NodeId> {
     at_fixed_times.map(|constraint| constraint.to).collect()
 }
 
-/// The interfering pairs, earlier node first, less those connected through a third node.
+/// Returns the interfering pairs, earlier node first, except those connected through a third node.
 pub(crate) fn interfering_in_order(
     task: &Task,
     plan: &StnPlan,
@@ -57,7 +57,8 @@ pub(crate) fn interfering_in_order(
         .collect()
 }
 
-/// The positions of interfering footprints, the earlier one first, less those connected through others.
+/// Returns the positions of interfering footprints, the earlier one first, except those connected
+/// through others.
 fn nearest_pairs(footprints: impl Iterator<Item = Footprint>) -> Vec<(usize, usize)> {
     let mut neighbours = Neighbours::default();
     let mut links: Vec<Vec<usize>> = Vec::new();
@@ -70,13 +71,14 @@ fn nearest_pairs(footprints: impl Iterator<Item = Footprint>) -> Vec<(usize, usi
         .collect()
 }
 
-/// Those of some positions that no way along `links` leads to from others of them, latest first.
+/// Returns the candidates that are not reachable along `links` from other candidates, latest first.
 fn nearest(candidates: &BTreeSet<usize>, links: &[Vec<usize>]) -> Vec<usize> {
     let mut nearest = Vec::new();
     let mut reached = BTreeSet::new();
     let mut open = candidates.clone();
     let mut undecided = candidates.len();
-    // From the latest on, so that all ways to a position have been followed before it.
+    // Processed from the latest position on, so that all paths to a position are explored before
+    // it.
     while undecided > 0
         && let Some(position) = open.pop_last()
     {
@@ -94,7 +96,7 @@ fn nearest(candidates: &BTreeSet<usize>, links: &[Vec<usize>]) -> Vec<usize> {
     nearest
 }
 
-/// What a happening does to a fact or fluent.
+/// Kind of access of a happening to a fact or fluent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Use {
     Read,
@@ -106,22 +108,22 @@ enum Use {
     Assign,
 }
 
-/// The latest users of a fact or fluent.
+/// Latest users of a fact or fluent.
 ///
-/// Whoever uses it in one way only goes together with those who use it in the same way, unless they
-/// assign; everybody else interferes. So users come in blocks, each of which interferes with
-/// all of the one before, and by way of that with all earlier ones that are not of its own kind.
+/// Users with one kind of access are compatible with users of the same kind, unless they assign;
+/// all other pairs interfere. So users form blocks. Each user interferes with all users of the
+/// previous block, and transitively with all earlier ones that are not of its own kind.
 #[derive(Clone, Debug, Default)]
 struct Blocks {
     previous: Vec<usize>,
     last: Vec<usize>,
-    /// The use of all in the last block, if they go together with others.
+    /// The common kind of access in the last block, if its users are compatible.
     together: Option<Use>,
 }
 
 impl Blocks {
-    /// One more user: those before that it interferes with, less those that these are known to come
-    /// after.
+    /// Adds a user. Returns the earlier users that it interferes with, except those that precede
+    /// these transitively.
     fn add(&mut self, position: usize, uses: &[Use]) -> &[usize] {
         let together = match uses {
             [Use::Assign] => None,
@@ -137,7 +139,7 @@ impl Blocks {
     }
 }
 
-/// Finds interfering happenings through an index of who touches what.
+/// Finds interfering happenings through an index of the facts and fluents they use.
 #[derive(Default)]
 struct Neighbours {
     facts: BTreeMap<FactId, Blocks>,
@@ -145,7 +147,8 @@ struct Neighbours {
 }
 
 impl Neighbours {
-    /// The earlier positions that this one interferes with, less those connected through others.
+    /// Returns the earlier positions that this one interferes with, except those connected through
+    /// others.
     fn before(&mut self, position: usize, footprint: &Footprint) -> BTreeSet<usize> {
         let mut facts: BTreeMap<FactId, Vec<Use>> = BTreeMap::new();
         let of_facts = [

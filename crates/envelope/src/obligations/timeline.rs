@@ -1,4 +1,4 @@
-//! What happens to each fact and fluent, in the order of a nominal schedule.
+//! Changes of each fact and fluent, in the order of a nominal schedule.
 
 mod fluent;
 
@@ -19,49 +19,49 @@ use fluent::FluentHistory;
 
 pub(crate) use fluent::FluentChange;
 
-/// The events of every fact and fluent so far, in nominal order.
+/// Events of every fact and fluent so far, in nominal order.
 ///
-/// A *cut* is a set of nodes taken to have happened; reading at a cut gives what the plan's state
-/// is after exactly these. During the symbolic run the cut is everything recorded so far.
+/// A *cut* is a set of nodes that are assumed to have happened. Reading at a cut returns the plan's
+/// state after exactly these. During the symbolic run the cut is everything recorded so far.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Timeline {
     facts: BTreeMap<FactId, FactHistory>,
-    /// Boxed, because most timelines are about one of them, and a map has room for eleven.
+    /// Boxed, because most timelines contain one fluent, and a B-tree allocates space for eleven.
     fluents: BTreeMap<FluentId, Box<FluentHistory>>,
-    /// Under which conditional effects' outcomes this timeline is the right one.
+    /// Outcomes of conditional effects that this timeline assumes.
     pub(crate) assumptions: Vec<Inequality>,
 }
 
-/// The changes of a fact along a plan.
+/// Changes of a fact along a plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FactHistory {
     pub(crate) initially: bool,
-    /// The node, and what the fact becomes there.
+    /// The nodes, each with the new value of the fact.
     pub(crate) events: Vec<(NodeId, bool)>,
 }
 
-/// A cut through a plan: whether a node has happened; `None` if all have that are recorded.
+/// Cut through a plan: `true` for nodes that have happened. `None` contains everything recorded.
 pub(crate) type Cut<'a> = Option<&'a dyn Fn(NodeId) -> bool>;
 
-/// The context in which an expression is evaluated: a cut, a moment, and the action it belongs to.
+/// Context for evaluating an expression: a cut, a moment, and the action it belongs to.
 pub(crate) struct Reading<'a> {
     pub(crate) task: &'a Task,
     pub(crate) timeline: &'a Timeline,
     pub(crate) cut: Cut<'a>,
     /// The time at which values are read.
     pub(crate) moment: NodeId,
-    /// Start and end of the action whose `?duration` may be meant.
+    /// Start and end of the action that `?duration` refers to.
     pub(crate) action: Option<(NodeId, NodeId)>,
     /// Parameters that are differences of times.
     pub(crate) substitution: &'a Substitution,
-    /// For messages.
+    /// Location, for messages.
     pub(crate) place: &'a str,
-    /// The derived facts at the cut, once something has asked for one.
+    /// The derived facts at the cut, computed on first use.
     pub(crate) derived: OnceCell<Derived<Refusal>>,
 }
 
 impl Timeline {
-    /// Nothing has happened yet.
+    /// Creates a timeline of the initial state.
     pub(crate) fn initial(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -94,8 +94,8 @@ impl Timeline {
         self.fluents.entry(fluent).or_default().push(node, change);
     }
 
-    /// What holds and counts at the node, after all that was recorded, as a timeline on which
-    /// nothing happens.
+    /// Returns the facts and values at the moment, after all recorded changes, as a timeline
+    /// without events.
     pub(crate) fn snapshot(&self, moment: NodeId) -> Self {
         let mut snapshot = Self {
             assumptions: self.assumptions.clone(),
@@ -110,17 +110,17 @@ impl Timeline {
         snapshot
     }
 
-    /// Gives a fact its first truth value.
+    /// Sets the initial truth value of a fact.
     pub(crate) fn put_fact(&mut self, fact: FactId, truth: bool) {
         self.facts.entry(fact).or_default().initially = truth;
     }
 
-    /// Gives a fluent its first value.
+    /// Sets the initial value of a fluent.
     pub(crate) fn put_value(&mut self, fluent: FluentId, value: Option<Linear>) {
         self.fluents.entry(fluent).or_default().put(value);
     }
 
-    /// The continuous changes that have begun and not stopped.
+    /// Returns the active continuous changes.
     pub(crate) fn drifts(&self) -> Vec<(FluentId, Linear)> {
         let all = self.fluents.iter().flat_map(|(&fluent, history)| {
             let rates = history.last().rates();
@@ -129,8 +129,8 @@ impl Timeline {
         all.collect()
     }
 
-    /// What of this matters to a condition on these that is read inside an action; and the events of which it is not
-    /// known on which side of that moment they are.
+    /// Returns the part of the timeline that is relevant to a condition on these facts and fluents
+    /// inside an action. Also returns the events that may be on either side of the moment.
     pub(super) fn near(
         &self,
         (facts, fluents): (&[FactId], &[FluentId]),
@@ -152,12 +152,12 @@ impl Timeline {
         (near, open)
     }
 
-    /// The history of a fact.
+    /// Returns the history of a fact.
     pub(crate) fn fact_history(&self, fact: FactId) -> FactHistory {
         self.facts.get(&fact).cloned().unwrap_or_default()
     }
 
-    /// The nodes at which the fact may change.
+    /// Returns the nodes at which the fact may change.
     pub(crate) fn fact_nodes(&self, fact: FactId) -> impl Iterator<Item = NodeId> + '_ {
         self.facts
             .get(&fact)
@@ -165,7 +165,7 @@ impl Timeline {
             .flat_map(|h| h.events.iter().map(|&(node, _)| node))
     }
 
-    /// The nodes at which the fluent's value or rate may change.
+    /// Returns the nodes at which the fluent's value or rate may change.
     pub(crate) fn fluent_nodes(&self, fluent: FluentId) -> impl Iterator<Item = NodeId> + '_ {
         self.fluents
             .get(&fluent)
@@ -195,11 +195,11 @@ impl Timeline {
 }
 
 impl FactHistory {
-    /// What of this matters to a moment inside an action. Collects the events of which it is not known on which side
-    /// of the moment they are.
+    /// Returns the part of the history that is relevant to a moment inside an action. Collects the
+    /// events that may be on either side of the moment.
     ///
-    /// What makes a fact true and what makes it false interfere: if one of either kind is to come, so are all later
-    /// ones.
+    /// Events that make a fact true and events that make it false interfere. So if an event of each
+    /// kind is known to come after the moment, so are all later ones.
     fn near(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
         let here = self
             .events
@@ -232,7 +232,7 @@ impl FactHistory {
     }
 }
 
-/// The parameter, or the difference of times that it is.
+/// Returns the parameter, or the difference of times that replaces it.
 pub(crate) fn parameter_value(id: ParameterId, substitution: &Substitution) -> Linear {
     match substitution.get(&id) {
         Some(&(from, to)) => Linear::difference(from, to),
@@ -241,7 +241,7 @@ pub(crate) fn parameter_value(id: ParameterId, substitution: &Substitution) -> L
 }
 
 impl Reading<'_> {
-    /// Whether the fact is true at the cut.
+    /// Returns `true` if the fact is true at the cut.
     pub(crate) fn fact(&self, fact: FactId) -> Result<bool, Refusal> {
         if !self.task.is_derived(fact) {
             return Ok(self.timeline.is_true(fact, self.cut));
@@ -257,7 +257,7 @@ impl Reading<'_> {
         derivation.on_top_of(&basic, derived).fact(fact)
     }
 
-    /// The expression's value at the cut and moment; `None` where it is undefined.
+    /// Returns the expression's value at the cut and moment; `None` if it is undefined.
     pub(crate) fn linear(&self, expression: &Expression) -> Result<Option<Linear>, Refusal> {
         Ok(match expression {
             Expression::Constant(value) => Some(Linear::constant(value.clone())),
@@ -325,7 +325,7 @@ impl Reading<'_> {
     }
 }
 
-/// The context in which rules are evaluated: basic facts, and comparisons of constants.
+/// Context for evaluating rules: basic facts, and comparisons of constants.
 struct Basic<'a>(&'a Reading<'a>);
 
 impl Moment<Refusal> for Basic<'_> {
@@ -333,7 +333,7 @@ impl Moment<Refusal> for Basic<'_> {
         Ok(self.0.timeline.is_true(fact, self.0.cut))
     }
 
-    /// A comparison with an undefined number is false.
+    /// Evaluates a comparison, which is false with an undefined number.
     fn compare(
         &self,
         comparison: Comparison,

@@ -1,4 +1,4 @@
-//! Why a box is inside the envelope.
+//! Proofs that a box is inside the envelope.
 
 mod strategy;
 
@@ -11,8 +11,8 @@ use crate::reduction::Reduction;
 use crate::soundness::Soundness;
 
 impl Oracle {
-    /// Why there are times for all nodes, whatever the values in the box are; `None` if there are
-    /// not, or if that takes too much to tell.
+    /// Returns the proof that there are times for all nodes, for all values in the box; `None` if
+    /// there are not, or if the proof takes too much work.
     pub fn control_proof(&self, envelope: &DecoupledEnvelope) -> Option<ControlProof> {
         match &self.controllability {
             Controllability::Weak(feasibility) => {
@@ -29,8 +29,9 @@ impl Oracle {
         }
     }
 
-    /// Why no condition of the plan can fail in any schedule for values in the box, which is inside the
-    /// envelope and holds the nominal values; `None` if that cannot be told.
+    /// Returns the proofs that no condition of the plan can fail in any schedule for values in the
+    /// box. The box must be inside the envelope and contain the nominal values. `None` if the
+    /// proofs cannot be computed.
     pub fn condition_proofs(&self, envelope: &DecoupledEnvelope) -> Option<Vec<ConditionProof>> {
         let (task, plan) = (&self.task, &self.plan);
         let nominal = plan.nominal();
@@ -39,7 +40,7 @@ impl Oracle {
     }
 }
 
-/// Times that do for all values.
+/// Returns times that work for all values.
 fn fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Schedule> {
     let network = plan.uncertain_network(envelope).ok()?;
     let times = network.network.strong().ok()?.into_times();

@@ -1,4 +1,4 @@
-//! What a refused box says about others.
+//! Derivation of cuts from refused boxes.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
@@ -12,13 +12,13 @@ use crate::obligations::Refusal;
 use crate::row::Row;
 
 impl Oracle {
-    /// Whether the box, which holds the nominal values, is inside the envelope, and if not, what
-    /// that says about others that do: `most` cuts at most.
+    /// Checks a box that contains the nominal values. If it is not inside the envelope, returns at
+    /// most `most` cuts, which apply to all boxes that contain the nominal values.
     ///
-    /// Takes about as long as [`objection`](Self::objection); the accepted box stays what it is.
+    /// Takes about as long as [`objection`](Self::objection); the accepted box does not change.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub(crate) fn learn(
         &mut self,
         envelope: &DecoupledEnvelope,
@@ -32,7 +32,7 @@ impl Oracle {
         if !is_there && self.move_to(envelope)?.is_some() {
             return Ok(Learnt::Unknown);
         }
-        // What a condition says about other boxes counts where all values have a schedule.
+        // The cut of a condition is only valid if all values have a schedule.
         let learnt = self.controllability.learn(&self.plan, envelope, most)?;
         if learnt != Learnt::Nothing || self.asked == Asked::Times {
             self.proofs_hold_in_last = learnt == Learnt::Nothing;
@@ -60,11 +60,11 @@ impl Oracle {
         Ok(Learnt::Cuts(cuts))
     }
 
-    /// Takes a box that includes the accepted one for the accepted one, if it is inside the envelope;
-    /// if not, what that says about others. That is not counted as a check.
+    /// Makes a box that includes the accepted one the accepted box, if it is inside the envelope;
+    /// otherwise returns cuts. Not counted as a check.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub(crate) fn accept_or_learn(
         &mut self,
         envelope: &DecoupledEnvelope,
@@ -76,7 +76,7 @@ impl Oracle {
     }
 
     fn widen_or_learn(&mut self, envelope: &DecoupledEnvelope) -> Result<Learnt, Refusal> {
-        // What is remembered of the accepted box makes it cheap to move one end.
+        // The stored proofs of the accepted box make it cheap to move one end.
         if self.remembers_accepted
             && let Some(end) = self.only_end(envelope)
             && self.widen(end, end.reach(envelope))?.is_none()
@@ -91,7 +91,7 @@ impl Oracle {
         Ok(learnt)
     }
 
-    /// The end in which a box differs from the accepted one, if it is one.
+    /// Returns the end that differs from the accepted box, if there is exactly one.
     fn only_end(&self, envelope: &DecoupledEnvelope) -> Option<BoxEnd> {
         let accepted = self.accepted.as_ref()?;
         let count = envelope.intervals().len();
@@ -106,38 +106,39 @@ impl Oracle {
         ends.next().is_none().then_some(end)
     }
 
-    /// Whether every box with this end so far out is outside the envelope, as far as that can be
-    /// told without looking at the other ends. `None` is infinitely far.
+    /// Returns `true` if every box with this end at that reach is outside the envelope, judging by
+    /// the end alone. `None` is infinitely far.
     pub(crate) fn is_too_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
         self.controllability.is_too_far(end, reach)
     }
 
-    /// Whether a box that is far too wide takes no longer to check than a narrow one.
+    /// Returns `true` if checking a box that is far too wide takes no longer than checking a narrow
+    /// one.
     pub(crate) fn asks_little(&self) -> bool {
         self.asked == Asked::Times
     }
 
-    /// Takes a box inside the accepted one for the accepted one.
+    /// Replaces the accepted box by a box inside it.
     pub(crate) fn narrow(&mut self, envelope: &DecoupledEnvelope) {
         self.remembers_accepted &= self.accepted.as_ref() == Some(envelope);
         self.accepted = Some(envelope.clone());
     }
 
-    /// Counts boxes as checked about which something was known already.
+    /// Sets the number of checks, which includes boxes whose outcome was known already.
     pub(crate) fn count_checks(&mut self, checks: usize) {
         self.checks = checks;
     }
 
-    /// Keeps what a search has found out about boxes.
+    /// Stores the reasons that a search has found.
     pub(crate) fn remember(&mut self, known: Known) {
         self.known = known;
     }
 
-    /// Like [`objection`](Self::objection), of a box with one end moved out. Where a search has come across a reason
-    /// that refuses that box as well, it is not looked for again.
+    /// Like [`objection`](Self::objection), for a box with one end moved out. If a reason found by
+    /// an earlier search refuses that box as well, it is reused.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub fn objection_beside(
         &mut self,
         envelope: &DecoupledEnvelope,
@@ -159,15 +160,15 @@ impl Oracle {
         let Some(accepted) = self.accepted.take_if(|accepted| accepted == envelope) else {
             return self.objection(&candidate);
         };
-        // What is remembered of the accepted box makes it cheap to move one end.
+        // The stored proofs of the accepted box make it cheap to move one end.
         let reason = self.check_moved(&accepted, &candidate, end);
         self.accepted = Some(accepted);
         self.remembers_accepted &= !matches!(reason, Ok(None));
         Ok(reason?.map(|reason| self.objection_of(&candidate, reason)))
     }
 
-    /// Takes a box that many questions with one end further out will be about for the accepted one, if it is inside the
-    /// envelope. That is not counted as a check.
+    /// Makes a box the accepted one, if it is inside the envelope, in preparation of many queries
+    /// with one end further out. Not counted as a check.
     pub(crate) fn stand_at(&mut self, envelope: &DecoupledEnvelope) {
         let checks = self.checks;
         self.remembers_accepted = matches!(self.check_afresh(envelope), Ok(None));
@@ -177,8 +178,8 @@ impl Oracle {
         }
     }
 
-    /// The objection that a row is to a box with one end moved out so far; `None` if it has to be
-    /// worked out.
+    /// Returns the objection of a row to a box with one end moved out; `None` if it has to be
+    /// computed.
     fn objection_by(
         &self,
         (row, ground): (&Row, &Ground),
@@ -187,7 +188,7 @@ impl Oracle {
     ) -> Option<Objection> {
         match ground {
             Ground::Condition(broken) => Some(Objection::Broken(broken.clone())),
-            // One end of each parameter counts, and at these ends there is no schedule.
+            // The row contains one end of each parameter, and there is no schedule at these ends.
             Ground::Cycle(_) | Ground::Semireducible(_) => {
                 let mut values = envelope.nearest(&self.plan.nominal());
                 for end in row.factors.keys() {

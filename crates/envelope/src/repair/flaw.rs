@@ -1,4 +1,4 @@
-//! What is wrong with a schedule, and what could be otherwise.
+//! Flaws of a schedule, and the alternatives that avoid them.
 
 use std::collections::BTreeSet;
 
@@ -15,19 +15,19 @@ use crate::obligations::{
     BadCase, Difference, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution,
 };
 
-/// `expression <= 0`, or `< 0` when strict, and what asks for it.
+/// `expression <= 0`, or `< 0` when strict, and the constraint that requires it.
 pub(super) type Alternative = (Linear, bool, Hindrance);
 
-/// What is wrong with a schedule.
+/// Flaw of a schedule.
 pub(super) enum Flaw {
-    /// Nothing that an obligation stands for.
+    /// All obligations are met.
     None,
-    /// This cannot be met while happenings keep their order.
+    /// This requirement cannot be met while happenings keep their order.
     Hopeless(Requirement),
     /// One of these holds in every valid schedule of the case.
     Cases {
         alternatives: Vec<Alternative>,
-        /// The pair whose order is the question, if it is one.
+        /// The pair whose order the case decides, if any.
         decides: Option<(NodeId, NodeId)>,
     },
 }
@@ -41,10 +41,10 @@ pub(super) struct Finder<'a> {
 }
 
 impl Finder<'_> {
-    /// A flaw of the schedule, in a case that decides the order of some happenings.
+    /// Returns a flaw of the schedule, in a case that decides the order of some happenings.
     ///
     /// # Errors
-    /// When something is beyond linear reasoning in the order of this schedule.
+    /// If something is beyond linear reasoning in the order of this schedule.
     pub(super) fn find(
         &self,
         values: &Valuation,
@@ -53,7 +53,8 @@ impl Finder<'_> {
     ) -> Result<Flaw, Refusal> {
         let compiled =
             Obligations::compile(self.task, self.plan, (schedule, values), self.substitution)?;
-        // As long as separations are broken, the others go by an order that there may not be.
+        // Separations come first: while they are violated, the other obligations assume an order
+        // that may not exist.
         for obligation in &compiled.direct {
             if let Some(case) = broken(obligation, values, schedule) {
                 return Ok(self.flaw(obligation, case, decided));
@@ -104,7 +105,7 @@ impl Finder<'_> {
         }
     }
 
-    /// The next question about the order of happenings that a requirement depends on.
+    /// Returns the next undecided order of happenings that a requirement depends on.
     fn order_of(
         &self,
         requirement: &Requirement,
@@ -128,8 +129,8 @@ impl Finder<'_> {
         })
     }
 
-    /// The facts that a requirement depends on, whether it depends on numbers, and the happenings
-    /// at which it reads them.
+    /// Returns the facts that a requirement depends on, `true` if it depends on numbers, and the
+    /// happenings at which it reads them.
     fn reads(&self, requirement: &Requirement) -> (BTreeSet<FactId>, bool, Vec<NodeId>) {
         let of = |condition: &Condition, anchors: Vec<NodeId>| {
             let (facts, numbers) = read_by(self.task, condition);
@@ -186,7 +187,7 @@ impl Finder<'_> {
     }
 }
 
-/// The bad case that holds in the schedule, if one does.
+/// Returns the bad case that holds in the schedule, if any.
 fn broken<'a>(
     obligation: &'a Obligation,
     values: &Valuation,

@@ -7,16 +7,17 @@ use elbowroom_plan::{NodeId, Schedule, StnPlan, Valuation};
 use crate::linear::{Factor, Linear};
 use crate::obligations::{Inequality, OverAll, Refusal};
 
-/// What could be otherwise so that the condition is not broken where it is in this schedule: of
-/// these (`<= 0`, or `< 0` when strict), one holds in every valid schedule. `None` if it is not
-/// broken.
+/// Returns alternatives that avoid this schedule's violation of the condition: one of these
+/// expressions is `<= 0` (`< 0` when strict) in every valid schedule. `None` if the condition is
+/// not violated.
 ///
-/// Between two of the events that the condition depends on, what breaks it is linear in the moment.
-/// So it holds between them exactly if it does on the way to both. Where it fails at one of them, either that changes,
-/// or this is not the last event before the moment, or the first one after it, any longer.
+/// Between two consecutive events that the condition depends on, the violation is linear in the
+/// moment. So the condition holds between them exactly if it holds in the limit at both. If it
+/// fails at one of them, either that value changes, or this event is no longer the last one before
+/// the moment, or the first one after it.
 ///
 /// # Errors
-/// When a value is not linear, or what breaks the condition has several parts.
+/// If a value is not linear, or if the violation has several parts.
 pub(super) fn broken(
     task: &Task,
     plan: &StnPlan,
@@ -62,7 +63,7 @@ pub(super) fn broken(
                 });
             let mut failing =
                 ends.filter(|(_, _, expression)| expression.value(schedule, values).is_negative());
-            // Where it is not below zero at either end, it is zero throughout, and must not be.
+            // If it is not below zero at either end, it is zero throughout, and must not be.
             let (Some((at, is_first, expression)), [_]) = (failing.next(), case.as_slice()) else {
                 return Err(several_parts(plan, over_all));
             };
@@ -84,8 +85,8 @@ fn several_parts(plan: &StnPlan, over_all: &OverAll) -> Refusal {
     }
 }
 
-/// That something else than `at` is the last event before the moment (`is_first`), or the first one
-/// after it, or that there is no moment between these events at all.
+/// Returns the alternatives that another event than `at` is the last one before the moment
+/// (`is_first`), or the first one after it, or that there is no moment between these events.
 fn others(
     over_all: &OverAll,
     is_before: impl Fn(NodeId) -> bool,
@@ -96,7 +97,7 @@ fn others(
     let nodes = events.iter().copied();
     let nodes = nodes.chain([over_all.start, over_all.end]);
     let others = nodes.filter(|&node| node != at).map(|node| {
-        // What falls together with `at` changes nothing.
+        // Events that coincide with `at` change nothing.
         if is_before(node) {
             (Linear::difference(node, at), is_first)
         } else {
@@ -106,7 +107,7 @@ fn others(
     others.collect()
 }
 
-/// The expression at a moment that falls together with a node.
+/// Returns the expression at a moment that coincides with a node.
 fn read_at(expression: &Linear, moment: NodeId, at: NodeId) -> Linear {
     let mut read = expression.clone();
     if let Some(factor) = read.times.remove(moment) {
@@ -127,7 +128,7 @@ fn read_at(expression: &Linear, moment: NodeId, at: NodeId) -> Linear {
     read
 }
 
-/// Whether all inequalities hold at one moment strictly between two times.
+/// Returns `true` if all inequalities hold at one moment strictly between two times.
 fn holds_between(
     case: &[Inequality],
     moment: NodeId,
@@ -136,7 +137,7 @@ fn holds_between(
     schedule: &Schedule,
 ) -> bool {
     let [since, until] = between.map(|node| &schedule[node]);
-    // The moments at which all of them hold, and whether the ends of that interval are left out.
+    // The interval of moments at which all of them hold, each end with `true` if it is excluded.
     let (mut least, mut most) = ((since.clone(), true), (until.clone(), true));
     for inequality in case {
         let at =

@@ -1,4 +1,4 @@
-//! Which happenings keep their order, and which may change it.
+//! Happenings that keep their order, and happenings that may change it.
 
 use std::collections::BTreeSet;
 
@@ -9,15 +9,16 @@ use elbowroom_plan::{Bound, Node, NodeId, ParametrizedPlan, Schedule, StnPlan};
 
 use crate::obligations::interfering_in_order;
 
-/// What a plan says of the order of its happenings.
+/// Order of a plan's happenings, as far as the plan fixes it.
 pub(super) struct Orders {
     /// Interfering actions, the earlier first, that keep their order.
     pub(super) kept: Vec<(NodeId, NodeId)>,
-    /// By node.
+    /// The footprints, by node.
     pub(super) footprints: Vec<Footprint>,
-    /// For each node those that come before it, or with it, whatever changes.
+    /// For each node, the nodes that always come before it, or with it.
     before: Vec<BTreeSet<NodeId>>,
-    /// Whether effects have conditions, so that what one happening changes can depend on all others.
+    /// `true` if effects have conditions, so that the changes of one happening can depend on all
+    /// others.
     pub(super) is_conditional: bool,
 }
 
@@ -84,16 +85,15 @@ impl Orders {
         }
     }
 
-    /// Whether nothing says yet which of the two comes first.
+    /// Returns `true` if the order of the two nodes is not fixed.
     fn is_open(&self, one: NodeId, other: NodeId) -> bool {
         one != other
             && !self.before[one.index()].contains(&other)
             && !self.before[other.index()].contains(&one)
     }
 
-    /// Two interfering happenings without a fixed order, which makes a difference to what holds of
-    /// these facts, and of all numbers (`numbers`), where `anchors` read them; none of those that
-    /// are `decided`.
+    /// Returns two interfering happenings without a fixed order that affects the facts, or any
+    /// numbers if `numbers`, that `anchors` read; pairs in `decided` are skipped.
     pub(super) fn undecided(
         &self,
         facts: &BTreeSet<FactId>,
@@ -113,13 +113,13 @@ impl Orders {
             .copied()
             .filter(|&node| is_writer(node))
             .collect();
-        // What a writer does may depend on numbers that it reads.
+        // The changes of a writer may depend on numbers that it reads.
         let readers = if self.is_conditional || numbers {
             &nodes[..]
         } else {
             &[]
         };
-        // What is read where the flaw shows comes first: that decides most.
+        // Pairs with the nodes that read the flawed condition come first, because they decide most.
         let of = |own: &[NodeId]| -> Vec<(NodeId, NodeId)> {
             own.iter()
                 .flat_map(|&node| pairs_with(node, &writers))
@@ -136,7 +136,7 @@ impl Orders {
         pairs.find(|pair| !decided.contains(pair))
     }
 
-    /// The two as a pair whose order may still be decided.
+    /// Returns the two as a pair, if their order can still be decided.
     pub(super) fn pair(
         &self,
         one: NodeId,
@@ -148,7 +148,7 @@ impl Orders {
     }
 }
 
-/// The node with each other, the one of the smaller number first.
+/// Returns the pairs of the node with each other node, the smaller number first.
 fn pairs_with(node: NodeId, others: &[NodeId]) -> impl Iterator<Item = (NodeId, NodeId)> + '_ {
     others
         .iter()
@@ -156,7 +156,7 @@ fn pairs_with(node: NodeId, others: &[NodeId]) -> impl Iterator<Item = (NodeId, 
         .map(move |&other| (node.min(other), node.max(other)))
 }
 
-/// The time of timed initials that no parameter moves.
+/// Returns the time of timed initials that no parameter moves.
 fn fixed_time(plan: &ParametrizedPlan, node: NodeId) -> Option<&Rational> {
     if !matches!(plan.plan.nodes[node.index()], Node::Timed(_)) {
         return None;
@@ -173,8 +173,8 @@ fn fixed_time(plan: &ParametrizedPlan, node: NodeId) -> Option<&Rational> {
     })
 }
 
-/// The starts and ends of actions in order of time. Where they fall together, what takes time ends
-/// before anything starts, and the rest comes as the plan lists it.
+/// Returns the starts and ends of actions in order of time. If they coincide, ends of actions with
+/// a positive duration come before starts, and the rest is in the order of the plan.
 fn actions_in_order(plan: &StnPlan, times: &Schedule) -> Vec<NodeId> {
     let rank = |node: NodeId| match plan.nodes[node.index()] {
         Node::End(id) if times[plan.start(id)] < times[node] => 0,
@@ -190,7 +190,7 @@ fn actions_in_order(plan: &StnPlan, times: &Schedule) -> Vec<NodeId> {
     nodes
 }
 
-/// The facts that a condition depends on, and whether it depends on numbers.
+/// Returns the facts that a condition depends on, and `true` if it depends on numbers.
 pub(super) fn read_by(
     task: &Task,
     condition: &elbowroom_model::ground::Condition,

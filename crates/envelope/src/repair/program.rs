@@ -1,4 +1,4 @@
-//! The linear program: times and quantities, and what their changes cost.
+//! The linear program: times and quantities, and the costs of their changes.
 
 use std::collections::BTreeMap;
 
@@ -21,13 +21,13 @@ pub(super) struct Solved {
     pub(super) because: Vec<(Hindrance, Rational)>,
 }
 
-/// A parameter as `base + Σ term`.
+/// Parameter as `base + Σ term`.
 struct Value {
     base: Rational,
     terms: Vec<(VariableId, Rational)>,
 }
 
-/// A row that holds in some cases: `sum <= bound`, or a contradiction where there is no sum.
+/// Row that holds in some cases: `sum <= bound`, or a contradiction if there is no sum.
 struct CaseRow {
     sum: Option<VariableId>,
     bound: Delta,
@@ -38,24 +38,25 @@ pub(super) struct Program<'a> {
     plan: &'a ParametrizedPlan,
     changeable: &'a [Changeable],
     simplex: Simplex,
-    /// By node; the first is time zero and stays unused.
+    /// The times, by node; the first is time zero and unused.
     times: Vec<VariableId>,
     parameters: BTreeMap<ParameterId, Value>,
-    /// The values of those that do not change.
+    /// The values of parameters that do not change.
     fixed: BTreeMap<ParameterId, Rational>,
-    /// Minus the cost, and the sum of all times of actions, both to be made as great, or as small,
-    /// as can be.
+    /// The negated cost, which is maximised. `earliness`, the negated sum of all times of actions,
+    /// is maximised after that.
     gain: Vec<(VariableId, Rational)>,
-    /// Minus the cost as a variable, to hold it at its optimum.
+    /// The negated cost as a variable, to fix it at its optimum.
     gained: VariableId,
     earliness: Vec<(VariableId, Rational)>,
-    /// By tag, what asserts a bound.
+    /// By tag, the origin of a bound.
     hindrances: Vec<Hindrance>,
     rows: Vec<CaseRow>,
 }
 
 impl<'a> Program<'a> {
-    /// The program of the plan's bounds, and of these orders, each at least `epsilon` apart.
+    /// Creates the program of the plan's bounds, and of these orders, each at least `epsilon`
+    /// apart.
     pub(super) fn new(
         plan: &'a ParametrizedPlan,
         changeable: &'a [Changeable],
@@ -123,8 +124,8 @@ impl<'a> Program<'a> {
         program
     }
 
-    /// A parameter: where its free values begin, and variables for what is added to that, those outside
-    /// of the free values at a cost.
+    /// Adds a parameter: a base value within its free values, and variables for deviations from it.
+    /// Those outside the free values have a cost.
     fn add_changeable(&mut self, own: &Changeable) {
         let range = &self.plan.parameter(own.parameter).range;
         let tag = self.tag(Hindrance::Range(own.parameter));
@@ -179,7 +180,8 @@ impl<'a> Program<'a> {
         self.hindrances.len() - 1
     }
 
-    /// The expression over the variables, with its constant apart; `None` if it has a product.
+    /// Returns the expression over the variables, and its constant; `None` if it contains a
+    /// product.
     fn combination(&self, expression: &Linear) -> Option<(Vec<(VariableId, Rational)>, Rational)> {
         let expression = expression.with_values(&self.fixed);
         if !expression.products.is_empty() {
@@ -197,7 +199,7 @@ impl<'a> Program<'a> {
         Some((row, constant))
     }
 
-    /// `expression <= 0`, in all cases.
+    /// Adds `expression <= 0`, in all cases.
     fn always(&mut self, expression: &Linear, hindrance: Hindrance) {
         let (row, constant) = self
             .combination(expression)
@@ -208,10 +210,11 @@ impl<'a> Program<'a> {
         self.simplex.assert_upper(sum, bound, tag);
     }
 
-    /// `expression <= 0`, or `< 0`, in some cases: its number.
+    /// Adds the row `expression <= 0`, or `< 0`, which holds in some cases only, and returns its
+    /// number.
     ///
     /// # Errors
-    /// When it is not linear in what may change.
+    /// If it is not linear in the times and the changeable parameters.
     pub(super) fn row(
         &mut self,
         expression: &Linear,
@@ -241,8 +244,10 @@ impl<'a> Program<'a> {
         Ok(self.rows.len() - 1)
     }
 
-    /// The least cost in the case in which these rows hold, and the earliest schedule at that cost;
-    /// or what contradicts itself.
+    /// Computes the least cost in the case of these rows, and the earliest schedule at that cost.
+    ///
+    /// # Errors
+    /// The constraints that contradict each other.
     pub(super) fn solve(&mut self, rows: &[usize]) -> Result<Solved, Vec<Hindrance>> {
         self.simplex.push();
         let tags = self.hindrances.len();
@@ -285,7 +290,7 @@ impl<'a> Program<'a> {
             }
         };
         let because = named(&self.hindrances, proof);
-        // At that cost, everything as early as can be.
+        // At that cost, everything as early as possible.
         let tag = self.tag(Hindrance::Beginning);
         self.simplex.assert_lower(self.gained, gain.clone(), tag);
         self.simplex
@@ -315,7 +320,7 @@ impl<'a> Program<'a> {
         })
     }
 
-    /// What these values cost.
+    /// Returns the cost of these values.
     pub(super) fn cost_of(&self, values: &Valuation) -> Rational {
         let costs = self.changeable.iter().map(|own| {
             let value = &values[own.parameter];

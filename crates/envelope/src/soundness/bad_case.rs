@@ -1,4 +1,4 @@
-//! Deciding whether a bad case is possible in a box.
+//! Feasibility of a bad case in a box.
 
 use std::collections::BTreeMap;
 
@@ -19,27 +19,28 @@ use crate::obligations::{BadCase, Difference, Inequality};
 use crate::reduction::Reduction;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, Side, Valuation};
 
-/// The schedules of a box: a network that can be tightened for a while.
+/// Schedules of a box: a network that can be tightened temporarily.
 pub(crate) struct Schedules<'a, S: Scale> {
     pub(crate) reduction: &'a Reduction,
     pub(crate) envelope: &'a DecoupledEnvelope,
     network: ConsistentNetwork<S::Weight>,
     scale: S,
-    /// Where the next question begins, as far as that is not where this one did: those of a plan resemble each
-    /// other, so it is a schedule at which the last one that was answered by a flow came out greatest.
+    /// Schedule that the next check starts from, as differences to the current one. It is the
+    /// maximum of the last check that a flow decided, because the checks of a plan resemble each
+    /// other.
     next: Vec<(ClassId, S::Weight)>,
-    /// A schedule in which all that can take long does, if there is one, until the first question about inequalities.
+    /// Schedule with long durations, if there is one; dropped at the first check of inequalities.
     longest: Option<Schedule<S::Weight>>,
     workspace: flow::Workspace<S::Weight>,
     /// For the first constraints of the network, a position in [`Reduction::edges`].
     edges: Vec<usize>,
-    /// The constraints after these: what is assumed.
+    /// The constraints after these: the assumptions.
     assumed: Vec<Constraint<Delta>>,
-    /// Whether proofs tell what they add up.
+    /// `true` if proofs list the constraints that they add up.
     tells: bool,
 }
 
-/// A moment to come back to.
+/// State to return to.
 pub(crate) struct Before {
     checkpoint: Checkpoint,
     assumed: usize,
@@ -47,17 +48,17 @@ pub(crate) struct Before {
 
 /// The result of a feasibility check of a bad case.
 pub(crate) enum Outcome {
-    /// No; one proof for each combination of values of multiplied parameters.
+    /// Impossible; one proof for each combination of values of multiplied parameters.
     Impossible(Vec<Certificate>),
-    /// Yes.
+    /// Possible.
     Possible,
-    /// Nobody knows: a parameter multiplies something in several inequalities, or moves the times
-    /// as well, so the corners of the box do not decide.
+    /// Unknown: a parameter multiplies something in several inequalities, or also moves the times,
+    /// so the corners of the box do not decide.
     Unknown(ParameterId),
 }
 
 impl<'a, S: Scale> Schedules<'a, S> {
-    /// All schedules for values in the box, or `None` if there are none at all.
+    /// Creates the network of all schedules for values in the box; `None` if there are none.
     pub(crate) fn new(
         reduction: &'a Reduction,
         envelope: &'a DecoupledEnvelope,
@@ -116,15 +117,15 @@ impl<'a, S: Scale> Schedules<'a, S> {
         })
     }
 
-    /// Lets proofs tell what they add up from now on.
+    /// Makes proofs list the constraints that they add up, from now on.
     pub(crate) fn tell(&mut self) {
         self.tells = true;
     }
 
-    /// Tightens by a difference.
+    /// Adds a difference to the network.
     ///
     /// # Errors
-    /// The proof that this leaves no schedule; the network is as before.
+    /// The proof that this leaves no schedule; the network does not change.
     pub(crate) fn assume(&mut self, difference: &Difference) -> Result<(), Certificate> {
         let constraint = constraint(self.reduction, difference);
         let weighted = Constraint {
@@ -141,7 +142,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         }
     }
 
-    /// The present moment, to come back to.
+    /// Returns the current state, for [`undo_to`](Self::undo_to).
     pub(crate) fn before(&self) -> Before {
         Before {
             checkpoint: self.network.checkpoint(),
@@ -149,7 +150,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         }
     }
 
-    /// Forgets what has been assumed since.
+    /// Undoes all assumptions made since.
     pub(crate) fn undo_to(&mut self, before: &Before) {
         self.assumed.truncate(before.assumed);
         self.network.go_back_to(before.checkpoint);
@@ -167,7 +168,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
         self.network.add_node_at(time);
     }
 
-    /// The proof a negative cycle is; its first constraint, with bound `added`, was refused.
+    /// Returns the proof given by a negative cycle; its first constraint, with bound `added`, was
+    /// refused.
     fn certificate(&self, cycle: &NegativeCycle<S::Weight>, added: &Delta) -> Certificate {
         let mut certificate = Certificate::default();
         for id in &cycle.constraints {
@@ -191,7 +193,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         certificate.complete()
     }
 
-    /// Whether all of the case can be at once.
+    /// Decides whether all constraints of the case can hold at once.
     pub(crate) fn possible(&mut self, case: &BadCase) -> Outcome {
         let before = self.before();
         let mut refuted = None;
@@ -206,8 +208,9 @@ impl<'a, S: Scale> Schedules<'a, S> {
         outcome
     }
 
-    /// Begins at a schedule from the next question on: the present one, but for some nodes. Its times count from the
-    /// beginning of the plan; one in which they are so large that sums might not fit is not taken.
+    /// Sets the schedule that the next check starts from: the present one with these changes. Its
+    /// times are relative to the beginning of the plan. It is ignored if its times are so large
+    /// that sums might overflow.
     fn begin_at(&mut self, moved: Vec<(ClassId, S::Weight)>) {
         let present = self.network.schedule();
         let mut times: BTreeMap<ClassId, S::Weight> = self
@@ -232,7 +235,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
         }
     }
 
-    /// Whether the inequalities can hold in the network as it is now, differences included.
+    /// Decides whether the inequalities can hold in the current network, which includes the
+    /// differences.
     pub(crate) fn inequalities_possible(&mut self, case: &BadCase) -> Outcome {
         if case.inequalities.is_empty() && self.reduction.coupled.is_empty() {
             return Outcome::Possible;
@@ -253,7 +257,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         {
             return self.each_possible(case, parameter);
         }
-        // Mostly one, and there are as many as conditions.
+        // Usually one, and as many of these lists as conditions, so the capacity is exact.
         let mut certificates = Vec::with_capacity(corners.len());
         for corner in corners {
             let fixed: Vec<Inequality> = case
@@ -275,8 +279,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
         Outcome::Impossible(certificates)
     }
 
-    /// Where corners do not decide several inequalities at once, one of them may be impossible by
-    /// itself.
+    /// Checks each inequality on its own, for cases where the corners do not decide several
+    /// inequalities at once.
     fn each_possible(&mut self, case: &BadCase, parameter: ParameterId) -> Outcome {
         if case.inequalities.len() > 1 {
             for (index, inequality) in case.inequalities.iter().enumerate() {
@@ -298,9 +302,10 @@ impl<'a, S: Scale> Schedules<'a, S> {
         Outcome::Unknown(parameter)
     }
 
-    /// A proof that the inequalities, free of products, cannot all hold; `None` if they can.
+    /// Returns a proof that the inequalities, free of products, cannot all hold; `None` if they
+    /// can.
     fn linear_possible(&mut self, inequalities: &[Inequality]) -> Option<Certificate> {
-        // Each inequality alone, without what couples parameters, is a problem of flows.
+        // Each inequality alone, without coupled parameters, is a flow problem.
         for (index, inequality) in inequalities.iter().enumerate() {
             if let Some(mut certificate) = self.flow_certificate(inequality) {
                 if self.tells {
@@ -310,8 +315,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
                 return Some(certificate);
             }
         }
-        // A parameter that is a difference of times has been replaced by it; one that only bounds a
-        // difference occurs twice.
+        // A parameter that is a difference of times has been replaced by it; a parameter that only
+        // bounds a difference occurs twice.
         let is_shared = inequalities
             .iter()
             .flat_map(|inequality| inequality.expression.parameters.keys())
@@ -322,7 +327,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         linear_program::refute(self.reduction, self.envelope, &self.assumed, inequalities)
     }
 
-    /// The proof that `expression <= 0` fails in all schedules, if it does.
+    /// Returns the proof that `expression <= 0` fails in all schedules, if it does.
     fn flow_certificate(&mut self, inequality: &Inequality) -> Option<Certificate> {
         // It can hold exactly if the greatest value of `-expression` is at least zero.
         let negated = inequality.expression.scaled(&Rational::from(-1));
@@ -372,8 +377,9 @@ impl<'a, S: Scale> Schedules<'a, S> {
             .then_some(certificate)
     }
 
-    /// Whether an expression is likely to be greater in this schedule than in the present one: whether it would be
-    /// with 1 and -1 for coefficients. Of one that reads a moment inside an action nothing is known.
+    /// Returns `true` if an expression is likely to be greater in this schedule than in the present
+    /// one: its coefficients are replaced by their signs. Always `true` if the expression reads a
+    /// moment inside an action.
     fn is_greater_at(&self, other: &Schedule<S::Weight>, demand: &Demand) -> bool {
         let present = self.network.schedule();
         let mut gain = S::Weight::zero();
@@ -391,7 +397,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
         gain > S::Weight::zero()
     }
 
-    /// The expression's constant and its coefficients for classes; times count from class 0.
+    /// Returns the expression's constant and its coefficients for classes; times are relative to
+    /// class 0.
     fn by_class(&self, expression: &Linear) -> (Rational, Demand) {
         let mut demand = Demand::new();
         let constant = spread(self.reduction, expression, |class: ClassId, coefficient| {
@@ -404,7 +411,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
     }
 }
 
-/// `to - from <= bound` over classes.
+/// Returns the constraint `to - from <= bound` over classes.
 fn constraint(reduction: &Reduction, difference: &Difference) -> Constraint<Delta> {
     let (from, from_offset) = reduction.place(difference.from);
     let (to, to_offset) = reduction.place(difference.to);
@@ -417,8 +424,8 @@ fn constraint(reduction: &Reduction, difference: &Difference) -> Constraint<Delt
     Constraint { from, to, bound }
 }
 
-/// Calls `add` with each class and its share of the expression's times, and returns the constant
-/// with the nodes' offsets in it.
+/// Calls `add` with each class and its share of the expression's times. Returns the constant, which
+/// includes the nodes' offsets.
 pub(crate) fn spread(
     reduction: &Reduction,
     expression: &Linear,
@@ -433,15 +440,15 @@ pub(crate) fn spread(
     constant
 }
 
-/// Values and a schedule in the box for which the case comes about. Among these, the ones that
-/// make `least` smallest, or, failing that, break the case's only inequality by most.
+/// Returns values and a schedule in the box for which the case holds. Among these, it chooses those
+/// that minimise `least` or, without it, violate the case's only inequality most.
 pub(crate) fn witness(
     reduction: &Reduction,
     envelope: &DecoupledEnvelope,
     case: &BadCase,
     least: Option<&Linear>,
 ) -> Option<Counterexample> {
-    // Without any schedule there is none to show.
+    // Without any schedule there is no witness.
     Schedules::new(reduction, envelope, Exactly)?;
     let assumed: Vec<_> = case
         .differences

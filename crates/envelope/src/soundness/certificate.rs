@@ -1,23 +1,25 @@
-//! Proofs that a bad case cannot be, and how they depend on a box.
+//! Proofs that a bad case is impossible, and their dependence on a box.
 
 use elbowroom_num::{Delta, Rational, Total};
 
 use crate::reduction::Edge;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
-/// A sum of constraints that comes out below zero on one side and at zero on the other.
+/// Sum of constraints with a value below zero on one side and zero on the other.
 ///
-/// By Farkas' lemma a system of linear inequalities is infeasible exactly if such a sum exists.
-/// Its value in a box is `base + Σ factor · reach(end)`; below zero, the bad case is impossible in
-/// that box. So after a box has been widened, one sum tells whether an old proof still stands.
+/// By Farkas' lemma a system of linear inequalities is infeasible exactly if such a sum exists. Its
+/// value in a box is `base + Σ factor · reach(end)`. If it is below zero, the bad case is
+/// impossible in that box. So after a box has been widened, one sum decides whether an old proof
+/// still holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Certificate {
     base: Delta,
-    /// Positive factors. Once it is [complete](Self::complete), in the order of the ends.
+    /// Positive factors. Once it is [complete](Self::complete), sorted by end.
     ends: Vec<(BoxEnd, Rational)>,
-    /// Ends on which the factors themselves depend: once one moves, the proof is void.
+    /// Ends that the factors themselves depend on: once one moves, the proof is void.
     pub(crate) fixed: Vec<BoxEnd>,
-    /// What is added up, and how often; only where that [is told](super::bad_case::Schedules::tell).
+    /// Constraints of the sum with their factors; empty unless they are
+    /// [recorded](super::bad_case::Schedules::tell).
     pub(crate) terms: Vec<(Term, Rational)>,
 }
 
@@ -26,7 +28,7 @@ pub(crate) struct Certificate {
 pub(crate) enum Term {
     /// The edge of the reduced network at this position.
     Edge(usize),
-    /// What is assumed, by position.
+    /// The assumption at this position.
     Assumed(usize),
     /// The inequality of the case at this position.
     Inequality(usize),
@@ -51,7 +53,7 @@ impl Certificate {
         self.ends.push((end, factor.clone()));
     }
 
-    /// The certificate, when all is added.
+    /// Completes the certificate after all additions.
     #[must_use]
     pub(crate) fn complete(mut self) -> Self {
         self.ends.sort_by_key(|(end, _)| *end);
@@ -66,13 +68,13 @@ impl Certificate {
         self
     }
 
-    /// Whether the proof uses the end.
+    /// Returns `true` if the proof uses the end.
     pub(crate) fn depends_on(&self, end: BoxEnd) -> bool {
         let known = self.ends.binary_search_by_key(&end, |(own, _)| *own);
         known.is_ok() || self.fixed.contains(&end)
     }
 
-    /// The value in the box; `None` for infinity.
+    /// Returns the value in the box; `None` for infinity.
     pub(crate) fn value(&self, envelope: &DecoupledEnvelope) -> Option<Delta> {
         let mut real = Total::default();
         real.add(&self.base.real);
@@ -85,8 +87,8 @@ impl Certificate {
         })
     }
 
-    /// Whether the proof stands in the box, which differs from the one it was made for in `moved`;
-    /// `None`: nothing is known about how they differ.
+    /// Returns `true` if the proof holds in the box, which differs from the proof's box only in
+    /// `moved`. `None` means that the difference is unknown.
     pub(crate) fn holds_in(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
         let is_void = match moved {
             Some(end) => self.fixed.contains(&end),

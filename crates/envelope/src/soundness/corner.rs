@@ -8,8 +8,8 @@ use crate::linear::{Factor, Linear};
 use crate::obligations::Inequality;
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, Valuation};
 
-/// The combinations of ends of the parameters' intervals. Where an end is infinite, the
-/// combination says what becomes of an expression as the parameter grows without bound.
+/// Returns the combinations of ends of the parameters' intervals. For an infinite end, the
+/// combination describes the limit of an expression as the parameter grows without bound.
 pub(crate) fn corners(envelope: &DecoupledEnvelope, parameters: &[ParameterId]) -> Vec<Corner> {
     let mut corners = vec![Corner::default()];
     for &parameter in parameters {
@@ -18,7 +18,7 @@ pub(crate) fn corners(envelope: &DecoupledEnvelope, parameters: &[ParameterId]) 
         let (lower, upper) = (interval.lower.value(), interval.upper.value());
         let mut ends = vec![lower.ok_or(false), upper.ok_or(true)];
         if lower.is_none() && upper.is_none() {
-            // Where the factor vanishes, any value shows what is left.
+            // If the factor vanishes, the remainder does not depend on the value.
             ends.push(Ok(&zero));
         }
         ends.dedup();
@@ -45,18 +45,19 @@ pub(crate) fn corners(envelope: &DecoupledEnvelope, parameters: &[ParameterId]) 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Corner {
     pub(crate) values: BTreeMap<ParameterId, Rational>,
-    /// Parameters at an infinite end, and whether it is the upper one.
+    /// Parameters at an infinite end, with `true` if it is the upper one.
     infinite: Vec<(ParameterId, bool)>,
 }
 
 impl Corner {
-    /// The inequality with these values put in.
+    /// Substitutes these values in an inequality.
     pub(crate) fn apply(&self, inequality: &Inequality) -> Inequality {
         let mut expression = inequality.expression.with_values(&self.values);
         let mut is_strict = inequality.is_strict;
         for &(parameter, is_upper) in &self.infinite {
-            // As the parameter grows, its coefficient alone decides. The expression gets below
-            // zero if the coefficient can be negative (for a parameter that goes down: positive).
+            // As the parameter grows, its coefficient alone decides. The expression becomes
+            // negative if the coefficient can be negative (for a parameter that decreases:
+            // positive).
             let coefficient = coefficient_of(&expression, parameter);
             if coefficient == Linear::default() {
                 continue;
@@ -73,7 +74,7 @@ impl Corner {
 }
 
 impl Corner {
-    /// The valuation with the parameters at infinite ends so far out that it will do.
+    /// Replaces the parameters at infinite ends by finite values that satisfy `will_do`.
     ///
     /// As in [`apply`](Self::apply), the first of them outgrows the second, and so on.
     pub(crate) fn far_out(
@@ -97,10 +98,10 @@ impl Corner {
     }
 }
 
-/// How often values are doubled to show what becomes of an expression as they grow.
+/// Limit on doublings of values in the search for values that are large enough.
 const MOST_DOUBLINGS: usize = 256;
 
-/// The factor of a parameter in an expression.
+/// Returns the factor of a parameter in an expression.
 fn coefficient_of(expression: &Linear, parameter: ParameterId) -> Linear {
     let mut coefficient = Linear::default();
     if let Some(constant) = expression.parameters.get(parameter) {

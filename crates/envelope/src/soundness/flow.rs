@@ -1,9 +1,9 @@
 //! The greatest value of a linear expression over the schedules of a network.
 //!
 //! `max Σ c_k t_k` subject to `t_to - t_from <= w` is the dual of a transshipment problem: send
-//! flow along the constraints, `c_k` units into each node, at cost `w` a unit. Its cheapest flow
-//! is found by successive shortest paths, exactly and without a tableau, and the flow itself is
-//! the proof of the maximum: the constraints, weighted by their flow, add up to it.
+//! flow along the constraints, `c_k` units into each node, at cost `w` a unit. Its cheapest flow is
+//! found by successive shortest paths, exactly and without a tableau. The flow itself is the proof
+//! of the maximum: the constraints, weighted by their flow, add up to it.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -13,18 +13,19 @@ use elbowroom_stn::{
     ConsistentNetwork, Constraint, ConstraintId, Network, NodeId, Schedule, Weight,
 };
 
-/// The flow along each constraint that has any.
+/// The flow along each constraint with a non-zero flow.
 pub(crate) type Flow = BTreeMap<ConstraintId, Rational>;
 
-/// How many units have to come into a node net, where that is not none.
+/// Net number of units that have to flow into each node; nodes with 0 are left out.
 pub(crate) type Demand = BTreeMap<NodeId, Rational>;
 
-/// The cheapest flow that brings `demand[k]` units net into each node `k` (the demands add up to
-/// zero), and which nodes happen when in a schedule at which the expression is greatest, if not when they do in the
-/// network's present one; `None` if there is none: then it has no greatest value.
+/// Computes the cheapest flow that brings `demand[k]` units net into each node `k` (the demands add
+/// up to zero). Also returns a schedule that maximises the expression, as differences to the
+/// network's present schedule. `None` if there is no flow: then the expression is unbounded.
 ///
-/// The search begins at the network's present schedule. The nearer that is to such a one, the
-/// shorter are the paths. The workspace is one for networks that have the first `lasting` constraints in common.
+/// The search begins at the network's present schedule. The closer it is to a maximum, the shorter
+/// the paths are. The workspace may only be shared by networks with the same first `lasting`
+/// constraints.
 pub(crate) fn cheapest<W: Weight>(
     network: &ConsistentNetwork<W>,
     lasting: usize,
@@ -57,19 +58,20 @@ enum Step {
     Back(ConstraintId),
 }
 
-/// What is known of nodes during a search, kept to spare allocations; between two of them that is nothing.
+/// Data about nodes during a search, reused to save allocations. Only `components` is kept between
+/// searches.
 #[derive(Debug)]
 pub(crate) struct Workspace<W> {
-    /// The potentials of nodes that are not their times in the network's present schedule.
+    /// The potentials of nodes that differ from their times in the network's present schedule.
     potential: Vec<Option<W>>,
-    /// The nodes that have one.
+    /// The nodes with such a potential.
     moved: Vec<NodeId>,
-    /// What is known of the nodes during a search for a path.
+    /// Result of the current search for a path, by node.
     reached: Vec<Option<Reached<W>>>,
-    /// The nodes of which something is known.
+    /// Nodes with an entry in `reached`.
     touched: Vec<NodeId>,
-    /// For nodes that lasting constraints are about, one for all that these lead to and back from: they lead to nodes with the same one, or
-    /// a greater one.
+    /// For each node of a lasting constraint, the strongly connected component by these
+    /// constraints, named by one node. Constraints lead to the same component, or to a greater one.
     components: Vec<NodeId>,
 }
 
@@ -77,12 +79,13 @@ struct Search<'a, 'b, W> {
     network: &'a ConsistentNetwork<W>,
     lasting: usize,
     flow: Flow,
-    /// Invariant: no residual step is cheaper than the difference of its nodes' potentials. A schedule `t` satisfies
-    /// `t_to - t_from <= w`, so with its times for potentials that is so from the beginning.
+    /// Invariant: no residual step is cheaper than the difference of its nodes' potentials. A
+    /// schedule `t` satisfies `t_to - t_from <= w`, so its times as potentials satisfy the
+    /// invariant initially.
     workspace: &'b mut Workspace<W>,
 }
 
-/// A node that a path leads to.
+/// Node that a path leads to.
 #[derive(Clone, Debug)]
 struct Reached<W> {
     distance: W,
@@ -115,13 +118,13 @@ impl<W: Weight> Workspace<W> {
         self.reached.resize_with(node_count, || None);
     }
 
-    /// A node's potential, which is its time in the present schedule where nothing else is known.
+    /// Returns a node's potential, which is its time in the present schedule unless it was changed.
     fn potential<'a>(&'a self, node: NodeId, present: &'a Schedule<W>) -> &'a W {
         let own = self.potential[node.index()].as_ref();
         own.unwrap_or(&present[node])
     }
 
-    /// The potentials that are not the times of the present schedule; they are forgotten.
+    /// Removes and returns the potentials that differ from the times of the present schedule.
     fn take_moved(&mut self) -> Vec<(NodeId, W)> {
         let moved = self.moved.drain(..);
         moved
@@ -131,18 +134,19 @@ impl<W: Weight> Workspace<W> {
 }
 
 impl<W: Weight> Search<'_, '_, W> {
-    /// Whether there is [no flow](is_endless) for the demand, as far as that can be told before one is looked for.
+    /// Returns `true` if [no flow](is_endless) meets the demand, as far as that is known without a
+    /// search.
     fn is_endless(&self, demand: &Demand) -> bool {
         let assumed = &self.network.network().constraints()[self.lasting..];
         let mut left = assumed.iter().map(|constraint| constraint.from);
         is_endless(demand, &self.workspace.components, &mut left)
     }
 
-    /// Sends what is demanded, by one cheapest path after the other; whether there are such.
+    /// Meets the demand along one cheapest path after the other. Returns `false` if there is none.
     fn meet(&mut self, demand: &mut Demand) -> bool {
         let sources = demand.iter().filter(|(_, amount)| amount.is_negative());
         let sources: Vec<NodeId> = sources.map(|(node, _)| *node).collect();
-        // Where no more has to leave, nothing will have to later.
+        // A source whose demand is met stays met.
         for source in sources {
             while let Some(left) = demand.get(&source).filter(|left| left.is_negative()) {
                 let left = -left;
@@ -168,11 +172,11 @@ impl<W: Weight> Search<'_, '_, W> {
         true
     }
 
-    /// The node with open demand nearest to `source`, and the way there. Dijkstra's algorithm with
-    /// reduced costs; the potentials are brought up to date.
+    /// Returns the node with open demand nearest to `source`, and the path to it. Dijkstra's
+    /// algorithm with reduced costs; updates the potentials.
     ///
-    /// Takes time for the nodes that are nearer, and none for the others: potentials matter only by
-    /// their differences, so those of the nearer ones are lowered instead of raising all.
+    /// Only nodes that are nearer take time. Potentials matter only by their differences, so those
+    /// of the nearer nodes are lowered instead of raising all others.
     fn nearest(&mut self, source: NodeId, demand: &Demand) -> Option<(NodeId, Vec<Step>)> {
         let found = self.explore(source, demand);
         let workspace = &mut *self.workspace;
@@ -208,12 +212,12 @@ impl<W: Weight> Search<'_, '_, W> {
         path
     }
 
-    /// Looks for that node, and says how far it is.
+    /// Searches for that node. Returns it with its distance.
     fn explore(&mut self, source: NodeId, demand: &Demand) -> Option<(NodeId, W)> {
         let (network, present) = (self.network.network(), self.network.schedule());
         let workspace = &mut *self.workspace;
         let is_wanted = |node: NodeId| demand.get(&node).is_some_and(Rational::is_positive);
-        // Of nodes at the same distance, those fewer steps away come first: many may be as near as the source.
+        // Ties go to nodes with fewer steps, because many nodes may be as near as the source.
         let mut queue = BinaryHeap::from([Reverse((W::zero(), 0_u32, source))]);
         workspace.touched.push(source);
         workspace.reached[source.index()] = Some(Reached {
@@ -254,8 +258,8 @@ impl<W: Weight> Search<'_, '_, W> {
                     workspace.touched.push(far);
                 }
                 if known.as_ref().is_none_or(|old| candidate < old.distance) {
-                    // Nothing is nearer than what is no farther than the nearest of the queue: from
-                    // a good schedule, many nodes are as near, and need not be looked at.
+                    // A node as near as the head of the queue is the nearest one. From a good
+                    // schedule, many nodes are equally near, and need not be examined.
                     let is_nearest = candidate == distance && is_wanted(far);
                     if !is_nearest {
                         queue.push(Reverse((candidate.clone(), steps + 1, far)));
@@ -275,13 +279,13 @@ impl<W: Weight> Search<'_, '_, W> {
     }
 }
 
-/// For each node one for all that these constraints lead to and back from. They lead to nodes with the same one, or a
-/// greater one.
+/// Returns, for each node, its strongly connected component by these constraints, named by one
+/// node. Constraints lead to the same component, or to a greater one.
 fn components(
     node_count: usize,
     constraints: &mut dyn Iterator<Item = (NodeId, NodeId)>,
 ) -> Vec<NodeId> {
-    // Only where they lead counts.
+    // Only the ends of the constraints matter, not their bounds.
     let mut network: Network<i128> = Network::with_nodes(node_count);
     for (from, to) in constraints {
         network.add(Constraint::at_most(from, to, 0));
@@ -291,11 +295,12 @@ fn components(
     components.into_iter().map(|number| nodes[number]).collect()
 }
 
-/// Whether some nodes from which only constraints between themselves lead have more units that leave them than come into
-/// them. Then there is no flow; the search for a path would go everywhere before it says so.
+/// Returns `true` if a set of nodes without outgoing constraints has a net demand to send units
+/// out. There is then no flow, but the search for a path would visit the whole network before it
+/// fails.
 ///
-/// Such nodes are those of one component, and all of the greater ones, if `left` has none of them, from which other
-/// constraints lead.
+/// The sets considered are a component and all greater ones, provided that none of the nodes in
+/// `left`, where other constraints begin, belongs to them.
 fn is_endless(
     demand: &Demand,
     components: &[NodeId],
@@ -303,7 +308,7 @@ fn is_endless(
 ) -> bool {
     let component = |node: NodeId| components.get(node.index()).copied();
     let left = left.filter_map(component).max();
-    // By component.
+    // Sums of demands by component.
     let mut inside = Demand::new();
     for (node, amount) in demand {
         if let Some(own) = component(*node).filter(|own| left.is_none_or(|left| *own > left)) {
@@ -324,7 +329,7 @@ mod tests {
 
     use super::*;
 
-    /// A network of six nodes, in which 0, 1, 2, … is a schedule.
+    /// Returns a network of six nodes with the schedule 0, 1, 2, ….
     fn network(random: &mut ChaCha8Rng) -> Network<i64> {
         let mut network = Network::with_nodes(6);
         for _ in 0..random.random_range(4..12) {

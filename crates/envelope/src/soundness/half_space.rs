@@ -1,12 +1,12 @@
-//! What a broken obligation says about other boxes: a [`Row`].
+//! Derivation of a [`Row`] for other boxes from a violated obligation.
 //!
-//! Where the bad case is one inequality in differences of times that are parameters, what it says
-//! is a linear function of the parameters: some schedule exists for every value in a box inside the
-//! envelope, and whichever it is, these differences are what the values say. So the worst corner of
-//! the box decides, and every box inside the envelope satisfies one linear inequality in its ends.
+//! Let the bad case be one inequality in differences of times that are parameters. Then it is a
+//! linear function of the parameters: for every value in a box inside the envelope there is some
+//! schedule, and in each schedule these differences equal the values. So the worst corner of the
+//! box decides, and every box inside the envelope satisfies one linear inequality in its ends.
 //!
-//! An over-all condition is read at a moment that lies anywhere inside its action. It is taken as
-//! close to one of the events around it as one likes, if that is a possible place for the moment.
+//! An over-all condition is read at a moment anywhere inside its action. The moment is taken
+//! arbitrarily close to one of the events around it, if that is a possible place.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -21,7 +21,7 @@ use crate::obligations::{BadCase, Difference};
 use crate::reduction::Reduction;
 use crate::row::Row;
 
-/// A time as a function of the parameters: `time of a root + offset + Σ factor · parameter`.
+/// Time as a function of the parameters: `time of a root + offset + Σ factor · parameter`.
 #[derive(Clone, Debug)]
 struct Place {
     root: usize,
@@ -30,8 +30,8 @@ struct Place {
 }
 
 impl Soundness {
-    /// What every box inside the envelope satisfies because of each of these, which are broken in this
-    /// one; `None` if that is nothing linear.
+    /// Returns, for each of these violations in `envelope`, the row that every box inside the
+    /// robustness envelope satisfies because of it; `None` if it is not linear.
     pub(crate) fn rows(
         &self,
         plan: &ParametrizedPlan,
@@ -75,7 +75,8 @@ impl Soundness {
                 events.dedup();
                 events.into_iter().find_map(|event| {
                     let expression = at(&inequality.expression, moment, event)?;
-                    // Only near the event, so that the bound itself need not be reached.
+                    // The moment is only close to the event, so the bound itself need not be
+                    // reached.
                     let row = row(&expression, true)?;
                     let is_possible = widest
                         .is_some_and(|network| self.is_there(network, case, moment, event))
@@ -87,8 +88,8 @@ impl Soundness {
         }
     }
 
-    /// Whether the moment can be as close to the event as one likes, for the values at which a box
-    /// with the nominal values in it breaks the row.
+    /// Returns `true` if the moment can be arbitrarily close to the event, for the values at which
+    /// a box that contains the nominal values violates the row.
     fn is_possible(
         &self,
         plan: &ParametrizedPlan,
@@ -111,10 +112,11 @@ impl Soundness {
             .is_some_and(|network| self.is_there(&network, case, moment, event))
     }
 
-    /// The network of all schedules for values in a box, if there are any.
+    /// Returns the network of all schedules for values in a box, if there are any.
     fn schedules_in(&self, envelope: &DecoupledEnvelope) -> Option<ConsistentNetwork<Delta>> {
         let network = self.reduction.network(envelope).network;
-        // From a schedule in which things take their time, what is far away in time is far away.
+        // Relative to the nominal schedule, nodes that are far apart in time are also far apart in
+        // the search for shortest paths.
         let times = self.reduction.class_times(&self.schedule).into_iter();
         let known = elbowroom_stn::Schedule::new(times.map(Delta::from).collect());
         if known.holds_in(&network) {
@@ -123,8 +125,8 @@ impl Soundness {
         ConsistentNetwork::try_from(network).ok()
     }
 
-    /// Whether the moment can be as close to the event as one likes in all schedules of a network, and so
-    /// in all of one that allows fewer.
+    /// Returns `true` if the moment can be arbitrarily close to the event in all schedules of a
+    /// network. The result also holds for every network with fewer schedules.
     fn is_there(
         &self,
         network: &ConsistentNetwork<Delta>,
@@ -132,7 +134,7 @@ impl Soundness {
         moment: NodeId,
         event: NodeId,
     ) -> bool {
-        // Just before the event all that comes before it has happened, just after it the same.
+        // Just before the event, and just after it, the same other events have happened.
         [true, false].into_iter().any(|is_before| {
             case.differences.iter().all(|difference| {
                 entails(
@@ -148,8 +150,8 @@ impl Soundness {
     }
 }
 
-/// Whether a difference holds in all schedules of the network, the moment being just before or just
-/// after the event.
+/// Returns `true` if a difference holds in all schedules of the network, with the moment just
+/// before or just after the event.
 fn entails(
     reduction: &Reduction,
     network: &ConsistentNetwork<Delta>,
@@ -160,7 +162,7 @@ fn entails(
 ) -> bool {
     let place = |node: NodeId| if node == moment { event } else { node };
     let (from, to) = (place(difference.from), place(difference.to));
-    // `to - from <= bound`, where moving the moment may help or cost a little.
+    // `to - from <= bound`; moving the moment may help or cost an infinitesimal.
     let helps = (difference.to == moment && is_before) || (difference.from == moment && !is_before);
     let costs = (difference.to == moment && !is_before) || (difference.from == moment && is_before);
     let bound = Delta::from(difference.bound.clone());
@@ -186,7 +188,7 @@ fn entails(
     }
 }
 
-/// The expression with one node's time in place of another's; `None` if products are in it.
+/// Replaces the moment by the event in an expression; `None` if it contains products.
 fn at(expression: &Linear, moment: NodeId, event: NodeId) -> Option<Linear> {
     if !expression.products.is_empty() {
         return None;
@@ -198,7 +200,7 @@ fn at(expression: &Linear, moment: NodeId, event: NodeId) -> Option<Linear> {
     Some(placed)
 }
 
-/// That `expression <= 0`, or `< 0` when strict, is not so at the worst corner.
+/// Returns the row that `expression <= 0`, or `< 0` when strict, does not hold at the worst corner.
 fn half_space(
     reduction: &Reduction,
     places: &[Place],
@@ -233,7 +235,7 @@ fn half_space(
     }
     let factors = factors.into_iter().filter(|(_, factor)| !factor.is_zero());
     let factors = factors.map(|(parameter, factor)| {
-        // What lowers the expression makes it bad.
+        // The worst end is the one that lowers the expression.
         let side = if factor.is_positive() {
             Side::Lower
         } else {
@@ -248,8 +250,8 @@ fn half_space(
     })
 }
 
-/// Each class's time as a function of the parameters, as far as differences that are parameters
-/// lead; the first class has time zero.
+/// Returns each class's time as a function of the parameters, as far as differences that are
+/// parameters connect the classes; the first class has time zero.
 fn places(reduction: &Reduction) -> Vec<Place> {
     let count = reduction.class_count();
     let mut neighbours: Vec<Vec<(usize, ParameterId, Rational, Rational)>> =

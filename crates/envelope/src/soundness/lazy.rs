@@ -1,4 +1,4 @@
-//! The network of a box, made only when something has to be proved anew.
+//! The network of a box, built only when a new proof is needed.
 
 use elbowroom_model::Task;
 
@@ -9,16 +9,16 @@ use crate::obligations::{BadCase, Obligations, OverAll, Refusal};
 use crate::reduction::Reduction;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
-/// The network of a box, made when first needed.
+/// Network of a box, built on first use.
 pub(crate) enum Lazy<'a> {
     Unmade(&'a Reduction, &'a DecoupledEnvelope, Option<&'a Numbers>),
     Made(AnySchedules<'a>),
-    /// The box has no schedule at all: then none is bad.
+    /// The box has no schedule, so none is bad.
     Empty,
 }
 
 impl<'a> Lazy<'a> {
-    /// `None` if the box has no schedule at all.
+    /// Returns the network; `None` if the box has no schedule.
     pub(crate) fn get(&mut self) -> Option<&mut AnySchedules<'a>> {
         if let Self::Unmade(reduction, envelope, numbers) = *self {
             *self = AnySchedules::new(reduction, envelope, numbers).map_or(Self::Empty, Self::Made);
@@ -30,14 +30,14 @@ impl<'a> Lazy<'a> {
     }
 }
 
-/// The network of a box, with whole numbers for weights if they fit.
+/// Network of a box, with whole numbers as weights if they fit.
 pub(crate) enum AnySchedules<'a> {
     Whole(Schedules<'a, Whole>),
     Exact(Schedules<'a, Exactly>),
 }
 
 impl<'a> AnySchedules<'a> {
-    /// `None` if the box has no schedule at all.
+    /// Builds the network; `None` if the box has no schedule.
     fn new(
         reduction: &'a Reduction,
         envelope: &'a DecoupledEnvelope,
@@ -49,7 +49,7 @@ impl<'a> AnySchedules<'a> {
         }
     }
 
-    /// The same, whose proofs tell what they add up.
+    /// Like [`new`](Self::new), but proofs list the constraints that they add up.
     pub(crate) fn telling(
         reduction: &'a Reduction,
         envelope: &'a DecoupledEnvelope,
@@ -89,7 +89,7 @@ impl<'a> AnySchedules<'a> {
     }
 }
 
-/// The numbers that bounds are made of, but for the ends of boxes; `None` if they are large.
+/// Returns the numbers in bounds, except the ends of boxes; `None` if they are large.
 pub(crate) fn numbers(reduction: &Reduction, obligations: &Obligations) -> Option<Numbers> {
     let mut numbers = Numbers::default();
     numbers.include_edges(reduction.edges())?;

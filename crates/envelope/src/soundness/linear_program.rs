@@ -1,4 +1,4 @@
-//! The general case: several inequalities at once, or parameters that stand in several places.
+//! The general case: several inequalities at once, or parameters that occur in several places.
 
 use std::collections::BTreeMap;
 
@@ -13,11 +13,11 @@ use crate::obligations::Inequality;
 use crate::reduction::Reduction;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side, Valuation};
 
-/// The meaning of a bound of the linear program.
+/// Meaning of a bound of the linear program.
 enum Meaning {
     Edge(usize),
     End(BoxEnd),
-    /// What is assumed, or an inequality.
+    /// An assumption or an inequality.
     Given(Term, Delta),
     Zero,
 }
@@ -30,7 +30,7 @@ struct Program<'a> {
     meanings: Vec<Meaning>,
 }
 
-/// The proof that no schedule of the box, with the constraints assumed, satisfies all
+/// Returns the proof that no schedule of the box, with the assumed constraints, satisfies all
 /// inequalities (which are free of products); `None` if one does.
 pub(crate) fn refute(
     reduction: &Reduction,
@@ -45,7 +45,7 @@ pub(crate) fn refute(
         let term = match program.meanings[tag] {
             Meaning::Edge(index) => Some(Term::Edge(index)),
             Meaning::Given(term, _) => Some(term),
-            // Which ends count follows from the rest.
+            // The ends in the sum follow from the rest.
             Meaning::End(_) | Meaning::Zero => None,
         };
         certificate
@@ -66,8 +66,8 @@ pub(crate) fn refute(
     Some(certificate.complete())
 }
 
-/// Times of all classes and values of the parameters that satisfy everything, if there are any;
-/// those that make `least` smallest, if something does.
+/// Returns times of all classes and values of the parameters that satisfy everything, if there are
+/// any. They minimise `least`, if it has a minimum.
 pub(crate) fn witness(
     reduction: &Reduction,
     envelope: &DecoupledEnvelope,
@@ -79,7 +79,7 @@ pub(crate) fn witness(
     program.simplex.check().ok()?;
     if let Some(least) = least {
         let (row, _) = program.row(least);
-        // Where there is no smallest value, any will do.
+        // Without a minimum, any values are accepted.
         program.simplex.minimize(&row).ok()?;
     }
     let model = program.simplex.model();
@@ -107,7 +107,7 @@ impl<'a> Program<'a> {
         inequalities: &[Inequality],
     ) -> Self {
         let mut simplex = Simplex::new();
-        // One class more for the moment of an over-all condition, whether or not it occurs.
+        // One additional class for the moment of an over-all condition, whether or not it occurs.
         let classes = (0..=reduction.class_count())
             .map(|_| simplex.add_variable())
             .collect();
@@ -171,7 +171,7 @@ impl<'a> Program<'a> {
         }
     }
 
-    /// `t_to - t_from -/+ parameter <= constant`.
+    /// Adds `t_to - t_from -/+ parameter <= constant`.
     fn add_edge(&mut self, index: usize) {
         let edge = &self.reduction.edges()[index];
         let mut row: BTreeMap<VariableId, Rational> = BTreeMap::new();
@@ -192,7 +192,7 @@ impl<'a> Program<'a> {
         self.at_most(&row, bound, Meaning::Edge(index));
     }
 
-    /// The expression as a combination of variables, and its constant.
+    /// Returns the expression as a combination of variables, and its constant.
     fn row(&self, expression: &Linear) -> (Vec<(VariableId, Rational)>, Rational) {
         let mut row: BTreeMap<VariableId, Rational> = BTreeMap::new();
         let constant = spread(self.reduction, expression, |class, coefficient| {

@@ -10,23 +10,23 @@ use super::scale::Scale;
 use crate::obligations::{BadCase, Difference, OverAll, Refusal};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan};
 
-/// How many places of the moment are told apart in one over-all condition.
+/// Limit on the places of the moment that are distinguished in one over-all condition.
 const MOST_PLACES: usize = 100_000;
 
-/// Why there is no moment at which the condition is false.
+/// Proof that there is no moment at which the condition is false.
 #[derive(Clone, Debug)]
 pub(crate) enum Proof {
     /// There is no such moment, whatever the condition.
     NoMoment(Certificate),
-    /// Which events come before the moment is settled, and the condition is true there: one proof
-    /// for each way in which it could be false.
+    /// The events before the moment are fixed, and the condition is true there: one proof for each
+    /// way for it to be false.
     True(Vec<Vec<Certificate>>),
     /// The moment is at or after an event, or before it.
     Either(Box<Proof>, Box<Proof>),
 }
 
 impl Proof {
-    /// Whether the proof stands in a box that differs from its own in `moved` only.
+    /// Returns `true` if the proof holds in a box that differs from its own only in `moved`.
     pub(crate) fn holds_in(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
         match self {
             Self::NoMoment(certificate) => certificate.holds_in(envelope, moved),
@@ -38,7 +38,7 @@ impl Proof {
     }
 }
 
-/// Looks for a moment at which an over-all condition is false.
+/// Search for a moment at which an over-all condition is false.
 pub(crate) struct Prover<'a, 'b, S: Scale> {
     pub(crate) task: &'a Task,
     pub(crate) plan: &'a ParametrizedPlan,
@@ -52,7 +52,7 @@ pub(crate) struct Prover<'a, 'b, S: Scale> {
     places: usize,
 }
 
-/// A proof, or how the condition can be false.
+/// Proof, or a way for the condition to be false.
 pub(crate) type Attempt = Result<Proof, BadCase>;
 
 impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
@@ -75,7 +75,7 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
         }
     }
 
-    /// Proves the condition in the box, reusing what stands of an old proof.
+    /// Proves the condition in the box, reusing the valid parts of an old proof.
     pub(crate) fn prove(
         &mut self,
         old: Option<&Proof>,
@@ -183,7 +183,7 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
         }
     }
 
-    /// All events are placed: the condition's value is now an expression.
+    /// Decides the condition after all events are placed: its value is now an expression.
     fn settle(&mut self, happened: &[NodeId]) -> Result<Attempt, Refusal> {
         let cut = |node: NodeId| happened.contains(&node);
         let mut proofs = Vec::new();

@@ -1,7 +1,8 @@
-//! Weights of the networks in which bad cases are looked for.
+//! Weights of the networks for bad cases.
 //!
-//! Bounds are fractions, and strict ones an infinitesimal less. Nearly always they fit whole
-//! numbers, multiplied by their common denominator: that is several times faster, and as exact.
+//! Bounds are fractions, and strict ones an infinitesimal less. Multiplied by their common
+//! denominator, they almost always fit whole numbers, which are several times faster and equally
+//! exact.
 
 use elbowroom_num::{CommonDenominator, Delta, Rational};
 use elbowroom_stn::Weight;
@@ -14,10 +15,11 @@ pub(crate) trait Scale {
     /// The weight of a bound.
     type Weight: Weight;
 
-    /// The bound's weight.
+    /// Returns the bound's weight.
     fn weight(&self, bound: &Delta) -> Self::Weight;
 
-    /// Whether a time is one that paths can add up to, so that sums with it fit.
+    /// Returns `true` if a time is no larger than the length of a path can be, so that sums with it
+    /// fit.
     fn is_moderate(&self, time: &Self::Weight) -> bool;
 }
 
@@ -43,10 +45,10 @@ pub(crate) struct Whole {
     denominator: i64,
 }
 
-/// How many δ make up the smallest difference of two bounds: more than anything adds up.
+/// Number of δ in the smallest difference of two bounds; more than any sum contains.
 const UNIT: i128 = 1 << 40;
 
-/// All weights on a path without repetition add up to less, δ apart.
+/// Upper bound on the sum of all weights on a path without repetition, δ aside.
 const LARGEST_PATH: i128 = 1 << 60;
 
 impl Scale for Whole {
@@ -70,12 +72,12 @@ impl Scale for Whole {
 }
 
 impl Whole {
-    /// The scale for the schedules of a box on which differences with the bounds in `numbers` are
-    /// imposed; `None` if it takes numbers so large that sums might not fit.
+    /// Returns the scale for the schedules of a box, for differences with the bounds in `numbers`;
+    /// `None` if the numbers are so large that sums might not fit.
     ///
-    /// A schedule's times lie between sums of paths, and those are at most [`LARGEST_PATH`]
-    /// units. What the searches add up on top of that is a few such sums for each constraint
-    /// imposed at a time; 127 bits leave room for millions.
+    /// A schedule's times lie between sums of paths, and those are at most [`LARGEST_PATH`] units.
+    /// The searches add a few such sums for each constraint that is added; 127 bits are enough for
+    /// millions.
     pub(crate) fn fitting(
         reduction: &Reduction,
         envelope: &DecoupledEnvelope,
@@ -116,7 +118,7 @@ impl Default for Numbers {
 }
 
 impl Numbers {
-    /// Includes a number; `None` if the numbers get too large.
+    /// Includes a number. Returns `None` if the numbers become too large.
     pub(crate) fn include(&mut self, number: &Rational) -> Option<()> {
         let (numerator, own) = number.as_small()?;
         self.denominator.include(number)?;
@@ -139,7 +141,7 @@ mod tests {
     use crate::reduction::Reduction;
     use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, StnPlan};
 
-    /// The scale for these numbers in a plan without actions.
+    /// Returns the scale for these numbers in a plan without actions.
     fn fitting(inside: &[Rational], ends: &[Rational]) -> Option<Whole> {
         let task = elbowroom_model::Task::new(elbowroom_model::Problem::default());
         let plan = StnPlan::unconstrained(&task, Vec::new());

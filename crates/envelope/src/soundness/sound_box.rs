@@ -1,4 +1,4 @@
-//! A box that grows as long as every schedule in it is valid.
+//! Box that grows as long as every schedule in it is valid.
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -7,9 +7,9 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 use super::Soundness;
 use crate::obligations::Refusal;
 
-/// A box in which every schedule is valid. That there is a schedule for each value is not asked,
-/// so where a parameter is the bound of a constraint, the ends of its interval may as well be the
-/// bounds of it.
+/// Box in which every schedule is valid. It is not required that each value has a schedule. So if a
+/// parameter is the bound of a constraint, the ends of its interval can also be used as the bounds
+/// of that constraint.
 #[derive(Clone, Debug)]
 pub struct SoundBox<'a> {
     task: &'a Task,
@@ -19,10 +19,10 @@ pub struct SoundBox<'a> {
 }
 
 impl<'a> SoundBox<'a> {
-    /// The nominal values; `None` if not even with these every schedule is valid.
+    /// Creates a box with the nominal values; `None` if some schedule is invalid at these values.
     ///
     /// # Errors
-    /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
+    /// If the plan has no schedule at its nominal values, or contains something beyond exact linear
     /// reasoning.
     pub fn new(task: &'a Task, plan: &'a ParametrizedPlan) -> Result<Option<Self>, Refusal> {
         let nominal = plan.nominal();
@@ -38,16 +38,16 @@ impl<'a> SoundBox<'a> {
         }))
     }
 
-    /// The box.
+    /// Returns the box.
     pub fn envelope(&self) -> &DecoupledEnvelope {
         &self.envelope
     }
 
-    /// Moves one end out so that it reaches that far ([`BoxEnd::reach`]; `None` is infinitely far),
-    /// if every schedule stays valid: whether it does.
+    /// Moves one end out to `reach` ([`BoxEnd::reach`]; `None` is infinitely far), if every
+    /// schedule stays valid. Returns `true` if it does.
     ///
     /// # Errors
-    /// When there are too many cases to tell apart.
+    /// If there are too many cases to decide.
     pub fn try_reach(&mut self, end: BoxEnd, reach: Option<Rational>) -> Result<bool, Refusal> {
         let candidate = end.with_reach(&self.envelope, reach);
         let broken = self

@@ -1,4 +1,4 @@
-//! Why no condition can fail in a box, constraint by constraint.
+//! Proofs that no condition can fail in a box, constraint by constraint.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::proved::{ConditionProof, Impossible, Refutation, Summand, Unfailing};
 use crate::reduction::Reduction;
 
 impl Soundness {
-    /// Why no condition can fail in a box in which none does; `None` if the box has no schedule.
+    /// Returns the proofs for a box without violations; `None` if the box has no schedule.
     pub(crate) fn told(
         &self,
         task: &Task,
@@ -78,7 +78,8 @@ struct Teller<'a> {
 }
 
 impl Teller<'_> {
-    /// Why a way to fail is impossible. Proofs count differences along `known`, then `own`.
+    /// Converts the proofs that a way to fail is impossible. They number differences along `known`,
+    /// then `own`.
     fn impossible(
         &self,
         own: &[Difference],
@@ -104,9 +105,9 @@ impl Teller<'_> {
         }
     }
 
-    /// For each combination of ends of multiplied parameters, the last parameter's ends first, the
-    /// position of its proof, and their values there. Where both ends are the same value, they share a
-    /// proof. What becomes of an infinite end is not told.
+    /// Returns, for each combination of ends of multiplied parameters, the position of its proof
+    /// and the values there. The last parameter's ends vary slowest. Equal ends share a proof.
+    /// Returns none if an end is infinite.
     fn places_of(&self, corners: &[ParameterId]) -> Vec<(usize, BTreeMap<ParameterId, Rational>)> {
         let mut places = vec![(0, BTreeMap::new())];
         for &parameter in corners {
@@ -131,7 +132,8 @@ impl Teller<'_> {
         places
     }
 
-    /// The sum in terms of the plan's own constraints, for some values of multiplied parameters.
+    /// Returns the sum in terms of the plan's own constraints, for some values of multiplied
+    /// parameters.
     fn refutation(
         &self,
         proof: &Certificate,
@@ -187,7 +189,7 @@ impl Teller<'_> {
             .collect()
     }
 
-    /// Why an over-all condition cannot fail.
+    /// Converts the proof that an over-all condition cannot fail.
     fn over_all(&self, over_all: &OverAll, proof: &Proof) -> Option<Unfailing> {
         let events = over_all.events(self.is_in_ranges);
         let mut place = Place {
@@ -247,17 +249,17 @@ impl Teller<'_> {
     }
 }
 
-/// Where the moment of an over-all condition is.
+/// Place of the moment of an over-all condition.
 struct Place {
     known: Vec<Difference>,
     happened: Vec<NodeId>,
 }
 
-/// A tree of the constraints that fix differences, by which the times of nodes that are rigidly
-/// connected are reckoned in each other.
+/// Spanning trees of the constraints that fix differences. They express the times of rigidly
+/// connected nodes by each other.
 struct Rigid {
-    /// Nodes in an order in which each comes after the one that it is reckoned by; that node, the
-    /// constraint between the two, and whether it leads to the first.
+    /// Nodes, each after the node that its time is computed from; with that node, the constraint
+    /// between the two, and `true` if the constraint leads to the first.
     reckoned: Vec<(NodeId, NodeId, usize, bool)>,
 }
 
@@ -291,13 +293,13 @@ impl Rigid {
         Self { reckoned }
     }
 
-    /// Adds those constraints by which times cancel out that are left in a sum.
+    /// Adds the constraints that cancel the times left in a sum.
     fn settle(&self, left: &mut BTreeMap<NodeId, Rational>, sum: &mut BTreeMap<Summand, Rational>) {
         for &(node, by, index, is_to) in self.reckoned.iter().rev() {
             let Some(factor) = left.remove(&node).filter(|factor| !factor.is_zero()) else {
                 continue;
             };
-            // The bound in which the time has the other sign.
+            // The bound with the opposite sign of the time.
             let summand = if factor.is_positive() == is_to {
                 Summand::AtLeast(index)
             } else {

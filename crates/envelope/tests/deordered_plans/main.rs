@@ -1,8 +1,8 @@
-//! Deordering against the judge, on problems made so that a random plan is valid.
+//! Deordering compared with the validator, on problems constructed so that a random plan is valid.
 //!
-//! A random plan of random effects comes first. Then conditions are added one at a time, each of
-//! which the judge finds to hold in that plan; so they are many, and tight. Whatever schedule the
-//! deordered plan has, the judge must find them to hold in it as well.
+//! The test begins with a random plan of random effects. Then it adds conditions one at a time that
+//! the validator confirms in that plan, so that they are many and tight. In every schedule of the
+//! deordered plan, the validator must confirm them as well.
 
 mod scenario;
 
@@ -23,7 +23,7 @@ use rand_chacha::ChaCha8Rng;
 
 use scenario::{scenario, time};
 
-/// A schedule whose nodes, in random order, take an end or a random point of their windows.
+/// Returns a schedule whose nodes, in random order, take an end or a random point of their windows.
 fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     let zero = network_node(NodeId::ZERO);
     let mut network = ConsistentNetwork::try_from(plan.network(&Valuation::default()))
@@ -50,7 +50,7 @@ fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     network.schedule().relative_to(zero).into()
 }
 
-/// Steps with what they need and do, and what is left of their order.
+/// Describes the steps with their conditions and effects, and their remaining order.
 fn shown(task: &Task, plan: &StnPlan, fixed: &TimeTriggeredPlan) -> String {
     let steps = fixed.steps.iter().map(|step| {
         let duration = step.duration.clone().unwrap_or_default();
@@ -74,7 +74,7 @@ fn shown(task: &Task, plan: &StnPlan, fixed: &TimeTriggeredPlan) -> String {
     steps.chain(order).chain([timed]).collect()
 }
 
-/// What some schedule of the plan breaks.
+/// Returns an obligation that some schedule of the plan violates.
 fn broken(task: &Task, plan: &StnPlan) -> Result<Option<Broken>, Refusal> {
     let closed = ParametrizedPlan::closed(task, plan.clone());
     let everything = DecoupledEnvelope::point(&Valuation::default());
@@ -95,7 +95,7 @@ fn assert_sound(seed: u64, task: &Task, plan: &StnPlan, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// A random scenario without an order, with its random numbers.
+/// Returns a random scenario, deordered, with its random number generator.
 fn deordered(seed: u64, is_timeless: bool) -> (ChaCha8Rng, Task, Deordered) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let scenario = scenario(&mut rng, is_timeless);
@@ -108,8 +108,8 @@ fn deordered(seed: u64, is_timeless: bool) -> (ChaCha8Rng, Task, Deordered) {
     )
 }
 
-/// Deordering alone is claimed to be enough where [`keeps_all_that_is_read`] says so: the judge and the
-/// soundness check look at what it says so of.
+/// If [`keeps_all_that_is_read`] returns `true`, deordering alone keeps the plan valid. The
+/// validator and the soundness check confirm that.
 #[test]
 fn all_schedules_are_valid_where_deordering_is_said_to_keep_all_that_is_read() {
     let (mut kept, mut with_numbers, mut in_doubt, mut unsound) = (0, 0, 0, 0);
@@ -166,8 +166,8 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
     println!("{pinned} of 250 plans needed pins; of {untold} nothing could be told");
 }
 
-/// Of what a condition throughout an action reads, only what can happen on either side of a moment inside the action
-/// is placed; the slow way, which decides about each event, comes to the same wherever the moment is.
+/// For an over-all condition, only events that can be on either side of a moment inside the action
+/// are placed. The result equals that of placing every event, for every moment.
 #[test]
 fn what_is_far_from_an_action_makes_no_difference_to_what_holds_throughout() {
     let (mut conditions, mut fewer) = (0, 0);

@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 const FACTS: u32 = 4;
 const FLUENTS: u32 = 3;
 
-/// A problem of actions without parameters, and when its plan does each of them, for how long.
+/// Problem of actions without parameters, with the start times and durations of its plan.
 #[derive(Clone)]
 pub(super) struct Scenario {
     problem: Problem,
@@ -72,12 +72,13 @@ fn fluent(rng: &mut ChaCha8Rng) -> Fluent {
     }
 }
 
-/// A time on a grid, so that happenings often coincide.
+/// Returns a random time on a grid, so that happenings often coincide.
 pub(super) fn time(rng: &mut ChaCha8Rng, most: i64) -> Rational {
     Rational::new(rng.random_range(1..=2 * most), 2)
 }
 
-/// What an effect depends on, mostly nothing. Only end effects look back.
+/// Returns the guard of an effect, usually trivial. Only end effects can read the state at the
+/// start.
 fn guard(rng: &mut ChaCha8Rng, is_end: bool) -> Guard {
     let mut part = |may_be: bool| {
         if may_be && rng.random_bool(0.08) {
@@ -150,7 +151,7 @@ fn duration_constraints(rng: &mut ChaCha8Rng, duration: &Rational) -> Vec<Durati
     }
 }
 
-/// Effects and times at random; `is_timeless`: no value depends on when things happen.
+/// Generates random effects and times. With `is_timeless`, no value depends on times.
 fn effects_only(rng: &mut ChaCha8Rng, is_timeless: bool) -> Scenario {
     let mut schemas = Vec::new();
     let mut times = Vec::new();
@@ -189,7 +190,7 @@ fn effects_only(rng: &mut ChaCha8Rng, is_timeless: bool) -> Scenario {
         });
         times.push((time(rng, 10), duration));
     }
-    // Different times: initials of one time must not contradict each other.
+    // All times differ, because initials of one time must not contradict each other.
     let moments: std::collections::BTreeSet<_> =
         (0..rng.random_range(0..4)).map(|_| time(rng, 12)).collect();
     let initials = moments.into_iter().map(|time| TimedInitial {
@@ -255,7 +256,7 @@ fn condition(rng: &mut ChaCha8Rng) -> Condition {
     }
 }
 
-/// The scenario with one condition more, somewhere.
+/// Returns the scenario with one more condition in a random place.
 fn with_condition(scenario: &Scenario, rng: &mut ChaCha8Rng) -> Scenario {
     let mut scenario = scenario.clone();
     let new = condition(rng);
@@ -278,7 +279,7 @@ fn with_condition(scenario: &Scenario, rng: &mut ChaCha8Rng) -> Scenario {
     scenario
 }
 
-/// A valid plan with as many conditions as were found to hold.
+/// Returns a valid plan with as many conditions as were found to hold.
 pub(super) fn scenario(rng: &mut ChaCha8Rng, is_timeless: bool) -> Scenario {
     let mut scenario = loop {
         let scenario = effects_only(rng, is_timeless);

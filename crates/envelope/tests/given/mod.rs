@@ -13,24 +13,23 @@ use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::parametrize::vary;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
-/// A problem over the facts `(p)`, `(q)`, `(r)` and the numbers `(x)`, `(y)`, and an STN plan.
+/// Problem over the facts `(p)`, `(q)`, `(r)` and the numbers `(x)`, `(y)`, with an STN plan.
 #[derive(Default)]
 pub(crate) struct Given<'a> {
     /// `:synth-parameters` and actions.
     pub(crate) domain: &'a str,
-    /// What holds in the beginning, and what happens by itself. `(x)` and `(y)` begin at 5, `(z)`
-    /// has no value.
+    /// Initial state and timed initials. `(x)` and `(y)` begin at 5, `(z)` has no value.
     pub(crate) init: &'a str,
     /// The goal; `(and)` if empty.
     pub(crate) goal: &'a str,
     /// An STN plan file.
     pub(crate) plan: &'a str,
-    /// What else to leave open.
+    /// Further quantities to leave open.
     pub(crate) vary: &'a [&'a str],
 }
 
 impl Given<'_> {
-    /// The task with ε = 1/4.
+    /// Returns the task with ε = 1/4, and the plan.
     pub(crate) fn task_and_plan(&self) -> (Arc<Task>, Arc<ParametrizedPlan>) {
         let domain = format!(
             "(define (domain d) (:predicates (p) (q) (r)) (:functions (x) (y) (z)) {})",
@@ -62,7 +61,8 @@ impl Given<'_> {
         (Arc::new(task), Arc::new(plan))
     }
 
-    /// What one oracle says of these boxes, one after the other: `inside`, or why not.
+    /// Returns the answers of one oracle for these boxes, one after the other: `inside`, or the
+    /// objection.
     pub(crate) fn answers(&self, boxes: &[&str]) -> Vec<String> {
         let (task, plan) = self.task_and_plan();
         let mut oracle = oracle(&task, &plan).expect("within reach");
@@ -81,7 +81,7 @@ impl Given<'_> {
             .collect()
     }
 
-    /// What shows that the box is not inside.
+    /// Returns the counterexample that shows that the box is not inside.
     pub(crate) fn counterexample(&self, text: &str) -> Counterexample {
         let (task, plan) = self.task_and_plan();
         let mut oracle = oracle(&task, &plan).expect("within reach");
@@ -98,12 +98,12 @@ impl Given<'_> {
     }
 }
 
-/// The oracle of the weak guarantee.
+/// Creates the oracle of the weak guarantee.
 pub(crate) fn oracle(task: &Arc<Task>, plan: &Arc<ParametrizedPlan>) -> Result<Oracle, Refusal> {
     Oracle::new(task, plan, Guarantee::Weak)
 }
 
-/// `[1, 3/2] [-inf, 0]`: an interval for each parameter.
+/// Parses `[1, 3/2] [-inf, 0]`: an interval for each parameter.
 pub(crate) fn envelope(text: &str) -> DecoupledEnvelope {
     let end = |text: &str| match text.trim() {
         "inf" | "-inf" => End::Infinite,

@@ -1,10 +1,10 @@
-//! The boxes that our search finds on the paper's instances, as Z3 sees them through the authors'
+//! The boxes that the search finds on the paper's instances, checked by Z3 with the authors'
 //! encoding.
 //!
-//! Z3 has a time limit for each question (`ELBOWROOM_Z3_MILLISECONDS`). The generators, whose
-//! numbers change continuously, take it up to half a minute, so that only those of up to
-//! `ELBOWROOM_NODES` time points are asked about, and only the smallest also whether their boxes
-//! can grow. `ELBOWROOM_INSTANCES` is how the names of the instances begin.
+//! Z3 has a time limit for each query (`ELBOWROOM_Z3_MILLISECONDS`). The generators, whose numbers
+//! change continuously, take it up to half a minute. So only generators of up to `ELBOWROOM_NODES`
+//! time points are checked, and only for the smallest ones, the test also checks whether their
+//! boxes can grow. `ELBOWROOM_INSTANCES` is a prefix of the instance names.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -22,7 +22,7 @@ use crate::skipped::skipped;
 use crate::smt::contained;
 use crate::z3::Z3;
 
-/// The most time points of a generator plan that is asked about, if nothing else is said.
+/// Default limit on the time points of a generator plan that is checked.
 const MOST_NODES: u64 = 12;
 
 #[test]
@@ -104,7 +104,7 @@ fn our_boxes_are_inside_by_the_authors_encoding_and_cannot_grow() {
     );
 }
 
-/// What Z3 says of our boxes.
+/// Z3's verdicts on the computed boxes.
 #[derive(Debug, Default)]
 #[allow(dead_code, reason = "printed")]
 struct Tally {
@@ -112,11 +112,11 @@ struct Tally {
     inside: usize,
     shifted: usize,
     outside: usize,
-    /// What it could not tell in time.
+    /// Boxes that Z3 could not decide in time.
     open: Vec<String>,
 }
 
-/// `None` for a plan file without a plan.
+/// Reads an instance; `None` if its plan file is empty.
 fn read(instance: &Instance) -> Option<(Arc<Task>, Arc<ParametrizedPlan>)> {
     let bytes = |path: &Path| std::fs::read(path).expect("a benchmark file");
     let text = bytes(&instance.plan);

@@ -1,4 +1,4 @@
-//! A small problem with an STN plan whose numbers are partly open.
+//! Small problem with an STN plan whose numbers are partly open.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -16,7 +16,7 @@ use elbowroom_plan::{
 
 use crate::numbers;
 
-/// A bound on the difference of two time points, which are named by what they mean.
+/// Bound on the difference of two time points, which are identified by their meaning.
 #[derive(Clone, Debug)]
 pub(crate) struct Gap {
     pub(crate) from: Node,
@@ -25,10 +25,10 @@ pub(crate) struct Gap {
     pub(crate) upper: Bound,
 }
 
-/// A problem, and a plan that does each of its actions once.
+/// Problem with a plan that executes each of its actions once.
 ///
-/// `Unknown::Domain(i)` in the problem is parameter `i`. Timed initials have one time per group,
-/// in ascending order. All predicates, functions and actions are without arguments.
+/// `Unknown::Domain(i)` in the problem is parameter `i`. Timed initials have one time per group, in
+/// ascending order. All predicates, functions and actions are without arguments.
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
     pub(crate) problem: Problem,
@@ -42,7 +42,7 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// The times of the groups of timed initials.
+    /// Returns the times of the groups of timed initials.
     pub(crate) fn timed_times(&self) -> Vec<Rational> {
         let mut times: Vec<_> = self.problem.timed.iter().map(|t| t.time.clone()).collect();
         times.sort();
@@ -50,7 +50,7 @@ impl Case {
         times
     }
 
-    /// What the oracles are asked about.
+    /// Builds the task and the plan for the oracles.
     pub(crate) fn build(&self) -> (Task, ParametrizedPlan) {
         let mut problem = self.problem.clone();
         problem.unknowns = self.parameters.iter().map(|p| p.name.clone()).collect();
@@ -101,7 +101,7 @@ impl Case {
         (task, plan)
     }
 
-    /// The problem with these values in place of its parameters: what the judge knows.
+    /// Returns the problem with these values in place of its parameters, for the validator.
     pub(crate) fn task_at(&self, valuation: &Valuation) -> Task {
         let mut problem = self.problem.clone();
         numbers::fill(&mut problem, &|index| Some(valuation[index.into()].clone()));
@@ -120,7 +120,7 @@ impl Case {
         Task::new(problem).with_epsilon(self.epsilon.clone())
     }
 
-    /// What the judge says of a schedule of the plan for these values.
+    /// Returns the validator's verdict on a schedule of the plan for these values.
     pub(crate) fn judge(&self, valuation: &Valuation, schedule: &Schedule) -> Verdict {
         let (_, plan) = self.build();
         let scheduled = plan.plan.at(valuation).scheduled(schedule);
@@ -140,7 +140,7 @@ impl Case {
         validate(&task, &plan, &Settings::default())
     }
 
-    /// Takes away the domain's duration constraints of an action whose duration is a parameter.
+    /// Removes the domain's duration constraints of an action whose duration is a parameter.
     fn free_duration(&self, action: &mut Action) {
         let is_free = self.parameters.iter().any(|parameter| {
             matches!(parameter.kind, ParameterKind::Duration(id) if id.index() == action.schema.index())
@@ -160,13 +160,13 @@ fn parameter_of(leaf: &Expression) -> Option<Expression> {
     }
 }
 
-/// The plan's node of that meaning.
+/// Returns the plan's node with that meaning.
 pub(crate) fn node_of(plan: &StnPlan, node: Node) -> NodeId {
     let found = plan.nodes().find(|&(_, other)| other == node);
     found.expect("the plan has all its nodes").0
 }
 
-/// The instance that a node belongs to.
+/// Returns the instance that a node belongs to.
 pub(crate) fn instance_of(node: Node) -> Option<InstanceId> {
     match node {
         Node::Start(id) | Node::End(id) | Node::Instant(id) => Some(id),
@@ -174,7 +174,7 @@ pub(crate) fn instance_of(node: Node) -> Option<InstanceId> {
     }
 }
 
-/// For error messages: all of the case, in PDDL's words and the STN plan's.
+/// Formats the whole case in PDDL and as an STN plan, for error messages.
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (task, plan) = self.build();
@@ -253,7 +253,7 @@ fn write_action(f: &mut fmt::Formatter<'_>, task: &Task, instance: &Instance) ->
     }
 }
 
-/// For error messages.
+/// Formats a box, for error messages.
 pub(crate) fn show(envelope: &DecoupledEnvelope) -> String {
     let parts: Vec<_> = envelope
         .intervals()
@@ -263,7 +263,7 @@ pub(crate) fn show(envelope: &DecoupledEnvelope) -> String {
     parts.join(" x ")
 }
 
-/// The box with these intervals.
+/// Returns the box with these intervals.
 pub(crate) fn box_of(intervals: Vec<Interval>) -> DecoupledEnvelope {
     let zeros = intervals.iter().map(|_| Rational::ZERO).collect();
     let given = intervals.into_iter().enumerate();

@@ -1,4 +1,4 @@
-//! All oracles are asked about the same boxes, and the judge about what they claim.
+//! Compares all oracles on the same boxes, and checks their claims with the validator.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -23,26 +23,26 @@ use crate::smt::{Encoding, Places, contained};
 use crate::system::System;
 use crate::z3::{Found, Z3};
 
-/// How many groups of happenings the plain oracle may look at for one box.
+/// Limit on groups of happenings that the plain oracle examines for one box.
 const MOST_GROUPS: usize = 1500;
 
-/// A box to ask about.
+/// Query for a box.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
-    /// This one, as the box to widen from now on.
+    /// This box, which becomes the box to widen.
     Jump(DecoupledEnvelope),
-    /// This one, whatever box is being widened.
+    /// This box, independently of the box to widen.
     Look(DecoupledEnvelope),
-    /// The box that is being widened with one end moved out by so much, or to infinity.
+    /// The box to widen, with one end moved out by a distance, or to infinity.
     Widen { end: BoxEnd, by: Option<Rational> },
-    /// The same, but only to know; the box is not widened.
+    /// The same, but the box to widen does not change.
     LookWider { end: BoxEnd, by: Option<Rational> },
 }
 
-/// What came of it all.
+/// Statistics of a comparison.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
-    /// Boxes asked about, by what the oracles agree on (or do not say).
+    /// Numbers of boxes, by the common verdict of the oracles (or by its absence).
     pub(crate) counts: BTreeMap<&'static str, usize>,
     pub(crate) refusals: BTreeMap<String, usize>,
 }
@@ -74,15 +74,15 @@ impl fmt::Display for Tally {
     }
 }
 
-/// Somebody is wrong.
+/// Contradiction between oracles or with the validator.
 #[derive(Clone, Debug)]
 pub(crate) struct Mismatch {
-    /// The same for the same sort of mistake.
+    /// Kind of the bug: the same for similar ones.
     pub(crate) kind: &'static str,
     pub(crate) details: String,
 }
 
-/// A case with boxes to ask about.
+/// Case with queries.
 #[derive(Clone, Debug)]
 pub(crate) struct Script {
     pub(crate) case: Case,
@@ -90,7 +90,7 @@ pub(crate) struct Script {
 }
 
 impl Script {
-    /// Asks about all boxes, one after the other, the same fast oracle.
+    /// Runs all queries, one after the other, on the same fast oracle.
     pub(crate) fn run(&self, solver: Option<&mut Z3>) -> Result<Tally, Mismatch> {
         let (task, plan) = self.case.build();
         let (task, plan) = (Arc::new(task), Arc::new(plan));
@@ -152,7 +152,8 @@ fn next_box(
     }
 }
 
-/// Random boxes around the nominal point: growing ones as in a search, and some others.
+/// Generates random queries around the nominal point: growing boxes as in a search, and some
+/// others.
 pub(crate) fn steps(dice: &mut Dice, parameters: &[Parameter], length: usize) -> Vec<Step> {
     let nominal: Valuation = parameters.iter().map(|p| p.nominal.clone()).collect();
     let mut steps = vec![Step::Jump(DecoupledEnvelope::point(&nominal))];
@@ -186,7 +187,7 @@ pub(crate) fn steps(dice: &mut Dice, parameters: &[Parameter], length: usize) ->
     steps
 }
 
-/// A box near the nominal point, mostly with that point in it.
+/// Generates a box near the nominal point, usually one that contains it.
 fn random_box(dice: &mut Dice, nominal: &Valuation, parameters: &[Parameter]) -> DecoupledEnvelope {
     let mut envelope = DecoupledEnvelope::point(nominal);
     let is_around = dice.chance(75);
@@ -224,7 +225,7 @@ struct Contest<'a> {
 }
 
 impl Contest<'_> {
-    /// Whether the box is inside; `None` if the fast oracle has no answer.
+    /// Returns `true` if the box is inside; `None` if the fast oracle has no answer.
     fn ask(
         &mut self,
         oracle: &mut Oracle,
@@ -272,7 +273,7 @@ impl Contest<'_> {
         })
     }
 
-    /// All sampled schedules must be valid.
+    /// Checks that all sampled schedules are valid.
     fn sample(&mut self, envelope: &DecoupledEnvelope) -> Result<(), Mismatch> {
         let mut system = System::new(self.plan, envelope);
         for _ in 0..3 {
@@ -314,7 +315,7 @@ impl Contest<'_> {
         Ok(())
     }
 
-    /// The counterexample is a schedule in the box, and the judge refuses it.
+    /// Checks that the counterexample is a schedule in the box, and that the validator rejects it.
     fn confirm(
         &mut self,
         oracle: &Oracle,
@@ -352,7 +353,8 @@ impl Contest<'_> {
         }
     }
 
-    /// The judge does not mind how near a timed initial is to another one.
+    /// Returns `true` if both are timed initials; the validator does not require a distance between
+    /// them.
     fn are_timed(&self, first: NodeId, second: NodeId) -> bool {
         let is_timed = |id: NodeId| matches!(self.plan.plan.nodes[id.index()], Node::Timed(_));
         is_timed(first) && is_timed(second)
@@ -462,7 +464,7 @@ impl Contest<'_> {
         Ok(())
     }
 
-    /// The same without trying corners and impossible orders, as large plans are asked about.
+    /// Compares the verdicts without enumerating corners and impossible orders, as for large plans.
     fn compare_with_shortcuts(
         &mut self,
         envelope: &DecoupledEnvelope,

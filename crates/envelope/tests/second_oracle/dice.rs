@@ -1,8 +1,8 @@
-//! Random choices that can be repeated.
+//! Repeatable random choices.
 
 use elbowroom_num::Rational;
 
-/// The generator `SplitMix64`: small, seedable, and good enough to choose test cases with.
+/// The generator `SplitMix64`: small, seedable, and good enough for choosing test cases.
 pub(crate) struct Dice(u64);
 
 impl Dice {
@@ -18,29 +18,29 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// A number in `0..count`.
+    /// Returns a number in `0..count`.
     pub(crate) fn below(&mut self, count: usize) -> usize {
         let count = u64::try_from(count).expect("small");
         usize::try_from(self.roll() % count).expect("small")
     }
 
-    /// A number in `least..=most`.
+    /// Returns a number in `least..=most`.
     pub(crate) fn between(&mut self, least: i64, most: i64) -> i64 {
         let width = u64::try_from(most - least + 1).expect("least <= most");
         least + i64::try_from(self.roll() % width).expect("small")
     }
 
-    /// True so many times in a hundred.
+    /// Returns `true` with this probability, in percent.
     pub(crate) fn chance(&mut self, percent: usize) -> bool {
         self.below(100) < percent
     }
 
-    /// One of several.
+    /// Returns one of several elements.
     pub(crate) fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
         &from[self.below(from.len())]
     }
 
-    /// A whole number or a half.
+    /// Returns a whole number or a half.
     pub(crate) fn half(&mut self, least: i64, most: i64) -> Rational {
         Rational::new(self.between(2 * least, 2 * most), 2)
     }

@@ -1,4 +1,4 @@
-//! Random cases around a schedule that works.
+//! Random cases around a valid schedule.
 
 mod conditions;
 mod gaps;
@@ -14,10 +14,10 @@ use crate::dice::Dice;
 use crate::system::System;
 use skeleton::skeleton;
 
-/// What a case has more of than others.
+/// Feature that is more frequent in a case.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Theme {
-    /// Nothing.
+    /// No emphasis.
     Mixed,
     /// Timed initials, open ones, and disjunctions that depend on them.
     Timed,
@@ -25,7 +25,7 @@ enum Theme {
     Rates,
     /// Conditional effects.
     Guards,
-    /// Parameters that stand in several places.
+    /// Parameters that occur in several places.
     Shared,
 }
 
@@ -41,7 +41,7 @@ impl Theme {
     ];
 }
 
-/// The case of that number.
+/// Generates the case with that number.
 pub(crate) fn generate(seed: u64) -> Case {
     let mut dice = Dice::new(seed);
     loop {
@@ -51,7 +51,7 @@ pub(crate) fn generate(seed: u64) -> Case {
     }
 }
 
-/// Nothing if the happenings as drawn get in each other's way.
+/// Generates a case; `None` if the happenings are in conflict.
 fn attempt(dice: &mut Dice) -> Option<Case> {
     let theme = *dice.pick(&Theme::ALL);
     let case = Case {
@@ -93,7 +93,7 @@ fn attempt(dice: &mut Dice) -> Option<Case> {
     Some(nominal.case)
 }
 
-/// Times for all nodes, on a grid of halves.
+/// Generates times for all nodes, on a grid of halves.
 fn times(dice: &mut Dice, case: &Case) -> Schedule {
     let mut schedule = vec![Rational::ZERO];
     for schema in &case.problem.schemas {
@@ -128,7 +128,7 @@ impl Nominal<'_> {
         case.judge(&valuation, &self.schedule).is_valid()
     }
 
-    /// Durative actions with their nominal durations.
+    /// Returns durative actions with their nominal durations.
     fn durations(&self) -> Vec<(usize, Rational)> {
         let mut durations = Vec::new();
         for (index, schema) in self.case.problem.schemas.iter().enumerate() {
@@ -151,7 +151,8 @@ impl Nominal<'_> {
     }
 }
 
-/// Some schedule for some values: far out in a random direction, or halfway between two such.
+/// Samples a schedule for some values: extreme in a random direction, or halfway between two such
+/// ones.
 pub(crate) fn sample(system: &mut System, dice: &mut Dice) -> Option<(Valuation, Schedule)> {
     let mut weights = || (0..20).map(|_| dice.between(-1, 1)).collect::<Vec<_>>();
     let (first, second) = (weights(), weights());
@@ -166,5 +167,5 @@ pub(crate) fn sample(system: &mut System, dice: &mut Dice) -> Option<(Valuation,
     Some((values.collect(), times.collect()))
 }
 
-/// No sampled schedule is longer.
+/// Upper bound on the length of sampled schedules.
 const HORIZON: i64 = 60;

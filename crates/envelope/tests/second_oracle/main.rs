@@ -1,14 +1,14 @@
-//! The fast oracle against a plainly right one, an SMT solver, and the judge.
+//! The fast oracle, compared with a brute-force one, an SMT solver, and the validator.
 //!
-//! Random small plans are generated around a schedule that works. On growing boxes of parameter
-//! values, `elbowroom_envelope::Oracle` must agree with
+//! Random small plans are generated around a valid schedule. On growing boxes of parameter values,
+//! `elbowroom_envelope::Oracle` must agree with
 //!
 //! - [`plain`]: all orders of all time points, one linear program for each question;
-//! - [`smt`]: the encoding of the paper's authors, decided by Z3 (skipped where there is none);
-//! - the judge: each counterexample is refused by it, each schedule sampled from a box that is
-//!   said to be inside is accepted.
+//! - [`smt`]: the encoding of the paper's authors, decided by Z3 (skipped if it is not installed);
+//! - the validator: it rejects each counterexample, and accepts each schedule sampled from a box
+//!   that is said to be inside.
 //!
-//! `ELBOWROOM_CASES` says how many cases are tried, `ELBOWROOM_FIRST_CASE` which is the first.
+//! `ELBOWROOM_CASES` is the number of cases, `ELBOWROOM_FIRST_CASE` is the first one.
 
 mod benchmarks;
 mod case;
@@ -50,7 +50,7 @@ fn script(seed: u64, length: usize) -> Script {
     Script { case, steps }
 }
 
-/// All mismatches, shrunk, and what was compared.
+/// Returns all mismatches, shrunk, and statistics.
 fn compare(cases: std::ops::Range<u64>, mut solver: Option<Z3>) -> (Tally, Vec<String>) {
     let mut tally = Tally::default();
     let mut complaints = Vec::new();

@@ -1,4 +1,4 @@
-//! The numbers in a problem: every place where a parameter could stand.
+//! The numbers in a problem: every place for a parameter.
 
 use elbowroom_model::Problem;
 use elbowroom_model::problem::{Body, Change, Condition, Effect, Expression, Unknown};
@@ -39,7 +39,7 @@ pub(crate) fn visit(problem: &mut Problem, visit: &mut dyn FnMut(&mut Expression
     in_condition(&mut problem.goal, visit);
 }
 
-/// Puts values in place of the domain's unknowns.
+/// Replaces the domain's unknowns by values.
 pub(crate) fn fill(problem: &mut Problem, values: &dyn Fn(usize) -> Option<Rational>) {
     visit(problem, &mut |leaf| {
         if let Expression::Unknown(Unknown::Domain(index)) = leaf

@@ -1,11 +1,11 @@
-//! The plainly right oracle: every order of the time points, ties included.
+//! Brute-force oracle: every order of the time points, ties included.
 //!
-//! It goes through all orders in which the happenings can fall, group by group, and does what the
-//! judge does, with values that are expressions in times and parameters. Each question ("can this
-//! condition be false here?") is one linear program over all schedules with that order.
+//! It enumerates all orders of the happenings, group by group, and applies the validator's rules,
+//! with values that are expressions in times and parameters. Each question ("can this condition be
+//! false here?") is one linear program over all schedules with that order.
 //!
-//! Parameters that multiply something are not left open: a few values of each are tried. So
-//! "inside" is certain only without such products; "broken" always comes with a schedule.
+//! Parameters that multiply something are not left open; a few values of each are tried. So
+//! "inside" is certain only without such products. "Broken" always comes with a schedule.
 
 mod effects;
 mod group;
@@ -22,27 +22,28 @@ use crate::polynomial::{Polynomial, Symbol};
 use crate::system::System;
 use search::{Search, Trouble};
 
-/// Whether a box is inside the robustness envelope.
+/// Verdict on a box.
 #[derive(Clone, Debug)]
 pub(crate) enum Answer {
     Inside,
     /// For these values the plan has no schedule.
     NoSchedule(Valuation),
-    /// This schedule for these values breaks something.
+    /// This schedule for these values violates something.
     Broken(Break),
 }
 
-/// What breaks, and where.
+/// Violation, with values and a schedule that show it.
 #[derive(Clone, Debug)]
 pub(crate) struct Break {
     pub(crate) what: String,
     pub(crate) valuation: Valuation,
     pub(crate) schedule: Schedule,
-    /// It is only that a timed initial is too near to another one. The judge does not mind.
+    /// `true` if the violation is only a timed initial too close to another one, which the
+    /// validator accepts.
     pub(crate) is_only_timed: bool,
 }
 
-/// No answer.
+/// Reason for having no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum GaveUp {
     TooManyOrders,
@@ -50,7 +51,7 @@ pub(crate) enum GaveUp {
     NotCovered,
 }
 
-/// Whether all values in the box have a schedule, and all schedules for them are valid.
+/// Checks that all values in the box have a schedule, and that all schedules for them are valid.
 pub(crate) fn check(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -81,11 +82,11 @@ pub(crate) fn check(
     })
 }
 
-/// Values in the box for which the plan's network has no schedule.
+/// Returns values in the box for which the plan's network has no schedule.
 ///
 /// The values that have one are a projection of the polyhedron of values and schedules, so they
-/// form a convex set, and a box lies in it exactly if all its corners do. An infinite end is taken
-/// to be farther away than any number in a small case can reach.
+/// form a convex set, and a box lies in it exactly if all its corners do. An infinite end is
+/// replaced by a number that is larger than any sum in a small case.
 pub(crate) fn without_schedule(
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,
@@ -96,7 +97,7 @@ pub(crate) fn without_schedule(
     })
 }
 
-/// All combinations of ends.
+/// Returns all combinations of ends.
 pub(crate) fn corners(envelope: &DecoupledEnvelope) -> Vec<Valuation> {
     combinations(envelope.intervals(), &|interval| {
         let mut ends = vec![lower(interval), upper(interval)];
@@ -126,7 +127,7 @@ fn combinations(
     combinations.into_iter().map(Valuation::new).collect()
 }
 
-/// Farther than any sum of the numbers in a case.
+/// Returns a number that is larger than any sum of the numbers in a case.
 fn far() -> Rational {
     Rational::from(i64::MAX) * Rational::from(1_000_000)
 }
@@ -147,7 +148,7 @@ fn upper(interval: &Interval) -> Rational {
     }
 }
 
-/// Both ends and some values in between.
+/// Returns both ends and some values in between.
 fn samples(interval: &Interval) -> Vec<Rational> {
     let (lower, upper) = (lower(interval), upper(interval));
     let at = |part: Rational| &lower + (&upper - &lower) * part;
@@ -163,7 +164,7 @@ fn samples(interval: &Interval) -> Vec<Rational> {
     samples
 }
 
-/// The parameters in products.
+/// Returns the parameters in products.
 fn factors(polynomial: &Polynomial) -> BTreeSet<usize> {
     let products = polynomial.products();
     let symbols = products.flat_map(|factors| factors.iter());

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-/// What a value can depend on.
+/// Variable that a value can depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Symbol {
     /// The time of a node, by position in the plan.
@@ -28,7 +28,7 @@ impl Polynomial {
         Self::default().plus_term(vec![symbol], &Rational::ONE)
     }
 
-    /// `to - from`.
+    /// Returns `to - from`.
     pub(crate) fn difference(from: Symbol, to: Symbol) -> Self {
         Self::symbol(to).minus(&Self::symbol(from))
     }
@@ -64,7 +64,7 @@ impl Polynomial {
         product
     }
 
-    /// The number, if nothing else is in it.
+    /// Returns the number, if the polynomial is constant.
     pub(crate) fn as_constant(&self) -> Option<Rational> {
         match self.0.iter().next() {
             None => Some(Rational::ZERO),
@@ -75,13 +75,13 @@ impl Polynomial {
         }
     }
 
-    /// The products of two or more factors.
+    /// Returns the products of two or more factors.
     pub(crate) fn products(&self) -> impl Iterator<Item = &[Symbol]> {
         let products = self.0.keys().map(Vec::as_slice);
         products.filter(|factors| factors.len() > 1)
     }
 
-    /// The constant and the coefficient of each symbol; `None` if there is a product.
+    /// Returns the constant and the coefficient of each symbol; `None` if there is a product.
     pub(crate) fn linear(&self) -> Option<(Rational, Vec<(Symbol, Rational)>)> {
         let mut constant = Rational::ZERO;
         let mut terms = Vec::new();

@@ -1,24 +1,23 @@
-//! Values in a box for which there is no schedule, by branching.
+//! Values in a box without a schedule, by branching.
 //!
-//! Each bound is first taken at its worst, whatever the others of its parameter say, except that no
-//! path goes from a time point to another and straight back by the same parameter. If there is no
-//! cycle of negative weight even so, all values have a schedule. If there is one that no parameter
-//! is on in both directions, its bounds are at their worst all at once, for some values. Else one
-//! such parameter is set to one end, then to the other: the values with a schedule form a convex
-//! set.
+//! Each bound is first taken at its worst, independently of the others of its parameter, except
+//! that no path uses a parameter to another time point and directly back. If there is no negative
+//! cycle, all values have a schedule. If a negative cycle uses no parameter in both directions, its
+//! bounds are at their worst all at once, for some values. Otherwise one such parameter is set to
+//! one end, then to the other: the values with a schedule form a convex set.
 
 use std::collections::BTreeMap;
 
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan};
 
-/// How many branches are looked at before giving up.
+/// Limit on branches that are examined.
 const MOST_BRANCHES: usize = 200_000;
 
-/// A number, and how often infinity is added to it.
+/// A multiple of infinity, and a number.
 type Extended = (i64, Rational);
 
-/// An upper bound on how much later `to` is than `from`.
+/// Upper bound on the time from `from` to `to`.
 struct Edge {
     from: usize,
     to: usize,
@@ -31,7 +30,7 @@ enum Limit {
     Parameter(usize, i64),
 }
 
-/// Whether some values in the box have no schedule; `None` if that takes too long.
+/// Returns `true` if some values in the box have no schedule; `None` if the check takes too long.
 pub(crate) fn are_missing(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<bool> {
     let edges = edges(plan);
     let mut branches: Vec<BTreeMap<usize, Extended>> = vec![BTreeMap::new()];
@@ -115,7 +114,7 @@ fn edges(plan: &ParametrizedPlan) -> Vec<Edge> {
     edges
 }
 
-/// The least of `multiple` times a value in the interval.
+/// Returns the least of `multiple` times a value in the interval.
 fn least(interval: &Interval, multiple: i64) -> Extended {
     let end = |end: &End, infinite: i64| match end.value() {
         Some(value) => (0, value.clone()),
@@ -134,7 +133,7 @@ fn plus(a: &Extended, b: &Extended) -> Extended {
     (a.0 + b.0, &a.1 + &b.1)
 }
 
-/// Whether a path may go over both edges, one after the other.
+/// Returns `true` if a path may contain both edges, one after the other.
 fn may_follow(first: &Edge, second: &Edge) -> bool {
     let goes_back = match (&first.bound, &second.bound) {
         (Limit::Parameter(a, _), Limit::Parameter(b, _)) => a == b && second.to == first.from,
@@ -143,8 +142,8 @@ fn may_follow(first: &Edge, second: &Edge) -> bool {
     first.to == second.from && !goes_back
 }
 
-/// The edges of a cycle of negative weight, by Bellman and Ford's algorithm on paths by their last
-/// edge.
+/// Returns the edges of a cycle of negative weight, by Bellman and Ford's algorithm on paths by
+/// their last edge.
 fn negative_cycle(edges: &[Edge], weight: &dyn Fn(&Edge) -> Extended) -> Option<Vec<usize>> {
     let weights: Vec<_> = edges.iter().map(weight).collect();
     let followers: Vec<Vec<usize>> = edges

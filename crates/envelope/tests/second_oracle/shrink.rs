@@ -1,4 +1,4 @@
-//! Smaller cases with the same mistake.
+//! Reduction of cases to smaller ones with the same bug.
 
 use elbowroom_model::problem::{Body, Condition, Effect, Expression, Unknown};
 use elbowroom_plan::{Bound, BoxEnd, InstanceId, Node, ParameterId, ParameterKind};
@@ -7,7 +7,7 @@ use crate::case::{Case, box_of, instance_of};
 use crate::contest::{Script, Step};
 use crate::numbers;
 
-/// Leaves out one thing after the other as long as the script fails in the same way.
+/// Removes one part after the other as long as the script fails in the same way.
 pub(crate) fn shrink(script: &Script, fails: &mut dyn FnMut(&Script) -> bool) -> Script {
     let mut script = script.clone();
     while let Some(smaller) = smaller(&script).into_iter().find(|smaller| fails(smaller)) {
@@ -125,7 +125,7 @@ fn without_timed(case: &Case, removed: usize) -> Option<Case> {
     Some(case)
 }
 
-/// The parameter's nominal value stands in its place.
+/// Replaces a parameter by its nominal value.
 fn without_parameter(script: &Script, removed: usize) -> Script {
     let mut script = script.clone();
     let case = &mut script.case;
@@ -177,7 +177,7 @@ fn without_parameter(script: &Script, removed: usize) -> Script {
     script
 }
 
-/// One condition, effect or duration bound less.
+/// Returns the cases with one condition, effect or duration bound removed.
 fn without_parts(case: &Case) -> Vec<Case> {
     let mut cases = Vec::new();
     let mut index = 0;
@@ -198,7 +198,7 @@ fn without_parts(case: &Case) -> Vec<Case> {
     }
 }
 
-/// One of several changes of the same group.
+/// Removes one of several changes of the same group.
 fn remove_timed(case: &mut Case, left: &mut usize) -> bool {
     for index in 0..case.problem.timed.len() {
         let time = case.problem.timed[index].time.clone();
@@ -263,7 +263,7 @@ fn remove_nth<T>(list: &mut Vec<T>, left: &mut usize) -> bool {
     false
 }
 
-/// A conjunct less, or one of its disjuncts in its place.
+/// Removes a conjunct, or replaces it by one of its disjuncts.
 fn remove_conjunct(condition: &mut Condition, left: &mut usize) -> bool {
     let Condition::And(parts) = condition else {
         return false;

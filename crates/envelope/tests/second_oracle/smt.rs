@@ -1,9 +1,9 @@
 //! The authors' encoding of a plan as SMT-LIB text: one position for each time point, one copy of
 //! each fact and fluent for each position.
 //!
-//! As in their tool, simultaneous time points are tried in every order. Where the judge is more
-//! precise, the text follows the judge: over-all conditions are read at every moment between two
-//! positions of different times.
+//! As in their tool, simultaneous time points are tried in every order. If the validator is more
+//! precise, the encoding follows the validator: over-all conditions are read at every moment
+//! between two positions of different times.
 
 mod causes;
 mod effects;
@@ -24,11 +24,11 @@ use crate::z3::{Found, Z3};
 pub(crate) use places::Places;
 use text::{and, apply, not, number, or, sum};
 
-/// The plan has something that is not encoded here.
+/// Error for a plan with features that are not encoded.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NotEncoded;
 
-/// The text that a plan's schedules satisfy, and the text of what may go wrong in them.
+/// Text of the constraints on a plan's schedules, and text of the violations.
 pub(crate) struct Encoding {
     schedules: String,
     effects: String,
@@ -36,7 +36,7 @@ pub(crate) struct Encoding {
 }
 
 impl Encoding {
-    /// Each time point may be at one of its `places`.
+    /// Encodes a plan; each time point may be at one of its `places`.
     pub(crate) fn new(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -63,24 +63,26 @@ impl Encoding {
         })
     }
 
-    /// Satisfiable if some schedule for some values in the box breaks something.
+    /// Returns a text that is satisfiable if some schedule for some values in the box violates
+    /// something.
     pub(crate) fn broken(&self, envelope: &DecoupledEnvelope) -> String {
         let violation = or(&self.violations);
         format!("{}(assert {violation})\n", self.lives(envelope))
     }
 
-    /// What holds in all schedules for values in the box.
+    /// Returns the text that holds in all schedules for values in the box.
     fn lives(&self, envelope: &DecoupledEnvelope) -> String {
         format!("{}{}{}", self.schedules, in_box(envelope), self.effects)
     }
 
-    /// Satisfiable if there is a schedule for some values in the box.
+    /// Returns a text that is satisfiable if there is a schedule for some values in the box.
     pub(crate) fn scheduled(&self, envelope: &DecoupledEnvelope) -> String {
         format!("{}{}", self.schedules, in_box(envelope))
     }
 }
 
-/// Whether the box is inside; `None` if Z3 cannot tell in time, or something is not encoded.
+/// Returns `true` if the box is inside; `None` if Z3 cannot decide in time, or something is not
+/// encoded.
 pub(crate) fn contained(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -104,7 +106,8 @@ pub(crate) fn contained(
         Found::NoModel => Some(true),
         Found::Unknown => None,
     };
-    // All at once is quick where it is quick at all; one by one takes longer, and goes further.
+    // One query for all violations is fast if it succeeds; single queries take longer, but succeed
+    // more often.
     ask(&or(&violations)).or_else(|| {
         let mut is_inside = Some(true);
         for violation in &violations {
@@ -131,7 +134,7 @@ fn in_box(envelope: &DecoupledEnvelope) -> String {
     text
 }
 
-/// Where an expression is read.
+/// Moment at which an expression is evaluated.
 #[derive(Clone)]
 enum At {
     /// On arrival at a position.
@@ -177,7 +180,7 @@ impl<'a> Encoder<'a> {
         self.line(&format!("(assert {formula})"));
     }
 
-    /// How many nodes have a position: all but zero.
+    /// Returns the number of nodes with a position: all but zero.
     fn count(&self) -> usize {
         self.plan.plan.nodes.len() - 1
     }
@@ -241,7 +244,8 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// Each node has a position, each position a node, and times follow positions.
+    /// Requires that each node has a position, each position a node, and that times are ordered by
+    /// position.
     fn positions(&mut self) {
         let count = self.count();
         self.line("(define-fun tau0 () Real 0.0)");
@@ -274,7 +278,7 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// The node's position is `k`.
+    /// Returns the formula that the node's position is `k`.
     fn at(&self, node: usize, k: usize) -> String {
         let places = self.places.of(node);
         if !places.contains(&k) {
@@ -286,7 +290,7 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// The node's position is less than `k`.
+    /// Returns the formula that the node's position is less than `k`.
     fn before(&self, node: usize, k: usize) -> String {
         let places = self.places.of(node);
         if *places.end() < k {

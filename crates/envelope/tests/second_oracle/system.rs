@@ -8,7 +8,7 @@ use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan, Schedule, Valua
 
 use crate::polynomial::{Polynomial, Symbol};
 
-/// How a polynomial compares with zero.
+/// Comparison of a polynomial with zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Relation {
     Below,
@@ -16,16 +16,16 @@ pub(crate) enum Relation {
     Zero,
 }
 
-/// A product of two unknowns cannot be handed to the simplex.
+/// Error for a product of two unknowns, which the simplex cannot handle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NotLinear;
 
-/// All schedules of a plan for all values in a box, and what is assumed about them for a while.
+/// All schedules of a plan for all values in a box, with temporary assumptions.
 pub(crate) struct System {
     simplex: Simplex,
     variables: BTreeMap<Symbol, VariableId>,
     rows: BTreeMap<Vec<(VariableId, Rational)>, VariableId>,
-    /// One level for each push: whether a constraint without unknowns has failed.
+    /// One level for each push: `true` if a constraint without unknowns has failed.
     absurd: Vec<bool>,
     nodes: usize,
     parameters: usize,
@@ -105,7 +105,7 @@ impl System {
             *self.absurd.last_mut().expect("a level") |= !holds;
             return Ok(());
         };
-        // Rows that differ in a factor only are one row.
+        // Rows that differ only by a factor share a variable.
         let row: Vec<_> = terms
             .iter()
             .map(|(symbol, factor)| (self.variables[symbol], factor / &leading))
@@ -152,7 +152,7 @@ impl System {
         !self.absurd.last().expect("a level") && self.simplex.check().is_ok()
     }
 
-    /// Values and a schedule that satisfy everything, after a successful check.
+    /// Returns values and a schedule that satisfy everything, after a successful check.
     pub(crate) fn model(&self) -> (Valuation, Schedule) {
         let model = self.simplex.model();
         let value = |symbol: Symbol| model[self.variables[&symbol].index()].clone();
@@ -166,7 +166,8 @@ impl System {
         )
     }
 
-    /// A schedule at the far end in some direction: `weights` by node. Times are at most `horizon`.
+    /// Returns an extreme schedule in some direction: `weights` by node. Times are at most
+    /// `horizon`.
     pub(crate) fn extreme(
         &mut self,
         weights: &[i64],
@@ -191,7 +192,7 @@ impl System {
     }
 }
 
-/// The bound as a polynomial, if there is one.
+/// Returns the bound as a polynomial, if there is one.
 fn bound(bound: &Bound) -> Option<Polynomial> {
     match bound {
         Bound::Infinite => None,

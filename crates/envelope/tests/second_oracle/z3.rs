@@ -1,4 +1,4 @@
-//! Z3 as a process that reads SMT-LIB text.
+//! Z3 process that reads SMT-LIB text.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -13,23 +13,23 @@ pub(crate) struct Z3 {
     milliseconds: u64,
 }
 
-/// Whether a text has a model.
+/// Result of a satisfiability check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Found {
     Model,
     NoModel,
-    /// It took too long, or is beyond the solver.
+    /// The query took too long, or is beyond the solver.
     Unknown,
 }
 
-/// Prints the folder of the binary that comes with Python's package `z3-solver`.
+/// Python program that prints the folder of the binary in the package `z3-solver`.
 const WHEEL: &str = "import importlib.util as u, os; \
     p = os.path.dirname(u.find_spec('z3').origin); \
     print(next(c for c in (os.path.join(p, 'bin', 'z3'), \
     os.path.join(p, '..', '..', '..', '..', 'bin', 'z3')) if os.path.exists(c)))";
 
 impl Z3 {
-    /// Starts the solver; `None` where there is none.
+    /// Starts the solver; `None` if it is not installed.
     pub(crate) fn start() -> Option<Self> {
         Self::at("z3").or_else(|| {
             let output = Command::new("python3").args(["-c", WHEEL]).output().ok()?;
@@ -59,7 +59,7 @@ impl Z3 {
         })
     }
 
-    /// Whether the text, declarations and assertions, has a model.
+    /// Checks whether the text, declarations and assertions, has a model.
     pub(crate) fn ask(&mut self, text: &str) -> Found {
         let question = format!(
             "(reset)\n(set-option :timeout {})\n{text}(check-sat)\n",
@@ -82,7 +82,7 @@ impl Z3 {
 
 impl Drop for Z3 {
     fn drop(&mut self) {
-        // The process holds nothing worth saving.
+        // The process has no state worth saving.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

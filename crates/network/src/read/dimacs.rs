@@ -1,8 +1,8 @@
 //! DIMACS text: comments `c …`, a problem line `p sp NODES ARCS`, and arcs `a U V W`.
 //!
-//! `a U V W` says `U - V <= W`; W may be `inf`. Comments of the forms `c <label> U NAME` and
-//! `c <refine> U V W` count: they name nodes and tighten arcs. The generators write the arcs of
-//! the graph without bounds and put the bounds among the refinements.
+//! `a U V W` means `U - V <= W`; W may be `inf`. Comments of the forms `c <label> U NAME` and `c
+//! <refine> U V W` are significant: they name nodes and tighten arcs. The generators write the arcs
+//! of the graph without bounds, and the bounds as refinements.
 
 use std::collections::BTreeSet;
 
@@ -11,10 +11,10 @@ use crate::file::{Format, NetworkFile};
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// More nodes than any such file has.
+/// Limit on nodes: more than any such file has.
 const MOST_NODES: usize = 1 << 20;
 
-/// Whether a line is one of this format.
+/// Returns `true` if a line belongs to this format.
 pub(super) fn is_line(line: &str) -> bool {
     let mut words = line.split_whitespace();
     matches!(words.next(), Some("c" | "p"))
@@ -32,7 +32,7 @@ pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
                 .ok()
                 .filter(|&n| 0 < n && n <= count)
         {
-            // Labels that repeat would make names that repeat.
+            // Names must be unique, so repeated labels are dropped.
             if !labels.insert(name) || is_number(name) {
                 report.remark(format!(
                     "the label `{name}` occurs twice or is a number; it is left out"
@@ -79,7 +79,7 @@ fn words(line: &str) -> Vec<&str> {
     line.split_whitespace().collect()
 }
 
-/// Each line, and where it begins.
+/// Returns the lines with their positions.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.split('\n').scan(0, |at, line| {
         let begin = *at;
@@ -88,7 +88,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// The number of nodes by the problem line.
+/// Returns the number of nodes from the problem line.
 fn node_count(text: &str, report: &mut Report) -> Option<usize> {
     for (at, line) in lines(text) {
         if let ["p", _, count, ..] = words(line)[..] {

@@ -5,16 +5,17 @@ use elbowroom_num::Rational;
 use crate::file::Duration;
 use crate::number::Bound;
 
-/// The numbers in the names are seconds, the bounds beside them milliseconds.
+/// Factor between the numbers in the names (seconds) and the bounds (milliseconds).
 const MILLISECONDS: i64 = 1000;
 
-/// A distribution by its name, such as `N_12.5_0.25`, in the unit of the bounds beside it.
+/// Parses the name of a distribution, such as `N_12.5_0.25`. The result is in the unit of the
+/// bounds.
 ///
-/// The names count in seconds and the bounds in milliseconds. Where the bounds say otherwise (they
-/// do not contain what the name says, unless it is taken as it is), names count like bounds.
+/// Names are in seconds and bounds in milliseconds. If the bounds contain a typical value of the
+/// distribution only without conversion, the name is taken to be in the unit of the bounds.
 ///
 /// # Errors
-/// What is wrong with the name.
+/// A description of the mistake in the name.
 pub(super) fn by_name(name: &str, lower: &Bound, upper: &Bound) -> Result<Duration, String> {
     let seconds = Named::parse(name)?;
     let scaled = seconds.scaled(&Rational::from(MILLISECONDS));
@@ -41,21 +42,20 @@ pub(super) fn by_name(name: &str, lower: &Bound, upper: &Bound) -> Result<Durati
     })
 }
 
-/// A value that should lie between the bounds.
+/// Returns a value that should lie between the bounds.
 fn typical(duration: &Duration) -> Rational {
     match duration {
         Duration::Normal { mean, .. } => mean.clone(),
         Duration::Uniform { from, to } => (from + to) / Rational::from(2),
         Duration::Exponential { from, mean } => {
-            // Not the mean, which rare and long durations pull out of reach: the median is 0.69
-            // of it.
+            // The median, which is 0.69 of the mean. Rare long durations make the mean too large.
             from + mean * Rational::new(69, 100)
         }
         Duration::Gamma { from, shape, scale } => from + shape * scale,
     }
 }
 
-/// A distribution as it is named.
+/// Distribution with the numbers of its name.
 struct Named {
     kind: Kind,
     first: Rational,
@@ -136,7 +136,7 @@ impl Named {
         ))
     }
 
-    /// The distribution with its times multiplied by `unit`.
+    /// Returns the distribution with its times multiplied by `unit`.
     fn scaled(&self, unit: &Rational) -> Duration {
         let per = |rate: &Rational| rate.reciprocal().unwrap_or_default() * unit;
         match self.kind {

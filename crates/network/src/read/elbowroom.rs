@@ -1,4 +1,5 @@
-//! JSON of our own: `docs/formats/network.md`. What [`crate::write`] writes.
+//! Reader for Elbowroom's own JSON format (`docs/formats/network.md`), which [`crate::write`]
+//! writes.
 
 use elbowroom_num::Rational;
 use elbowroom_stn::NodeId;
@@ -120,7 +121,7 @@ fn read_link(builder: &mut Builder, json: &Json<'_>, report: &mut Report) {
     }
 }
 
-/// `{ "normal": { "mean": …, "deviation": … } }` and its like.
+/// Reads `{ "normal": { "mean": …, "deviation": … } }` and similar objects.
 fn read_duration(json: &Json<'_>, report: &mut Report) -> Option<Duration> {
     let Some([(kind, numbers)]) = json.members() else {
         report.mistake(

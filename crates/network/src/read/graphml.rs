@@ -1,10 +1,11 @@
 //! GraphML, as the CSTNU Tool reads and writes it.
 //!
 //! A directed graph whose edges have a `Type` and a `Value`, or a `LabeledValue` of the forms
-//! `LC(C):4` and `UC(C):-7`. An edge `X -> Y` with the value v says `Y - X <= v`. A contingent link
-//! from A to C is a pair of edges of type `contingent`: `A -> C` with the upper bound (or `LC(C):`
-//! and the lower one), and `C -> A` with the lower bound negated (or `UC(C):` and the upper one
-//! negated). `UC(C):-7` on another edge `X -> A` is a wait: X waits for C, but at most 7 after A.
+//! `LC(C):4` and `UC(C):-7`. An edge `X -> Y` with the value v means `Y - X <= v`. A contingent
+//! link from A to C is a pair of edges of type `contingent`: `A -> C` with the upper bound (or
+//! `LC(C):` and the lower one), and `C -> A` with the lower bound negated (or `UC(C):` and the
+//! upper one negated). `UC(C):-7` on another edge `X -> A` is a wait: X waits for C, but at most 7
+//! after A.
 
 use std::collections::BTreeMap;
 
@@ -18,9 +19,9 @@ use crate::mistake::Report;
 use crate::number::Bound;
 use crate::xml::{self, Element};
 
-/// The node from which times count.
+/// Name of the node that serves as time zero.
 const REFERENCE: &str = "Z";
-/// The label that says "in every case".
+/// The label of nodes that happen in every case.
 const EMPTY_LABEL: &str = "⊡";
 
 pub(super) fn read(text: &str, ending: &str, report: &mut Report) -> Option<NetworkFile> {
@@ -52,14 +53,14 @@ pub(super) fn read(text: &str, ending: &str, report: &mut Report) -> Option<Netw
     builder.finish(report)
 }
 
-/// The one graph of the document.
+/// Returns the only graph of the document.
 fn graph<'e>(elements: &'e [Element], report: &mut Report) -> Option<&'e Element> {
     let roots = elements.iter().filter(|element| element.name == "graphml");
     let graphs: Vec<&Element> = roots.flat_map(|root| root.named("graph")).collect();
     match graphs[..] {
         [graph] => Some(graph),
         [] => {
-            // Perhaps the head is missing, but what is there tells of a kind that is refused.
+            // The header may be missing, but the nodes can reveal an unsupported kind of network.
             let conditional = elements.iter().find(|element| is_conditional_node(element));
             match conditional {
                 Some(node) => report.mistake(
@@ -86,7 +87,7 @@ fn graph<'e>(elements: &'e [Element], report: &mut Report) -> Option<&'e Element
     }
 }
 
-/// The value under a key.
+/// Returns the value under a key.
 fn data<'e>(element: &'e Element, key: &str) -> Option<&'e Element> {
     let found = element
         .named("data")
@@ -94,7 +95,7 @@ fn data<'e>(element: &'e Element, key: &str) -> Option<&'e Element> {
     found.filter(|data| !data.text.trim().is_empty())
 }
 
-/// Where and why a network is of a kind that is refused.
+/// Returns the position and the description of an unsupported kind of network.
 fn unsupported(graph: &Element, ending: &str) -> Option<(usize, String)> {
     if let Some(kind) = data(graph, "NetworkType") {
         let name = kind.text.trim().to_ascii_uppercase();
@@ -124,14 +125,14 @@ fn unsupported(graph: &Element, ending: &str) -> Option<(usize, String)> {
     None
 }
 
-/// Whether a node observes a proposition, or only happens in some cases.
+/// Returns `true` if a node observes a proposition, or only happens in some cases.
 fn is_conditional_node(node: &Element) -> bool {
     let label = data(node, "Label").map(|label| label.text.trim());
     node.name == "node"
         && (data(node, "Obs").is_some() || label.is_some_and(|label| label != EMPTY_LABEL))
 }
 
-/// An edge as it stands in the file.
+/// Edge as given in the file.
 struct Edge {
     at: usize,
     from: NodeId,
@@ -141,7 +142,7 @@ struct Edge {
     labelled: Option<(Case, NodeId, Rational)>,
 }
 
-/// Whether a labelled value is that of a link that ends early, or late.
+/// Case of a labelled value: the link ends at its lower bound, or at its upper bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Case {
     Lower,
@@ -149,7 +150,7 @@ enum Case {
 }
 
 impl Edge {
-    /// `None` after a mistake was noted.
+    /// Reads an edge. Returns `None` after reporting a mistake.
     fn of(element: &Element, builder: &Builder, report: &mut Report) -> Option<Self> {
         let mut end = |name| {
             let Some(id) = element.attribute(name) else {
@@ -186,7 +187,7 @@ impl Edge {
         })
     }
 
-    /// The value in one of the two cases of a link that ends at a node.
+    /// Returns the value in one of the two cases of a link that ends at a node.
     fn in_case(&self, case: Case) -> Option<&Rational> {
         let (own, _, value) = self.labelled.as_ref()?;
         (*own == case).then_some(value)
@@ -251,7 +252,7 @@ fn contingent_links(builder: &mut Builder, edges: &[Edge], report: &mut Report) 
             );
             continue;
         };
-        // Each pair is met twice.
+        // Each pair is visited twice.
         if leads_to_end(edge, back) {
             link(builder, edge, back, report);
         } else if !leads_to_end(back, edge) && edge.from < edge.to {
@@ -264,7 +265,7 @@ fn contingent_links(builder: &mut Builder, edges: &[Edge], report: &mut Report) 
     }
 }
 
-/// Whether an edge leads from a link's beginning to its end, rather than its counterpart.
+/// Returns `true` if an edge leads from the activation of a link to its end, rather than back.
 fn leads_to_end(edge: &Edge, back: &Edge) -> bool {
     if let Some((_, end, _)) = &edge.labelled {
         return *end == edge.to;
@@ -281,7 +282,7 @@ fn leads_to_end(edge: &Edge, back: &Edge) -> bool {
     is_end(back.finite()) && is_positive
 }
 
-/// A link by its edge there and its edge back.
+/// Adds a link, given its forward and its backward edge.
 fn link(builder: &mut Builder, there: &Edge, back: &Edge, report: &mut Report) {
     let lower = there.in_case(Case::Lower).cloned();
     let lower = lower.or_else(|| back.finite().map(|value| -value));
@@ -309,7 +310,7 @@ fn link(builder: &mut Builder, there: &Edge, back: &Edge, report: &mut Report) {
     builder.link(given, report);
 }
 
-/// The meaning of an edge of another type: a requirement, a wait, or both.
+/// Adds the requirement, the wait, or both of an edge that is not contingent.
 fn requirement(builder: &mut Builder, edge: &Edge, report: &mut Report) {
     if let Some(value) = &edge.value {
         let bounds = (Bound::NegativeInfinity, value.clone());
@@ -330,7 +331,7 @@ fn requirement(builder: &mut Builder, edge: &Edge, report: &mut Report) {
                     link,
                     delay: Some(-value),
                 }),
-                // Its link may be among the mistakes that were noted.
+                // Its link may be missing because of a mistake that was reported.
                 None if report.is_failed() => {}
                 None => report.mistake(
                     edge.at,

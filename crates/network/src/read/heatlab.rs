@@ -1,9 +1,9 @@
 //! Nodes and constraints in JSON, as the HEATlab programs read and write them.
 //!
-//! `nodes`: `node_id`, perhaps `min_domain` and `max_domain`; `constraints`: `first_node`,
-//! `second_node`, `min_duration`, `max_duration`, perhaps a `type` (`stc`, `stcu` or `pstc`) and a
-//! `distribution`. Node 0 is the reference point; it need not be listed, and no other node comes
-//! before it unless `min_domain` says so.
+//! `nodes`: `node_id`, optionally `min_domain` and `max_domain`; `constraints`: `first_node`,
+//! `second_node`, `min_duration`, `max_duration`, optionally a `type` (`stc`, `stcu` or `pstc`) and
+//! a `distribution`. Node 0 is the reference point; it need not be listed, and no other node comes
+//! before it unless `min_domain` allows that.
 
 use elbowroom_stn::NodeId;
 
@@ -14,7 +14,7 @@ use crate::json::Json;
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// The node from which times count.
+/// Name of the node that serves as time zero.
 const REFERENCE: &str = "0";
 
 pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFile> {
@@ -46,7 +46,7 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFi
     builder.finish(report)
 }
 
-/// When a node may happen, counted from the reference point.
+/// Adds the bounds on the time of a node, relative to the reference point.
 fn domain(builder: &mut Builder, ends: (NodeId, NodeId), node: &Json<'_>, report: &mut Report) {
     let least = Bound::Finite(elbowroom_num::Rational::ZERO);
     let lower = bound_or(node, "min_domain", least, report);
@@ -56,7 +56,7 @@ fn domain(builder: &mut Builder, ends: (NodeId, NodeId), node: &Json<'_>, report
     }
 }
 
-/// Reads a constraint; the places of all mistakes in it are noted.
+/// Reads a constraint; reports all mistakes in it.
 fn read_constraint(builder: &mut Builder, constraint: &Json<'_>, report: &mut Report) {
     let mut end = |name| {
         let json = required(constraint, name, report)?;
@@ -110,7 +110,7 @@ fn read_constraint(builder: &mut Builder, constraint: &Json<'_>, report: &mut Re
     );
 }
 
-/// `{ "name": "N_12_3" }`, or the name alone.
+/// Reads `{ "name": "N_12_3" }`, or the name alone.
 fn named_distribution(
     given: &Json<'_>,
     lower: &Bound,

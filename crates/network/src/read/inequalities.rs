@@ -1,7 +1,7 @@
-//! For each node, the inequalities that it occurs in, in JSON.
+//! Inequalities listed by node, in JSON.
 //!
-//! `{ "0": [[0, 1, 10.0], [1, 0, -5.0]], "1": … }`: `[u, v, w]` says `v - u <= w`. Each inequality
-//! stands under both of its nodes.
+//! `{ "0": [[0, 1, 10.0], [1, 0, -5.0]], "1": … }`: `[u, v, w]` means `v - u <= w`. Each inequality
+//! is listed at both of its nodes.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use crate::json::Json;
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// Whether a document is of this form: lists under the numbers of nodes.
+/// Returns `true` if a document has this form: an object that maps node numbers to lists.
 pub(super) fn are_in(document: &Json<'_>) -> bool {
     let is_node = |name: &str| !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit());
     document.members().is_some_and(|members| {

@@ -17,8 +17,8 @@
 //! A 1 3 C
 //! ```
 //!
-//! `X 12 C` says `C - X <= 12`, and `A 1 3 C` that C comes 1 to 3 after A. Names may stand in
-//! quotes.
+//! `X 12 C` means `C - X <= 12`, and `A 1 3 C` means that C happens 1 to 3 after A. Names may be
+//! quoted.
 
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Format, NetworkFile};
@@ -68,7 +68,8 @@ impl Section {
 /// The state of the reader.
 struct Reader {
     builder: Builder,
-    /// How many time points, edges and links the file says it has, and where it does.
+    /// Numbers of time points, edges and links that the file declares, with the positions of these
+    /// declarations.
     announced: Vec<(What, usize, usize)>,
     edges: usize,
     links: usize,
@@ -108,7 +109,7 @@ pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
     reader.builder.finish(report)
 }
 
-/// The words of a line without their quotes, and where they begin.
+/// Returns the words of a line without their quotes, with their positions.
 fn words(line: &str, begin: usize) -> Vec<(usize, &str)> {
     let start = line.as_ptr() as usize;
     line.split_whitespace()
@@ -209,8 +210,8 @@ impl Reader {
         }
     }
 
-    /// That a number is not right may mean that the file is cut off, but not that it cannot be
-    /// used.
+    /// Compares the declared counts with the actual ones. A wrong count may mean that the file is
+    /// truncated, but the network can still be used, so it is only a remark.
     fn check_counts(&self, report: &mut Report) {
         for &(what, announced, at) in &self.announced {
             let (found, name) = match what {

@@ -2,7 +2,7 @@
 //!
 //! `timepoints`: `id`, `label`; `constraints`: `source`, `sink`, `type`, and either a
 //! `duration_bound` (`lb`, `ub`) or a `distribution` (`mean`, `sd`); `correlations`: groups of
-//! probabilistic constraints with their correlation matrix. 1000000000 stands for infinity.
+//! probabilistic constraints with their correlation matrix. 1000000000 means infinity.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFi
     builder.finish(report)
 }
 
-/// The time points by their numbers. The first one is the reference point.
+/// Reads the time points, by their numbers. The first one is the reference point.
 fn points(
     builder: &mut Builder,
     document: &Json<'_>,
@@ -51,7 +51,7 @@ fn points(
         let Some(number) = point_name(id, report) else {
             continue;
         };
-        // Labels repeat where an action does; then the number tells them apart.
+        // Labels of repeated actions are not unique, so the number is added.
         let label = point
             .member("label")
             .and_then(Json::text)
@@ -145,7 +145,7 @@ fn read_constraint(
     }
 }
 
-/// `duration_bound`, which probabilistic constraints need not have.
+/// Reads `duration_bound`, which is optional for probabilistic constraints.
 fn duration_bound(
     constraint: &Json<'_>,
     is_required: bool,
@@ -168,7 +168,7 @@ fn duration_bound(
     lower.zip(upper)
 }
 
-/// `{ "mean": …, "sd": … }`.
+/// Reads `{ "mean": …, "sd": … }`.
 fn normal(given: &Json<'_>, report: &mut Report) -> Option<Duration> {
     let mut part = |name| {
         let json = required(given, name, report)?;
@@ -216,7 +216,7 @@ fn read_correlation(
     }
 }
 
-/// The link from one point to another, if its duration is normally distributed.
+/// Returns the link from one point to another, if its duration is normally distributed.
 fn normal_link(builder: &Builder, source: NodeId, sink: NodeId) -> Option<LinkId> {
     let link = builder.link_ending_at(sink)?;
     let is_normal = matches!(builder.duration_of(link), Some(Duration::Normal { .. }));

@@ -83,7 +83,7 @@ pub(crate) const ELBOWROOM: &str = r#"{ "format": "elbowroom-network", "version"
     {"activation": "begin", "end": "cut", "lower": 0, "upper": "inf"}],
   "waits": [{"point": "drunk", "until": "boiled", "delay": 4}] }"#;
 
-/// All of them, under a name as such files have.
+/// All samples, with typical file names.
 pub(crate) const ALL: [(&str, &str); 7] = [
     ("one.json", HEATLAB),
     ("two.json", PSTN_LIB),

@@ -1,18 +1,18 @@
-//! Densities whose logarithm is concave, all over or as far as it matters.
+//! Densities whose logarithm is concave, everywhere or in the relevant range.
 
 use crate::{Rational, enclosed};
 
 /// A density.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Density {
-    /// All values between two numbers alike.
+    /// Uniform: all values between two numbers are equally likely.
     Uniform {
         /// The least value.
         from: Rational,
         /// The greatest value.
         to: Rational,
     },
-    /// Rises to the mode and falls after it.
+    /// Triangular: rises to the mode and falls after it.
     Triangular {
         /// The least value.
         from: Rational,
@@ -21,21 +21,21 @@ pub enum Density {
         /// The greatest value.
         to: Rational,
     },
-    /// Bell-shaped.
+    /// Normal.
     Normal {
         /// The mean.
         mean: Rational,
         /// The standard deviation.
         deviation: Rational,
     },
-    /// `from`, and what an exponential distribution adds.
+    /// Exponential, shifted by `from`.
     Exponential {
         /// The least value.
         from: Rational,
-        /// The mean of what is added.
+        /// Mean of the exponential part.
         mean: Rational,
     },
-    /// The logarithm is normal.
+    /// Lognormal: the logarithm is normal.
     Lognormal {
         /// The mean of the logarithm.
         location: Rational,
@@ -45,8 +45,8 @@ pub enum Density {
 }
 
 impl Density {
-    /// Whether its numbers are those of a density: what spreads is positive, and what has ends has them
-    /// in order.
+    /// Returns `true` if the parameters describe a density: spreads are positive, and ends are in
+    /// order.
     pub fn is_sound(&self) -> bool {
         match self {
             Self::Uniform { from, to } => from < to,
@@ -57,7 +57,7 @@ impl Density {
         }
     }
 
-    /// The least and the greatest value, where there are.
+    /// Returns the least and the greatest value, if they exist.
     pub fn support(&self) -> [Option<Rational>; 2] {
         match self {
             Self::Uniform { from, to } | Self::Triangular { from, to, .. } => {
@@ -69,12 +69,13 @@ impl Density {
         }
     }
 
-    /// The value beyond which the logarithm of the density is not known to be concave, if there is one.
+    /// Returns the value beyond which the logarithm of the density is not known to be concave, if
+    /// there is one.
     ///
-    /// The second derivative of the logarithm of a log-normal density has the sign of `ln x + spread² -
-    /// location - 1`.
+    /// The second derivative of the logarithm of a lognormal density has the sign of `ln x +
+    /// spread² - location - 1`.
     pub fn bend(&self) -> Option<Rational> {
-        /// Shorter numbers do as well; rounded down.
+        /// Resolution of the result, which is rounded down to keep numbers short.
         const GRID: i64 = 1 << 20;
         let Self::Lognormal { location, spread } = self else {
             return None;
@@ -91,7 +92,7 @@ impl Density {
         Some(if short.is_positive() { short } else { bend })
     }
 
-    /// Between which two numbers lies the probability of at most this.
+    /// Returns a lower and an upper bound on the probability of at most this value.
     pub fn at_most(&self, at: &Rational) -> [Rational; 2] {
         let exactly = |value: Rational| [value.clone(), value];
         let none = || exactly(Rational::ZERO);
@@ -144,7 +145,8 @@ impl Density {
         }
     }
 
-    /// Between which two numbers lies the probability between two values, each of which may be missing.
+    /// Returns a lower and an upper bound on the probability between two values. A missing value
+    /// means that the interval is unbounded on that side.
     pub fn between(&self, [lower, upper]: [Option<&Rational>; 2]) -> [Rational; 2] {
         if let (Some(lower), Some(upper)) = (lower, upper)
             && lower >= upper
@@ -161,7 +163,8 @@ impl Density {
         [(least - over).max(Rational::ZERO), most - under]
     }
 
-    /// Between which two numbers lies the density; at the end of the support, that inside of it.
+    /// Returns a lower and an upper bound on the density. At the end of the support, it is the
+    /// limit from inside.
     pub fn at(&self, at: &Rational) -> [Rational; 2] {
         let exactly = |value: Option<Rational>| {
             let value = value.unwrap_or_default();
@@ -209,8 +212,8 @@ impl Density {
         }
     }
 
-    /// The same between two values with a bell-shaped distribution, of which the difference of two
-    /// probabilities of [`at_most`](Self::at_most) would say little where the interval is short.
+    /// Computes [`between`](Self::between) for normal and lognormal distributions. The difference
+    /// of two results of [`at_most`](Self::at_most) would be imprecise for short intervals.
     fn within(&self, ends: [&Rational; 2]) -> Option<[Rational; 2]> {
         match self {
             Self::Normal { mean, deviation } => {
@@ -224,15 +227,15 @@ impl Density {
             Self::Lognormal { spread, .. } => {
                 let [lower, upper] = ends;
                 let places = self.standardized(lower)?;
-                // Twice the area tangent of this part, which is the logarithm of their ratio.
+                // The logarithm of their ratio is twice the area tangent of this part.
                 let part = (upper - lower).checked_div(&(upper + lower))?;
                 let twice = &part * Rational::from(2);
                 let at_most = twice.checked_div(&(Rational::ONE - &part * &part))?;
                 let [below, above] = enclosed::ln(&upper.checked_div(lower)?)?;
                 let least = below.max(twice).checked_div(spread)?;
                 let greatest = above.min(at_most).checked_div(spread)?;
-                // As an interval of this width moves, what it holds rises until its middle is at the
-                // peak, and falls from there on.
+                // The probability of an interval of this width rises until the middle of the
+                // interval is at the peak, and falls after that.
                 let at = |place: &Rational, width: &Rational| {
                     enclosed::normal_between([place, &(place + width)])
                 };
@@ -250,8 +253,8 @@ impl Density {
         }
     }
 
-    /// By how many standard deviations the logarithm of a number differs from its mean, between two
-    /// numbers; `None` for what is not positive.
+    /// Returns a lower and an upper bound on the number of standard deviations by which the
+    /// logarithm of a number differs from the mean; `None` if the number is not positive.
     fn standardized(&self, at: &Rational) -> Option<[Rational; 2]> {
         let Self::Lognormal { location, spread } = self else {
             return None;

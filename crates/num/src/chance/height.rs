@@ -1,30 +1,33 @@
-//! How far the logarithm of a probability is at most above a linear function.
+//! Upper bounds on the difference of the logarithm of a probability and a linear function.
 
 use super::{Cell, Chance, Dense, Reach, Touch};
 use crate::{Rational, enclosed};
 
-/// How a cell sees what is at a cut.
+/// Position of a cut relative to the intervals of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Cut {
-    /// There is none, or no interval of the cell reaches it: the interval ends inside.
+    /// No interval of the cell reaches the cut, or there is none: the interval ends inside.
     Before,
-    /// Some do: the logarithm gains at most `gain`, times the share of the way to `place` that is gone.
+    /// Some intervals reach the cut: the logarithm gains at most `gain`, in proportion to the
+    /// distance to `place`.
     Open {
-        /// Its distance from the point.
+        /// Distance of the cut from the point.
         place: Rational,
-        /// What it adds.
+        /// Greatest increase of the logarithm from the mass at the cut.
         gain: Rational,
     },
-    /// All do: everything on this side of the point is inside.
+    /// All intervals reach the cut: everything on this side of the point is inside.
     Inside,
 }
 
 impl Chance {
-    /// For the intervals around a point in a cell: by how much the logarithm of their probability is at
-    /// most greater than the sum of how far their ends lie from the point, each times its slope. The
-    /// least is found where the bound touches, or nearly so, and with the slopes that are right there.
+    /// Returns an upper bound on the difference of the logarithm of the probability and the linear
+    /// function with these slopes, for all intervals around a point in a cell. The linear function
+    /// is the sum of the distances of the ends from the point, each times its slope. The bound is
+    /// tight, or nearly tight, if `touch` is a point of contact and the slopes are the right ones
+    /// there.
     ///
-    /// `None` if nothing follows from a bound that touches there.
+    /// `None` if no bound can be computed for this point of contact.
     pub fn height(
         &self,
         point: &Rational,
@@ -52,7 +55,8 @@ impl Chance {
                     let heights = std::iter::once(first)
                         .chain(steps)
                         .map(|(place, share)| Some(share.checked_div(mass)? - slope * &place));
-                    // Between steps nothing is gained; a slope that falls is worst at the far end.
+                    // Between steps the probability is constant, so a negative slope is worst at
+                    // the far end.
                     let own = heights.collect::<Option<Vec<_>>>()?.into_iter().max()?;
                     height += if slope.is_negative() {
                         own - slope * &(&side[1] - &side[0])
@@ -89,7 +93,8 @@ impl Chance {
 }
 
 impl Dense {
-    /// How the lower and the upper cut are seen; `None` if nothing can be told of it.
+    /// Returns the positions of the lower and the upper cut relative to the cell; `None` if the
+    /// gain at a cut cannot be computed.
     pub fn seen(&self, point: &Rational, cell: &Cell) -> Option<[Cut; 2]> {
         let [minimum, maximum] = self.cuts();
         let below = minimum.as_ref().map(|cut| point - cut);
@@ -129,8 +134,8 @@ impl Dense {
         Some(seen)
     }
 
-    /// Where an interval of a cell begins and ends for the density alone; `None` where a side counts as
-    /// a whole.
+    /// Returns the ends of an interval of a cell for the density alone; `None` for a side that
+    /// counts as a whole.
     fn ends(&self, point: &Rational, seen: &[Cut; 2], at: &Reach) -> [Option<Rational>; 2] {
         let [minimum, maximum] = self.cuts();
         let lower = (seen[0] != Cut::Inside).then(|| {
@@ -144,14 +149,15 @@ impl Dense {
         [lower, upper]
     }
 
-    /// What an interval has of the density alone.
+    /// Returns bounds on the probability of an interval by the density alone.
     fn part(&self, point: &Rational, seen: &[Cut; 2], at: &Reach) -> [Rational; 2] {
         let ends = self.ends(point, seen, at);
         self.density.between([ends[0].as_ref(), ends[1].as_ref()])
     }
 
-    /// What an interval has of the density alone, and how fast its logarithm rises as its lower and its
-    /// upper end move out, all between two numbers; `None` if that is not known.
+    /// Returns bounds on the probability of an interval by the density alone, and bounds on the
+    /// derivatives of its logarithm as the lower and the upper end move outwards; `None` if they
+    /// are unknown.
     pub fn tangent(
         &self,
         point: &Rational,
@@ -178,17 +184,17 @@ impl Dense {
     }
 }
 
-/// What intervals of a cell have of a list of values: those that all of them have, and, for each side,
-/// the distances at which they come to have more, each with the share of all values that it then has.
+/// Values of a list that the intervals of a cell contain: the share in all intervals, and for each
+/// side the distances at which further values are added, each with the share added so far.
 pub struct Steps {
-    /// The share that all of them have.
+    /// Share of the values that all intervals contain.
     pub center: Rational,
-    /// Of the lower end and of the upper one.
+    /// Steps of the lower and the upper end.
     pub sides: [Vec<(Rational, Rational)>; 2],
 }
 
 impl Steps {
-    /// The values that intervals of a cell around a point may have.
+    /// Computes the steps for the intervals of a cell around a point.
     pub fn new(values: &[Rational], point: &Rational, cell: &Cell) -> Self {
         let one = Rational::from(i64::try_from(values.len()).unwrap_or(i64::MAX)).reciprocal();
         let one = one.unwrap_or_default();

@@ -5,7 +5,7 @@ use dashu_int::ops::Abs;
 
 use crate::Rational;
 
-/// How finely something is worked out.
+/// Precision of a computation.
 #[derive(Clone, Copy)]
 struct Fineness {
     /// The unit of the computation is 2 to minus this.
@@ -13,35 +13,35 @@ struct Fineness {
     /// Arguments of the normal distribution are rounded to units of 2 to minus this first, so that
     /// their squares are exact.
     rounded: usize,
-    /// Results are told in units of 2 to minus this, one to either side for all that was rounded. Less
-    /// than `bits` by at least 95.
+    /// Results are rounded to units of 2 to minus this, and widened by one unit on either side for
+    /// all rounding errors. Less than `bits` by at least 95.
     told: usize,
 }
 
-/// For what is told by itself.
+/// Precision for single values.
 const QUICK: Fineness = Fineness {
     bits: 160,
     rounded: 40,
     told: 64,
 };
-/// For what is the difference of two numbers that are almost the same.
+/// Precision for differences of two nearly equal numbers.
 const FINE: Fineness = Fineness {
     bits: 224,
     rounded: 80,
     told: 112,
 };
-/// How many standard deviations from the mean nothing is told any more: there is less than 2^-62
-/// beyond.
+/// Distance from the mean, in standard deviations, beyond which the tail is not computed. Its
+/// probability is less than 2^-62.
 const FAR: i64 = 9;
-/// What is beyond, at most, of the normal distribution or of a power.
+/// Upper bound on the tail of the normal distribution, or on a power, that is not computed.
 const BEYOND: (i64, usize) = (1, 62);
-/// `1 / √(2π)`, of which all these digits are right.
+/// `1 / √(2π)`; all these digits are correct.
 const PEAK: &str = "0.3989422804014326779399460599343818684758586311649346576659258296706579258993";
 
-/// `e^-argument`, between two numbers some 10^-19 apart; the argument is not negative.
+/// Returns bounds on `e^-argument` that are some 10^-19 apart; the argument must not be negative.
 ///
-/// The series of the argument divided by a power of two, squared as often. Every step is off by a few
-/// units of 2^-160, and each squaring at most doubles that and adds one.
+/// The series of the argument divided by a power of two is squared repeatedly. Every step is off by
+/// a few units of 2^-160, and each squaring at most doubles that and adds one.
 ///
 /// ```
 /// use elbowroom_num::{Rational, enclosed};
@@ -50,7 +50,7 @@ const PEAK: &str = "0.3989422804014326779399460599343818684758586311649346576659
 /// assert!(below < above && above.to_decimal(12) == "0.367879441171");
 /// ```
 pub fn exp_of_minus(argument: &Rational) -> [Rational; 2] {
-    /// Beyond that, there is less than 2^-62.
+    /// Greatest argument that is computed; beyond it, the result is less than 2^-62.
     const MOST: i64 = 45;
     if *argument > Rational::from(MOST) {
         return [Rational::ZERO, beyond()];
@@ -58,9 +58,9 @@ pub fn exp_of_minus(argument: &Rational) -> [Rational; 2] {
     enclosed(&power(argument, QUICK.bits), QUICK)
 }
 
-/// The same in units of 2 to minus `bits`, off by less than 2^30 of these.
+/// Returns `e^-argument` in units of 2 to minus `bits`, off by less than 2^30 of these.
 fn power(argument: &Rational, bits: usize) -> IBig {
-    /// 45 divided by 2 so often is less than a tenth.
+    /// Number of halvings after which 45 is less than a tenth.
     const HALVINGS: usize = 9;
     let one = IBig::ONE << bits;
     let small: IBig = argument.in_units(bits) >> HALVINGS;
@@ -80,24 +80,24 @@ fn power(argument: &Rational, bits: usize) -> IBig {
     sum
 }
 
-/// How likely a normally distributed number with mean 0 and standard deviation 1 is at most this:
-/// between two numbers some 10^-12 apart.
+/// Returns bounds, some 10^-12 apart, on the probability that a standard normal variable is at most
+/// `at`.
 pub fn normal(at: &Rational) -> [Rational; 2] {
     at_most(at, QUICK)
 }
 
-/// How likely that number is between two others, the lesser one first: between two numbers some 10^-24
-/// apart, so that something is known of short intervals, too.
+/// Returns bounds, some 10^-24 apart, on the probability that a standard normal variable lies
+/// between two numbers, the lesser one first. The precision is high enough for short intervals.
 pub fn normal_between(ends: [&Rational; 2]) -> [Rational; 2] {
     let [[under, over], [least, most]] = ends.map(|at| at_most(at, FINE));
     [(least - over).max(Rational::ZERO), most - under]
 }
 
-/// The distribution.
+/// Returns bounds on the standard normal distribution function at `at`.
 ///
-/// `1/2 + φ(z)·(z + z³/3 + z⁵/15 + …)`, all of whose terms have one sign. The sum is less than 2^59,
-/// and its roundings, none of which is multiplied by more than that afterwards, stay below 2^76 units
-/// of the computation.
+/// It is `1/2 + φ(z)·(z + z³/3 + z⁵/15 + …)`, and all terms have one sign. The sum is less than
+/// 2^59. None of its rounding errors is multiplied by more than that afterwards, so they stay below
+/// 2^76 units of the computation.
 fn at_most(at: &Rational, fineness: Fineness) -> [Rational; 2] {
     let far = Rational::from(FAR);
     if *at > far {
@@ -106,14 +106,14 @@ fn at_most(at: &Rational, fineness: Fineness) -> [Rational; 2] {
     if *at < -far {
         return [Rational::ZERO, beyond()];
     }
-    // The distribution rises: what is below is worked out at a smaller argument.
+    // The distribution function is monotonic, so the lower bound is computed at a smaller argument.
     let rounded = at.in_units(fineness.rounded);
     let [below, _] = at_units(&rounded, fineness);
     let [_, above] = at_units(&(rounded + IBig::ONE), fineness);
     [below.max(Rational::ZERO), above.min(Rational::ONE)]
 }
 
-/// The density of that distribution, between two numbers.
+/// Returns bounds on the standard normal density.
 pub fn normal_density(at: &Rational) -> [Rational; 2] {
     let square = at * at / Rational::from(2);
     let [below, above] = exp_of_minus(&square);
@@ -121,7 +121,8 @@ pub fn normal_density(at: &Rational) -> [Rational; 2] {
     [(below * &peak), above * &peak + beyond()]
 }
 
-/// The distribution at so many of the units that arguments are rounded to.
+/// Returns bounds on the distribution function at a number of the units that arguments are rounded
+/// to.
 fn at_units(units: &IBig, fineness: Fineness) -> [Rational; 2] {
     let Fineness { bits, rounded, .. } = fineness;
     let size = units.clone().abs();
@@ -146,7 +147,8 @@ fn at_units(units: &IBig, fineness: Fineness) -> [Rational; 2] {
     enclosed(&whole, fineness)
 }
 
-/// A number in units of the computation that is off by less than 2^94 of them.
+/// Returns bounds on a number that is given in units of the computation, and off by less than 2^94
+/// of them.
 fn enclosed(units: &IBig, fineness: Fineness) -> [Rational; 2] {
     let coarse: IBig = units >> (fineness.bits - fineness.told);
     [-1, 2].map(|more| {
@@ -154,7 +156,7 @@ fn enclosed(units: &IBig, fineness: Fineness) -> [Rational; 2] {
     })
 }
 
-/// What is beyond of what is so far away that it is not worked out.
+/// Returns the bound on tails that are not computed.
 fn beyond() -> Rational {
     let (units, bits) = BEYOND;
     Rational::from_units(IBig::from(units), bits)

@@ -1,12 +1,12 @@
-//! From floating-point numbers.
+//! Conversions from floating-point numbers.
 
 use dashu_ratio::RBig;
 
 use super::Rational;
 
 impl Rational {
-    /// The number that the float is, to the last bit: 0.1 is
-    /// 3602879701896397/36028797018963968. `None` for infinities and what is no number.
+    /// Returns the exact value of the float: 0.1 is 3602879701896397/36028797018963968. `None` for
+    /// infinities and NaN.
     ///
     /// ```
     /// use elbowroom_num::Rational;
@@ -18,8 +18,8 @@ impl Rational {
         RBig::try_from(value).ok().map(Self::from_big)
     }
 
-    /// The multiple of `grid` nearest to the float, the larger of two in magnitude. `None` for
-    /// infinities and what is no number, and for a grid that is not positive.
+    /// Returns the multiple of `grid` nearest to the float, and the one larger in magnitude if two
+    /// are equally near. `None` for infinities and NaN, and for a grid that is not positive.
     ///
     /// ```
     /// use elbowroom_num::Rational;
@@ -40,8 +40,8 @@ impl Rational {
         })
     }
 
-    /// The decimal with the fewest digits that reads as this float, which is what somebody wrote
-    /// who wrote few: 0.1 is 1/10. `None` for infinities and what is no number.
+    /// Returns the shortest decimal that parses to this float: 0.1 is 1/10. `None` for infinities
+    /// and NaN.
     ///
     /// ```
     /// use elbowroom_num::Rational;

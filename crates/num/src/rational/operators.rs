@@ -20,7 +20,7 @@ impl<'a> Sub<&'a Rational> for &Rational {
     }
 }
 
-/// `a + b`, or `a - b` when `subtract`.
+/// Returns `a + b`, or `a - b` when `subtract`.
 fn sum(left: &Rational, right: &Rational, subtract: bool) -> Rational {
     if let (&Small(a, b), &Small(c, d)) = (&left.0, &right.0) {
         let c = if subtract { -c } else { c };

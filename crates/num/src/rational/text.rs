@@ -1,4 +1,4 @@
-//! Fractions read from text, and written.
+//! Parsing and formatting of fractions.
 
 use std::fmt;
 use std::str::FromStr;
@@ -30,7 +30,7 @@ impl fmt::Debug for Rational {
     }
 }
 
-/// A text is not a number in decimal notation or a fraction, or has more digits than are read.
+/// Error for a text that is not a number in decimal notation or a fraction, or that is too long.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParseRationalError {
     /// The beginning of the text.
@@ -58,13 +58,13 @@ impl fmt::Display for ParseRationalError {
 
 impl std::error::Error for ParseRationalError {}
 
-/// Longest numeral accepted; more digits than any measurement has, few enough to stay fast.
+/// Longest numeral accepted: more digits than any measurement has, and few enough to stay fast.
 const LONGEST_NUMERAL: usize = 400;
 /// Largest decimal exponent accepted, for the same reason.
 const LARGEST_EXPONENT: i32 = 400;
-/// The most bits that numerator and denominator may have, so that a number that was read, written
-/// as a fraction with its sign, is no longer than [`LONGEST_NUMERAL`] on either side and can be
-/// read again.
+/// Limit on the bits of numerator and denominator. It ensures that a number that was parsed and
+/// written as a fraction with its sign is no longer than [`LONGEST_NUMERAL`] on either side, and
+/// can be parsed again.
 const MOST_BITS: usize = 1_325;
 
 /// Reads `12`, `-3.5`, `+.5`, `1e-3` and `p/q` exactly.
@@ -88,7 +88,7 @@ impl FromStr for Rational {
     }
 }
 
-/// Whether the number can be read again when it is written.
+/// Returns `true` if the written number is short enough to be parsed again.
 fn has_few_digits(number: &Rational) -> bool {
     match &number.0 {
         Small(..) => true,

@@ -30,7 +30,7 @@ impl Simplex {
         Ok(())
     }
 
-    /// A variable whose lower bound lies above its upper one.
+    /// Fails if a variable's lower bound lies above its upper one.
     fn refute_by_one_variable(&self) -> Result<(), Infeasible> {
         for variable in &self.variables {
             if let (Some(lower), Some(upper)) = (&variable.lower, &variable.upper)
@@ -44,7 +44,7 @@ impl Simplex {
         Ok(())
     }
 
-    /// The first basic variable outside its bounds (Bland's rule wants the first).
+    /// Returns the first basic variable outside its bounds (Bland's rule requires the first).
     fn violated_basic(&self) -> Option<(VariableId, Violated)> {
         self.tableau.basic().find_map(|basic| {
             let variable = &self.variables[basic.index()];
@@ -58,8 +58,8 @@ impl Simplex {
         })
     }
 
-    /// A variable by which the basic variable can be made to rise (or fall): the one that occurs
-    /// in the fewest rows, for the sake of short rows, or the first one.
+    /// Returns a variable that can make the basic variable rise (or fall): the one with the fewest
+    /// rows if `is_greedy`, to keep rows short, otherwise the first one.
     fn entering(&self, basic: VariableId, rises: bool, is_greedy: bool) -> Option<VariableId> {
         let row = self.tableau.row(basic).iter();
         let mut suitable = row
@@ -72,7 +72,7 @@ impl Simplex {
         }
     }
 
-    /// Whether `other` can move so that `coefficient · other` rises (or falls).
+    /// Returns `true` if `other` can move so that `coefficient · other` rises (or falls).
     pub(super) fn can_move(&self, other: VariableId, coefficient: &Rational, rises: bool) -> bool {
         let variable = &self.variables[other.index()];
         if coefficient.is_positive() == rises {
@@ -82,7 +82,7 @@ impl Simplex {
         }
     }
 
-    /// The row proves it: every variable in it is at the bound that holds the basic one back.
+    /// Returns the proof by a row: every variable in it is at the bound that blocks the basic one.
     fn refutation_by_row(&self, basic: VariableId, rises: bool) -> Infeasible {
         let variable = &self.variables[basic.index()];
         let violated = if rises {

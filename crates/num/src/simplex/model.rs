@@ -4,14 +4,14 @@ use super::{Simplex, VariableId};
 use crate::{Delta, Rational};
 
 impl Simplex {
-    /// The variable's value in the assignment. After a successful [`Simplex::check`] all bounds
-    /// hold in the assignment.
+    /// Returns the variable's value in the assignment. After a successful [`Simplex::check`] all
+    /// bounds hold in the assignment.
     pub fn value(&self, variable: VariableId) -> &Delta {
         &self.variables[variable.index()].value
     }
 
-    /// Rational values of all variables that satisfy all bounds, strict ones strictly; to be
-    /// asked for after a successful [`Simplex::check`].
+    /// Returns rational values of all variables that satisfy all bounds, strict ones strictly.
+    /// Valid after a successful [`Simplex::check`].
     pub fn model(&self) -> Vec<Rational> {
         let delta = self.small_enough_delta();
         let variables = self.variables.iter();
@@ -20,8 +20,8 @@ impl Simplex {
             .collect()
     }
 
-    /// A positive rational that may stand for δ: whatever bound holds for the infinitesimal, holds
-    /// for this number (Dutertre & de Moura, section 5).
+    /// Returns a positive rational that can replace δ: every bound that holds for the infinitesimal
+    /// also holds for this number (Dutertre & de Moura, section 5).
     fn small_enough_delta(&self) -> Rational {
         let mut delta = Rational::ONE;
         for variable in &self.variables {
@@ -36,7 +36,7 @@ impl Simplex {
     }
 }
 
-/// Makes `delta` so small that `less <= more` stays true when it is put in for δ.
+/// Reduces `delta` until `less <= more` stays true when δ is replaced by it.
 fn narrow(delta: &mut Rational, less: &Delta, more: &Delta) {
     if less.real < more.real && less.infinitesimal > more.infinitesimal {
         let room = &more.real - &less.real;
@@ -45,7 +45,7 @@ fn narrow(delta: &mut Rational, less: &Delta, more: &Delta) {
     }
 }
 
-/// `value` with `delta` put in for δ.
+/// Returns `value` with δ replaced by `delta`.
 fn at(value: &Delta, delta: &Rational) -> Rational {
     &value.real + &value.infinitesimal * delta
 }

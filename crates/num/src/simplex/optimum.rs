@@ -6,25 +6,25 @@ use crate::{Delta, Rational};
 /// The best value of an objective.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Optimum {
-    /// There are values better than any number.
+    /// The objective is unbounded.
     Unbounded,
-    /// No value is better. If it has an infinitesimal part, values come arbitrarily near to the
-    /// rational part, without reaching it.
+    /// No value is better. If it has an infinitesimal part, the rational part is approached
+    /// arbitrarily closely, but not reached.
     Value(Delta),
 }
 
 /// The largest step of a variable before some variable meets a bound.
 enum Limit {
     None,
-    /// By so far; then it meets its own other bound.
+    /// The variable meets its own other bound after this step.
     Own(Delta),
-    /// By so far; then the basic variable comes to its bound.
+    /// The basic variable meets its bound after this step.
     Basic(VariableId, Delta),
 }
 
 impl Simplex {
-    /// The largest value of `Σ coefficient · variable`. The assignment is left at the optimum, or
-    /// where it was found that there is none.
+    /// Returns the largest value of `Σ coefficient · variable`. The assignment is left at the
+    /// optimum, or at the point where the objective was found unbounded.
     ///
     /// # Errors
     /// Bounds that contradict each other.
@@ -32,9 +32,9 @@ impl Simplex {
         Ok(self.maximize_with_proof(objective)?.0)
     }
 
-    /// Like [`maximize`](Self::maximize), with the proof that no value is larger: the bounds with
-    /// these tags, written as `term <= bound`, each times its multiplier, which is positive, add up
-    /// to `objective <= value`. Empty if there are values larger than any number.
+    /// Like [`maximize`](Self::maximize), but also returns the proof that no value is larger: the
+    /// bounds with these tags, written as `term <= bound`, each times its positive multiplier, add
+    /// up to `objective <= value`. The proof is empty if the objective is unbounded.
     ///
     /// # Errors
     /// Bounds that contradict each other.
@@ -43,8 +43,8 @@ impl Simplex {
         objective: &Combination,
     ) -> Result<(Optimum, Vec<(usize, Rational)>), Infeasible> {
         self.check()?;
-        // The objective as a variable without bounds never leaves the basis, so its row can go
-        // again afterwards.
+        // The objective is a variable without bounds, so it never leaves the basis, and its row can
+        // be removed afterwards.
         let value = self.define(objective);
         let optimum = loop {
             let Some((entering, rises)) = self.improving(value) else {
@@ -65,7 +65,8 @@ impl Simplex {
         Ok((optimum, proof))
     }
 
-    /// The bounds that hold the objective back at its optimum: every variable in its row is at one.
+    /// Returns the bounds that limit the objective at its optimum: every variable in its row is at
+    /// one.
     fn proof(&self, objective: VariableId) -> Vec<(usize, Rational)> {
         let row = self.tableau.row(objective).iter();
         let mut proof: Vec<(usize, Rational)> = row
@@ -86,7 +87,7 @@ impl Simplex {
         proof
     }
 
-    /// The least value of `Σ coefficient · variable`; like [`Simplex::maximize`].
+    /// Returns the least value of `Σ coefficient · variable`; like [`Simplex::maximize`].
     ///
     /// # Errors
     /// Bounds that contradict each other.
@@ -98,7 +99,8 @@ impl Simplex {
         })
     }
 
-    /// The first variable whose move makes `objective` rise, and whether it has to rise itself.
+    /// Returns the first variable whose move makes `objective` rise, and `true` if that variable
+    /// has to rise itself.
     fn improving(&self, objective: VariableId) -> Option<(VariableId, bool)> {
         let row = self.tableau.row(objective).iter();
         let mut suitable = row.filter(|(other, factor)| self.can_move(**other, factor, true));
@@ -107,8 +109,8 @@ impl Simplex {
             .map(|(other, factor)| (*other, factor.is_positive()))
     }
 
-    /// The ratio test. Of several basic variables that stop the move at once, the first one
-    /// (Bland's rule, here and in `improving`: no circles).
+    /// Performs the ratio test. If several basic variables stop the move at once, it returns the
+    /// first one (Bland's rule, here and in `improving`, prevents cycling).
     fn limit(&self, entering: VariableId, rises: bool) -> Limit {
         let own = &self.variables[entering.index()];
         let other_bound = if rises { &own.upper } else { &own.lower };
@@ -138,7 +140,7 @@ impl Simplex {
     }
 }
 
-/// `|a - b|`.
+/// Returns `|a - b|`.
 fn distance(a: &Delta, b: &Delta) -> Delta {
     if a > b { a - b } else { b - a }
 }

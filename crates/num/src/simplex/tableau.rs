@@ -22,7 +22,7 @@ pub(super) struct Tableau {
 }
 
 impl Tableau {
-    /// Makes room for one more variable; it is not basic, and occurs in no row.
+    /// Adds a variable; it is not basic, and occurs in no row.
     pub(super) fn add_column(&mut self) {
         self.rows.push(None);
         self.columns.push(BTreeSet::new());
@@ -52,19 +52,19 @@ impl Tableau {
         self.rows[variable.index()].is_some()
     }
 
-    /// All basic variables, in ascending order.
+    /// Returns all basic variables, in ascending order.
     pub(super) fn basic(&self) -> impl Iterator<Item = VariableId> {
         self.basic.iter().copied()
     }
 
-    /// The row of a basic variable.
+    /// Returns the row of a basic variable.
     pub(super) fn row(&self, basic: VariableId) -> &Row {
         self.rows[basic.index()]
             .as_ref()
             .expect("only basic variables are asked for their row")
     }
 
-    /// The basic variables that depend on `variable`, and by which coefficient.
+    /// Returns the basic variables that depend on `variable`, with their coefficients.
     pub(super) fn column(
         &self,
         variable: VariableId,
@@ -73,7 +73,7 @@ impl Tableau {
         basic.map(move |&basic| (basic, &self.row(basic)[&variable]))
     }
 
-    /// In how many rows `variable` occurs.
+    /// Returns the number of rows that contain `variable`.
     pub(super) fn column_length(&self, variable: VariableId) -> usize {
         self.columns[variable.index()].len()
     }
@@ -99,7 +99,7 @@ impl Tableau {
         self.insert(entering, row);
     }
 
-    /// In the row of `basic`, writes `definition` for `variable`.
+    /// Replaces `variable` by `definition` in the row of `basic`.
     fn substitute(&mut self, basic: VariableId, variable: VariableId, definition: &Row) {
         let row = self.rows[basic.index()]
             .as_mut()
@@ -139,14 +139,14 @@ impl Tableau {
     }
 }
 
-/// `row += factor · other`.
+/// Computes `row += factor · other`.
 fn add_multiple(row: &mut Row, other: &Row, factor: &Rational) {
     for (term, coefficient) in other {
         add_term(row, *term, &(coefficient * factor));
     }
 }
 
-/// `row += coefficient · term`.
+/// Computes `row += coefficient · term`.
 fn add_term(row: &mut Row, term: VariableId, coefficient: &Rational) {
     let sum = match row.get(&term) {
         Some(old) => old + coefficient,

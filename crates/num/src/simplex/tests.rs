@@ -1,4 +1,4 @@
-//! The simplex against elimination by Fourier and Motzkin.
+//! The simplex, compared with Fourier-Motzkin elimination.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -16,7 +16,7 @@ struct Inequality {
 }
 
 impl Inequality {
-    /// `factor · self + other_factor · other`.
+    /// Returns `factor · self + other_factor · other`.
     fn combined(&self, factor: &Rational, other: &Self, other_factor: &Rational) -> Self {
         let pairs = self.coefficients.iter().zip(&other.coefficients);
         Self {
@@ -37,7 +37,7 @@ impl Inequality {
     }
 }
 
-/// The inequalities that remain when `variable` is eliminated.
+/// Returns the inequalities that remain when `variable` is eliminated.
 fn eliminated(system: &[Inequality], variable: usize) -> Vec<Inequality> {
     let mut rest = Vec::new();
     for upper in system {
@@ -58,7 +58,7 @@ fn eliminated(system: &[Inequality], variable: usize) -> Vec<Inequality> {
     tightest(rest)
 }
 
-/// The same without those that another one with the same left side, up to a factor, implies.
+/// Removes inequalities that another one with the same left side, up to a factor, implies.
 fn tightest(system: Vec<Inequality>) -> Vec<Inequality> {
     let mut bounds: BTreeMap<Vec<Rational>, Delta> = BTreeMap::new();
     for inequality in system {
@@ -78,13 +78,13 @@ fn tightest(system: Vec<Inequality>) -> Vec<Inequality> {
     bounds.into_iter().map(unfold).collect()
 }
 
-/// Whether the inequalities have a solution.
+/// Returns `true` if the inequalities have a solution.
 fn is_feasible(system: &[Inequality], variable_count: usize) -> bool {
     let rest = (0..variable_count).fold(system.to_vec(), |rest, v| eliminated(&rest, v));
     rest.iter().all(|left| left.bound >= Delta::ZERO)
 }
 
-/// The supremum of `Σ objective[i] · x_i`, of a system that has a solution.
+/// Returns the supremum of `Σ objective[i] · x_i`, of a system that has a solution.
 fn supremum(system: &[Inequality], objective: &[Rational]) -> Optimum {
     let count = objective.len();
     let widened = |coefficients: &[Rational], last: i64| {
@@ -118,8 +118,8 @@ fn supremum(system: &[Inequality], objective: &[Rational]) -> Optimum {
         .map_or(Optimum::Unbounded, Optimum::Value)
 }
 
-/// A simplex that holds inequalities, tagged by their place. Every second one is written the
-/// other way round, as a lower bound, and those on one variable need no definition.
+/// A simplex that holds inequalities, tagged by their position. Every second one is written in
+/// reverse, as a lower bound. Those on one variable need no definition.
 struct System {
     simplex: Simplex,
     variables: Vec<VariableId>,
@@ -168,8 +168,9 @@ impl System {
     }
 }
 
-/// Whether the multipliers prove that the inequalities have no solution. A bound on a single
-/// variable was divided by the size of its coefficient, so its multiplier is too.
+/// Returns `true` if the multipliers prove that the inequalities have no solution. A bound on a
+/// single variable was divided by the size of its coefficient, so its multiplier is divided as
+/// well.
 fn proves(infeasible: &Infeasible, system: &[Inequality], variable_count: usize) -> bool {
     let mut sum = Inequality {
         coefficients: vec![Rational::ZERO; variable_count],

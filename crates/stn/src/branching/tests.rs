@@ -1,4 +1,4 @@
-//! Against the plain way: all corners, one after the other.
+//! Comparison with the enumeration of all corners.
 
 use proptest::prelude::*;
 
@@ -17,7 +17,7 @@ struct Given {
 
 #[derive(Clone, Debug)]
 struct Quantity {
-    /// From, to, and how far the least difference is below the greatest; several are coupled.
+    /// From, to, and width of the difference; a quantity with several of them is coupled.
     differences: Vec<(usize, usize, i64)>,
     lower: i64,
     width: i64,
@@ -133,8 +133,8 @@ proptest! {
     }
 }
 
-/// A row of differences, each a quantity from 1 to 3, with no bound on where the row ends but one
-/// from above and one from below.
+/// Returns a row of differences, each a quantity from 1 to 3. The end of the row has one bound from
+/// above and one from below.
 fn row(length: usize, least: i64, most: i64) -> Given {
     let quantities = (0..length).map(|index| Quantity {
         differences: vec![(index, index + 1, 0)],

@@ -1,16 +1,16 @@
-//! Constraints that bind less than they did.
+//! Loosening of constraints.
 
 use super::{MovingWindows, Source, WindowEnd};
 use crate::direction::Direction;
 use crate::{ConstraintId, NodeId, Weight};
 
 impl<W: Weight> MovingWindows<W> {
-    /// From now on a constraint only demands `to - from <= bound`, or nothing if that is `None`.
-    /// A bound that demands more than it does so far changes nothing.
+    /// Loosens a constraint to `to - from <= bound`, or lifts it if `bound` is `None`. A bound that
+    /// is tighter than the current one changes nothing.
     ///
-    /// Costs time in proportion to the window ends that came from the constraint, and the
-    /// constraints at these: their paths are looked for again, beginning where those end that did
-    /// not come from it (cf. Ramalingam & Reps, *J. Algorithms* 21, 1996, on deletions).
+    /// Costs time in proportion to the window ends that depend on the constraint, and to the
+    /// constraints at these nodes. Their paths are searched again, from nodes whose window ends do
+    /// not depend on it (cf. Ramalingam & Reps, *J. Algorithms* 21, 1996, on deletions).
     pub fn loosen(&mut self, id: ConstraintId, bound: Option<W>) {
         match bound {
             None if self.is_lifted(id) => return,
@@ -30,7 +30,7 @@ impl<W: Weight> MovingWindows<W> {
         }
     }
 
-    /// Computes the distances of `node`, and of all whose paths go through it, once more.
+    /// Recomputes the distances of `node`, and of all nodes whose paths contain it.
     fn look_again(&mut self, direction: Direction, node: NodeId) {
         let mut lost = vec![node];
         let mut at = 0;
@@ -40,7 +40,7 @@ impl<W: Weight> MovingWindows<W> {
             while let Some(id) = next {
                 next = self.network.after(id, direction);
                 let far = direction.far_end(self.network.constraint(id));
-                // Paths make a tree: nobody is met twice.
+                // The paths form a tree, so no node is visited twice.
                 if self.source(direction, far) == Source::Constraint(id) {
                     lost.push(far);
                 }
@@ -61,7 +61,7 @@ impl<W: Weight> MovingWindows<W> {
                     continue;
                 }
                 let constraint = self.network.constraint(id);
-                // What is lost as well is queued when it is found again.
+                // A neighbour whose window end is also lost is queued when it is found again.
                 let Some(near) = self.distance(direction, back.far_end(constraint)) else {
                     continue;
                 };
@@ -79,7 +79,7 @@ impl<W: Weight> MovingWindows<W> {
         self.sources[node.index()][end(direction) as usize]
     }
 
-    /// The node's own limit as a distance.
+    /// Returns the node's own limit as a distance.
     fn limit(&self, direction: Direction, node: NodeId) -> Option<W> {
         let limit = self.limits[node.index()][end(direction) as usize].as_ref()?;
         Some(match direction {

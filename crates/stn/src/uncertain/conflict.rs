@@ -1,4 +1,4 @@
-//! Why a network is not dynamically controllable.
+//! Proofs that a network is not dynamically controllable.
 
 use elbowroom_num::Rational;
 
@@ -16,36 +16,36 @@ pub enum Ground {
     Late(LinkId),
 }
 
-/// `to - from <= bound` in the case that the conflict tells of.
+/// Constraint `to - from <= bound` that holds in the case described by the conflict.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Step<W = Rational> {
     /// The time point that is subtracted.
     pub from: NodeId,
     /// The time point it is subtracted from.
     pub to: NodeId,
-    /// What the difference does not exceed; infinite where a link without an upper bound lasts
-    /// for ever.
+    /// Upper bound of the difference; infinite if a link without an upper bound never ends.
     pub bound: Extended<W>,
-    /// Where it comes from.
+    /// Origin of the bound.
     pub ground: Ground,
 }
 
-/// A semi-reducible cycle of negative length (Morris 2006): requirements that would have to be
-/// satisfied although some links end early and others late, without anyone knowing in time which.
+/// Semi-reducible cycle of negative length (Morris 2006): requirements that cannot all be satisfied
+/// if some links end early and others late, because the executor does not know in time which of
+/// them do.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Conflict<W = Rational> {
-    /// The cycle, step by step; each begins where the one before ends, the first where the last
-    /// ends. A very long cycle is cut short ([`Conflict::is_whole`]).
+    /// The cycle, step by step; each step begins where the previous one ends, and the first where
+    /// the last one ends. A very long cycle is truncated ([`Conflict::is_whole`]).
     pub steps: Vec<Step<W>>,
-    /// Whether `steps` has all of the cycle.
+    /// `true` if `steps` contains the whole cycle.
     pub is_whole: bool,
     /// The length of the whole cycle; negative.
     pub total: Extended<W>,
 }
 
 impl<W: Weight> Conflict<W> {
-    /// The links that the cycle takes to end early, and those it takes to end late, in order and
-    /// without repetition.
+    /// Returns the links that end early in the cycle, and those that end late, in order and without
+    /// repetition.
     pub fn links(&self) -> (Vec<LinkId>, Vec<LinkId>) {
         let mut early = Vec::new();
         let mut late = Vec::new();
@@ -63,7 +63,7 @@ impl<W: Weight> Conflict<W> {
         (early, late)
     }
 
-    /// The same conflict in other numbers.
+    /// Returns the same conflict with another number type.
     pub(super) fn map<V>(self, number: impl Fn(W) -> V) -> Conflict<V> {
         let steps = self.steps.into_iter().map(|step| Step {
             from: step.from,

@@ -1,4 +1,4 @@
-//! A network in a form by which it can be executed event by event.
+//! Dispatchable form of a network, for event-by-event execution.
 
 use super::graph::{EdgeId, Graph, Kind, Origin};
 use super::{Extended, Ground, LinkId, Step, UncertainNetwork};
@@ -7,12 +7,13 @@ use crate::{Constraint, Network, NodeId, Weight};
 /// The limit on the steps in the explanation of an edge.
 const MOST_STEPS: usize = 1_000;
 
-/// A dynamically controllable network with all edges that executing it needs: what an event means
-/// for the future shows at its neighbours (Morris 2014; Hunsberger & Posenato, ICAART 2024, call
-/// it an *ESTNU*).
+/// Dynamically controllable network with all edges needed for its execution: each event has to be
+/// propagated to its neighbours only (Morris 2014; Hunsberger & Posenato, ICAART 2024, call it an
+/// *ESTNU*).
 ///
-/// An executor that keeps to it satisfies every requirement, whatever the world does within the
-/// bounds of the contingent links. [`Dispatcher`](super::Dispatcher) does.
+/// An executor that respects these edges satisfies every requirement, whatever the world does
+/// within the bounds of the contingent links. [`Dispatcher`](super::Dispatcher) is such an
+/// executor.
 #[derive(Clone, Debug)]
 pub struct Dispatchable<W> {
     network: UncertainNetwork<W>,
@@ -22,14 +23,15 @@ pub struct Dispatchable<W> {
     entering: Vec<Vec<EdgeId>>,
     /// For each node, the waits that begin when it happens.
     waits_at: Vec<Vec<Wait<W>>>,
-    /// For each node, those that have to have happened before. Where the world decides, nobody sees to it.
+    /// For each node, the nodes that must have happened before it. The dispatcher does not enforce
+    /// the entries of nodes that the world decides on.
     before: Vec<Vec<NodeId>>,
-    /// For each node, those that may not be later although they may fall together with it, and
-    /// that no other edge holds to that; and the edge that says so.
+    /// For each node, the nodes that must not happen later than it, but may happen at the same
+    /// time, if no other edge ensures that; each with its edge.
     not_after: Vec<Vec<(NodeId, EdgeId)>>,
 }
 
-/// `to - from <= bound`, given or found.
+/// `to - from <= bound`, from the network or derived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DispatchableEdge<'a, W> {
     /// The time point that is subtracted.
@@ -48,7 +50,7 @@ pub struct Wait<W> {
     pub node: NodeId,
     /// The link whose end it waits for.
     pub link: LinkId,
-    /// For how long at most; `None` if there is no other way than the link's end.
+    /// Longest wait after the activation; `None` if only the link's end can end it.
     pub delay: Option<W>,
     pub(super) edge: EdgeId,
 }
@@ -74,7 +76,7 @@ impl<W: Weight> Dispatchable<W> {
                     if edge.bound.is_negative() {
                         form.before[from.index()].push(to);
                     }
-                    // A link that takes no time at all: its end is as late as its activation.
+                    // A link with duration 0: its end is as late as its activation.
                     let is_link = matches!(edge.origin, Origin::Link(_));
                     if is_link && edge.bound == Extended::zero() {
                         form.not_after[from.index()].push((to, id));
@@ -100,9 +102,9 @@ impl<W: Weight> Dispatchable<W> {
         form
     }
 
-    /// What comes at the same time or later waits for what comes first: that the two may fall
-    /// together says nothing of their order. Nodes that have to fall together wait for none of
-    /// each other, but all for the world.
+    /// Makes nodes wait for nodes that are required to be earlier or simultaneous. A requirement
+    /// with bound 0 does not fix the order of simultaneous events. Nodes that must be simultaneous
+    /// do not wait for each other, but each of them waits for nodes that the world decides on.
     fn follow_at_once(&mut self) {
         let together = self.together();
         let requirements = &self.network.requirements;
@@ -124,12 +126,12 @@ impl<W: Weight> Dispatchable<W> {
         }
     }
 
-    /// Those that have to have happened by the node's own latest time.
+    /// Returns the nodes that have to have happened by the node's own latest time.
     pub(super) fn not_after(&self, node: NodeId) -> &[(NodeId, EdgeId)] {
         &self.not_after[node.index()]
     }
 
-    /// Whether the world has a choice when a node happens.
+    /// Returns `true` if the world can choose when a node happens.
     fn is_up_to_the_world(&self, node: NodeId) -> bool {
         let mut at = node;
         while let Some(link) = self.network.ending_at(at) {
@@ -142,7 +144,7 @@ impl<W: Weight> Dispatchable<W> {
         false
     }
 
-    /// For each node, a number that it shares with those that have to happen at the same time.
+    /// Returns a number for each node; nodes that have to happen at the same time share it.
     fn together(&self) -> Vec<usize> {
         let requirements = self.network.requirements.constraints().iter();
         let mut zero = Network::with_nodes(self.network.requirements.node_count());
@@ -158,13 +160,13 @@ impl<W: Weight> Dispatchable<W> {
         zero.components()
     }
 
-    /// The network that it is the form of.
+    /// Returns the network that this is the dispatchable form of.
     pub fn network(&self) -> &UncertainNetwork<W> {
         &self.network
     }
 
-    /// All edges to keep to, the given ones first. The bounds of contingent links are not among
-    /// them.
+    /// Returns all edges that the executor has to respect, those of the network first. The bounds
+    /// of contingent links are not included.
     pub fn edges(&self) -> impl Iterator<Item = DispatchableEdge<'_, W>> {
         self.graph
             .edges
@@ -178,7 +180,7 @@ impl<W: Weight> Dispatchable<W> {
             })
     }
 
-    /// All waits of nodes that the executor chooses, by the node that activates their link.
+    /// Returns all waits of nodes that the executor chooses, by the node that activates their link.
     pub fn waits(&self) -> impl Iterator<Item = (NodeId, &Wait<W>)> {
         let nodes = self.network.requirements.nodes();
         nodes.flat_map(|node| {
@@ -189,11 +191,12 @@ impl<W: Weight> Dispatchable<W> {
         })
     }
 
-    /// All waits found beside those of links for their own ends: the node, the link whose end it waits
-    /// for, and for how long at most after the link's activation; `None` is without limit.
+    /// Returns all derived waits, except those of links for their own ends: the node, the link
+    /// whose end it waits for, and the longest wait after the link's activation; `None` is without
+    /// limit.
     ///
-    /// Also those of nodes that the world decides on. Nobody has to see to these, but other waits
-    /// follow from them.
+    /// Includes waits of nodes that the world decides on. No executor enforces these, but other
+    /// waits are derived from them.
     pub fn waits_found(&self) -> impl Iterator<Item = (NodeId, LinkId, Option<W>)> {
         self.graph.edges.iter().filter_map(|edge| match edge.kind {
             Kind::Upper(link) if !matches!(edge.origin, Origin::Link(_)) => {
@@ -203,18 +206,19 @@ impl<W: Weight> Dispatchable<W> {
         })
     }
 
-    /// The waits that begin when a node happens, also of nodes that the world decides on.
+    /// Returns the waits that begin when a node happens, including those of nodes that the world
+    /// decides on.
     pub(super) fn waits_at(&self, node: NodeId) -> &[Wait<W>] {
         &self.waits_at[node.index()]
     }
 
-    /// Those that have to have happened before a node. Where the world decides when it happens, it keeps to that as long as
-    /// it keeps to the bounds of its links.
+    /// Returns the nodes that must have happened before a node. If the world decides when the node
+    /// happens, it respects that order as long as links stay within their bounds.
     pub fn before(&self, node: NodeId) -> &[NodeId] {
         &self.before[node.index()]
     }
 
-    /// The edges that begin at a node: where, how long, which.
+    /// Returns the edges that begin at a node: target, length, identifier.
     pub(super) fn leaving(&self, node: NodeId) -> impl Iterator<Item = (NodeId, &W, EdgeId)> {
         self.leaving[node.index()].iter().map(|&id| {
             let edge = &self.graph.edges[id];
@@ -222,7 +226,7 @@ impl<W: Weight> Dispatchable<W> {
         })
     }
 
-    /// The edges that end at a node: from where, how long, which.
+    /// Returns the edges that end at a node: source, length, identifier.
     pub(super) fn entering(&self, node: NodeId) -> impl Iterator<Item = (NodeId, &W, EdgeId)> {
         self.entering[node.index()].iter().map(|&id| {
             let edge = &self.graph.edges[id];
@@ -230,14 +234,14 @@ impl<W: Weight> Dispatchable<W> {
         })
     }
 
-    /// The path that an edge stands for, from its beginning to its end.
+    /// Returns the path that implies an edge, from its beginning to its end.
     pub(super) fn behind(&self, edge: EdgeId) -> Vec<Step<W>> {
         let mut edges = Vec::new();
         self.graph.spelt_out(edge, MOST_STEPS, &mut edges);
         edges.into_iter().map(|id| self.graph.step(id)).collect()
     }
 
-    /// The requirements among steps, in order.
+    /// Returns the requirements among steps, in order.
     pub fn requirements_of(steps: &[Step<W>]) -> impl Iterator<Item = crate::ConstraintId> {
         steps.iter().filter_map(|step| match step.ground {
             Ground::Requirement(id) => Some(id),

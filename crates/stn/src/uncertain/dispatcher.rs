@@ -1,4 +1,4 @@
-//! Executing a dispatchable network.
+//! Execution of a dispatchable network.
 
 mod beyond;
 
@@ -13,63 +13,64 @@ use crate::{NodeId, Weight, WindowEnd, spend_step};
 
 /// Executes a [`Dispatchable`] network by the rules of RTE* (Hunsberger & Posenato, ICAART 2024):
 ///
-/// - a point may happen when all that must come before it have happened, its window has opened, and
-///   none of its waits is on any more;
-/// - a wait is over when the end that it waits for has happened, or when its time is up;
+/// - a point may happen when all its predecessors have happened, its window has opened, and none of
+///   its waits is active any more;
+/// - a wait is over when the link's end has happened, or when its time is up;
 /// - an event updates the windows of its neighbours only.
 ///
-/// It has no clock: it is told what happens, and asked what may. An event costs time in proportion
-/// to the edges at its node.
+/// It has no clock: the caller reports events with their times, and queries the points that may
+/// happen. An event costs time in proportion to the edges at its node.
 #[derive(Clone, Debug)]
 pub struct Dispatcher<W = Rational> {
     form: Arc<Dispatchable<W>>,
     happened: Vec<Option<W>>,
-    /// For each node, how many of those before it have not happened.
+    /// For each node, the number of its predecessors that have not happened.
     missing: Vec<u32>,
-    /// For each node, those that wait for it to happen.
+    /// For each node, the nodes that wait for it.
     after: Vec<Vec<NodeId>>,
-    /// For each node that has not happened, its window, as far as events have shown it, and the
-    /// edge that each end comes by.
+    /// For each node that has not happened, its window by the events so far, and the edge that
+    /// implies each end.
     windows: Vec<[Option<(W, EdgeId)>; 2]>,
-    /// For each node, its waits that are on. Those of nodes that the world decides on say when it has to be, and nobody
-    /// sees to them.
+    /// For each node, its active waits. The waits of nodes that the world decides on are not
+    /// enforced; they restrict the times that the remaining network allows.
     waits: Vec<Vec<ActiveWait<W>>>,
     /// For each link, the nodes with a wait for its end.
     waiting_for: Vec<Vec<NodeId>>,
-    /// Nodes that the executor chooses and that have all behind them that must come before.
+    /// Nodes that the executor chooses and whose predecessors have all happened.
     ready: BTreeSet<NodeId>,
-    /// Links under way that may end later than their upper bound says: by when, `None` if there is no such time.
+    /// Running links that may end later than their upper bound, each with its latest end; `None` if
+    /// it has none.
     prolonged: Vec<(LinkId, Option<W>)>,
 }
 
 #[derive(Clone, Debug)]
 struct ActiveWait<W> {
     link: LinkId,
-    /// The time at which it is over at the latest; `None` if only the link's end ends it.
+    /// Latest end of the wait; `None` if only the link's end ends it.
     until: Option<W>,
     edge: EdgeId,
 }
 
-/// Something happened outside its window.
+/// Event outside its window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Missed<W = Rational> {
     /// The event's node.
     pub node: NodeId,
     /// The end of the window that was missed.
     pub end: WindowEnd,
-    /// Where that end was.
+    /// Limit that this end of the window set.
     pub limit: W,
-    /// By how much it was missed; positive.
+    /// Amount of the violation; positive.
     pub by: W,
-    /// The path behind that end, from the event that it counts from.
+    /// Path that implies that end, from the event that it is relative to.
     pub behind: Vec<Step<W>>,
-    /// Whether the time is outside nothing but the bounds of the link that ends there: whatever else is known of the
-    /// node permits it. What comes after may then still work: see [`Dispatcher::bears`].
+    /// `true` if the time violates only the bounds of the link that ends at the node, and no other
+    /// constraint. The remaining network may then still be executable: see [`Dispatcher::bears`].
     pub is_only_link: bool,
 }
 
 impl<W: Weight> Dispatcher<W> {
-    /// Nothing has happened yet.
+    /// Creates a dispatcher without past events.
     pub fn new(form: Arc<Dispatchable<W>>) -> Self {
         let count = form.network().requirements().node_count();
         let mut missing = vec![0; count];
@@ -100,28 +101,28 @@ impl<W: Weight> Dispatcher<W> {
         }
     }
 
-    /// The dispatchable network that it executes.
+    /// Returns the dispatchable network that it executes.
     pub fn form(&self) -> &Dispatchable<W> {
         &self.form
     }
 
-    /// The time at which a node happened.
+    /// Returns the time at which a node happened.
     pub fn happened(&self, node: NodeId) -> Option<&W> {
         self.happened[node.index()].as_ref()
     }
 
-    /// The nodes that the executor chooses and that have all behind them that must come before.
+    /// Returns the nodes that the executor chooses and whose predecessors have all happened.
     pub fn ready(&self) -> impl Iterator<Item = NodeId> + '_ {
         self.ready.iter().copied()
     }
 
-    /// Whether all that must come before a node has happened.
+    /// Returns `true` if all predecessors of a node have happened.
     pub fn is_ready(&self, node: NodeId) -> bool {
         self.ready.contains(&node)
     }
 
-    /// The window of a node that has not happened, as far as events have shown it: once it is
-    /// ready it is all that there is to know.
+    /// Returns the window of a node that has not happened, by the events so far. Once the node is
+    /// ready, the window is complete.
     pub fn window(&self, node: NodeId) -> (Option<&W>, Option<&W>) {
         let [earliest, latest] = &self.windows[node.index()];
         (
@@ -130,11 +131,11 @@ impl<W: Weight> Dispatcher<W> {
         )
     }
 
-    /// When a ready node may happen if nothing happens before: its window is open then, and its
-    /// waits are over.
+    /// Returns the time at which a ready node may happen if nothing happens before: its window is
+    /// open then, and its waits are over.
     ///
     /// # Errors
-    /// The link whose end it waits for however long that takes.
+    /// The link whose end the node has to wait for without limit.
     pub fn earliest(&self, node: NodeId) -> Result<Option<&W>, LinkId> {
         let mut earliest = self.windows[node.index()][WindowEnd::Earliest as usize]
             .as_ref()
@@ -148,7 +149,7 @@ impl<W: Weight> Dispatcher<W> {
         Ok(earliest)
     }
 
-    /// The link whose end a node waits for longest at present.
+    /// Returns the link of the node's longest active wait.
     pub fn waits_for(&self, node: NodeId) -> Option<LinkId> {
         let waits = self.own_waits(node).iter();
         waits
@@ -156,7 +157,7 @@ impl<W: Weight> Dispatcher<W> {
             .map(|wait| wait.link)
     }
 
-    /// The waits of a node that the executor sees to.
+    /// Returns the waits of a node that the executor enforces.
     fn own_waits(&self, node: NodeId) -> &[ActiveWait<W>] {
         if self.form.network().is_contingent(node) {
             return &[];
@@ -164,8 +165,8 @@ impl<W: Weight> Dispatcher<W> {
         &self.waits[node.index()]
     }
 
-    /// The path that keeps a node from happening earlier, or later: from the event that it counts
-    /// from.
+    /// Returns the path that implies the earliest, or the latest, time of a node, from the event
+    /// that it is relative to.
     pub fn behind(&self, node: NodeId, end: WindowEnd) -> Vec<Step<W>> {
         let window = &self.windows[node.index()][end as usize];
         let mut last = window.as_ref().map(|(time, edge)| (time, *edge));
@@ -186,11 +187,11 @@ impl<W: Weight> Dispatcher<W> {
             .unwrap_or_default()
     }
 
-    /// The node happens, or has been observed to have happened, at `time`. It is taken for a fact
-    /// in any case.
+    /// Records that the node happens, or was observed, at `time`. The event is recorded in any
+    /// case.
     ///
     /// # Errors
-    /// When that is outside its window.
+    /// If that is outside its window.
     pub fn happen(&mut self, node: NodeId, time: &W) -> Result<(), Missed<W>> {
         let missed = self.missed(node, time);
         if self.happened[node.index()].replace(time.clone()).is_some() {
@@ -232,7 +233,7 @@ impl<W: Weight> Dispatcher<W> {
         missed.map_or(Ok(()), Err)
     }
 
-    /// A node may not happen before, or after, `time`.
+    /// Adds the limit that a node may not happen before, or after, `time`.
     fn limit(&mut self, node: NodeId, end: WindowEnd, time: &W, edge: EdgeId) {
         let form = Arc::clone(&self.form);
         let mut limited = vec![(node, edge)];
@@ -249,7 +250,7 @@ impl<W: Weight> Dispatcher<W> {
             if is_news {
                 *known = Some((time.clone(), edge));
                 if end == WindowEnd::Latest {
-                    // The node waits for these although they may fall together.
+                    // The node waits for these, although they may happen at the same time.
                     limited.extend_from_slice(form.not_after(node));
                 }
             }
@@ -273,7 +274,7 @@ impl<W: Weight> Dispatcher<W> {
         Some(missed(WindowEnd::Latest, &latest, time.minus(&latest)))
     }
 
-    /// The window of a node, with the bounds of the link that ends there.
+    /// Returns the window of a node, including the bounds of the link that ends there.
     pub fn bounds(&self, node: NodeId) -> (Option<W>, Option<W>) {
         let (earliest, latest) = self.window(node);
         let (mut earliest, mut latest) = (earliest.cloned(), latest.cloned());

@@ -1,31 +1,32 @@
 //! Dynamic controllability, by the algorithm of Morris (2014).
 //!
-//! Drawn as a graph, a requirement is an edge, and a link `[x, y]` from `A` to `C` is two: a
-//! *lower-case* edge `A --x--> C` ("C may come as early as that") and an *upper-case* edge
-//! `C --y--> A` of length `-y` ("as late as that"). The network is dynamically controllable unless
-//! there is a semi-reducible cycle of negative length. Such a cycle is looked for backwards from
-//! each *negative node*, one at which an edge of negative length ends: along edges that are not
-//! negative, until the way is not negative any more. What is found on the way becomes an edge of
-//! its own, so that nobody goes that way again. A negative node on the way is dealt with first; if
-//! it is being dealt with already, the ways add up to the cycle.
+//! In the graph, a requirement is an edge, and a link `[x, y]` from `A` to `C` is two edges: a
+//! *lower-case* edge `A --x--> C` ("C may come as early as that") and an *upper-case* edge `C
+//! --y--> A` of length `-y` ("C may come as late as that"). The network is dynamically controllable
+//! unless there is a semi-reducible cycle of negative length. The search for such a cycle runs
+//! backwards from each *negative node* (the end of an edge of negative length), along edges that
+//! are not negative, until the path is no longer negative. Each path found becomes an edge, so that
+//! it is not searched again. A negative node on the path is processed first. If it is already being
+//! processed, the paths form a cycle.
 //!
-//! Where a way begins with an upper-case edge, it holds only until the link's end has happened: its
-//! edges are *waits*, until they are so long that the link cannot end earlier. Such ways are walked
-//! first, by themselves, and may not use the lower-case edge of the same link.
+//! A path that begins with an upper-case edge holds only until the link's end has happened. Its
+//! edges are *waits*, unless they are so long that the link cannot end earlier. Such paths are
+//! searched first, separately, and may not use the lower-case edge of the same link.
 //!
-//! The edges found make the network dispatchable: every way of a positive edge followed by a
-//! negative one has an edge beside it (*Dynamic Controllability and Dispatchability Relationships*,
-//! CPAIOR 2014, where links are brought into a normal form with lower bound 0; here the lower bound
-//! stays where it is, and what falls short of it is handed from the waits to the plain edges).
+//! The edges found make the network dispatchable: for every positive edge followed by a negative
+//! one, there is an edge that bypasses both (*Dynamic Controllability and Dispatchability
+//! Relationships*, CPAIOR 2014, which normalises links to lower bound 0; here the lower bound is
+//! kept, and the waits shorter than it become plain edges).
 //!
-//! An edge found that is not negative asks that its end is not too long after its beginning. Where the end
-//! comes first in any case, that says nothing, nor does a wait of what comes after the link's end in any case:
-//! such edges are left out, where many are found, unless all are asked for. The form stays dispatchable without them: whoever would
-//! reckon with one has done what it comes after, and so has whatever that comes after. Where much waits only
-//! because it waits for what came long before, these are nearly all edges there are.
+//! An edge found that is not negative is an upper limit on the time from its beginning to its end.
+//! If the end always comes first, the edge is redundant. So is a wait of a node that always comes
+//! after the link's end. If many edges are found, redundant ones are left out, unless all are
+//! requested. The form stays dispatchable without them: an event that such an edge would constrain
+//! comes after the other event anyway, and so do all its successors. If many nodes wait only
+//! because they come after much earlier events, nearly all edges are redundant.
 //!
-//! O(n³) at worst (Dijkstra's algorithm for each negative node); in the networks of plans, where
-//! ways end after a few edges, in proportion to their size.
+//! O(n³) at worst (Dijkstra's algorithm for each negative node). In the networks of plans, where
+//! paths end after a few edges, the time is in proportion to their size.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -43,8 +44,8 @@ use crate::{NodeId, Weight, spend_step};
 const MOST_STEPS: usize = 10_000;
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// The network's dispatchable form with all edges that were found, if it is dynamically controllable:
-    /// what shows that it is.
+    /// Returns the network's dispatchable form with all edges found, if it is dynamically
+    /// controllable. The edges are the proof of controllability.
     ///
     /// # Errors
     /// The cycle that shows that it is not.
@@ -53,8 +54,8 @@ impl<W: Weight> UncertainNetwork<W> {
         Ok(Dispatchable::new(self.clone(), graph))
     }
 
-    /// The same without edges and waits that say nothing while it is executed: those between points of which one
-    /// comes after the other anyway.
+    /// Returns the dispatchable form without redundant edges and waits: those between points whose
+    /// order is fixed anyway.
     ///
     /// # Errors
     /// The cycle that shows that it is not dynamically controllable.
@@ -63,19 +64,21 @@ impl<W: Weight> UncertainNetwork<W> {
         Ok(Dispatchable::new(self.clone(), graph))
     }
 
-    /// Why the network is not dynamically controllable; `None` if it is. Quicker than
-    /// [`dynamic`](Self::dynamic), because what only dispatching needs is left out.
+    /// Returns the proof that the network is not dynamically controllable; `None` if it is
+    /// controllable. Faster than [`dynamic`](Self::dynamic), because it keeps no edges for
+    /// dispatching.
     pub fn conflict(&self) -> Option<Conflict<W>> {
         self.search(false, false).err()
     }
 
-    /// Whether a strategy that decides with nothing but what has been observed satisfies every
-    /// requirement whatever the world does.
+    /// Returns `true` if a strategy that depends only on past observations satisfies every
+    /// requirement, whatever the world does.
     pub fn is_dynamically_controllable(&self) -> bool {
         self.search(false, false).is_ok()
     }
 
-    /// With all edges that are found if it `is_full`, else without those that say nothing.
+    /// Searches for a conflict. The graph contains all edges found if `is_full`, else redundant
+    /// ones are left out.
     pub(super) fn search(&self, keeps_edges: bool, is_full: bool) -> Result<Graph<W>, Conflict<W>> {
         let mut graph = Graph::new(self);
         graph.is_full = is_full;
@@ -95,44 +98,45 @@ pub(super) enum Stage {
     Done,
 }
 
-/// Looks for a conflict; what it finds on the way it leaves in the graph.
+/// Search for a conflict. It adds the edges it finds to the graph.
 pub(super) struct Search<'a, W> {
     links: &'a UncertainNetwork<W>,
     graph: &'a mut Graph<W>,
     pub(super) stage: Vec<Stage>,
-    /// For each node that has been dealt with, those by which negative ways lead to it. What was
-    /// found for it depends on nothing but them, and on the edges that end there.
+    /// For each processed node, the nodes through which negative ways lead to it. The edges found
+    /// for the node depend only on them, and on the edges that end at them.
     pub(super) regions: Vec<Vec<NodeId>>,
-    /// The negative nodes being dealt with, each for the sake of the one before.
+    /// Stack of negative nodes being processed; each one is needed by the previous one.
     frames: Vec<Frame<W>>,
-    /// Whether negative edges found are kept, for the sake of dispatching.
+    /// `true` if negative edges found are kept for dispatching.
     keeps_edges: bool,
 }
 
-/// Hears of a cycle, where it closes and its ways in order, and says whether to look for more.
+/// Callback for cycles: receives the place where a cycle closes and its ways in order, and returns
+/// whether the search continues.
 type OnCycle<'a, W> = dyn FnMut(&Graph<W>, Closed, &[WayId]) -> ControlFlow<()> + 'a;
 
-/// A negative node being dealt with.
+/// Negative node being processed.
 struct Frame<W> {
     node: NodeId,
     /// The upper-case edges into it that are still to be followed.
     upper: Vec<EdgeId>,
     /// The upper-case edge being followed; `None` for the plain edges.
     label: Option<LinkId>,
-    /// Plain edges that the waits have been found to be.
+    /// Plain edges that waits have turned into.
     plain: Vec<EdgeId>,
-    /// Whether the plain edges have been begun with.
+    /// `true` once the plain edges are being followed.
     is_last: bool,
     reached: Few<NodeId, Reached<W>>,
-    /// Edges that close a cycle at the node in this pass, other than that of the shortest one. Those found last, of
-    /// which the others may be parts, come first.
+    /// Edges that close a cycle at the node in this pass, other than that of the shortest one. The
+    /// newest edges, which may contain the others, are processed first.
     others: BTreeSet<EdgeId>,
     region: Vec<NodeId>,
     queue: BinaryHeap<Reverse<(Extended<W>, NodeId)>>,
 }
 
 impl<W: Weight> Frame<W> {
-    /// The way from a node that has been reached.
+    /// Returns the way from a node that has been reached.
     fn at(&self, node: NodeId) -> &Reached<W> {
         self.reached.get(node).expect("it has been reached")
     }
@@ -142,16 +146,16 @@ impl<W: Weight> Frame<W> {
     }
 }
 
-/// Where ways under way close a cycle.
+/// Place where the ways of the current frames close a cycle.
 #[derive(Clone, Copy)]
 pub(super) enum Closed {
-    /// At a node that is being dealt with, by the shortest way to it.
+    /// At a node that is being processed, by the shortest way to it.
     At(NodeId),
-    /// At the node of the last frame, by a longer way that has this edge first.
+    /// At the node of the last frame, by a longer way that begins with this edge.
     By(EdgeId),
 }
 
-/// A way from a node to the frame's.
+/// Way from a node to the frame's node.
 struct Reached<W> {
     distance: Extended<W>,
     /// Its first edge.
@@ -161,7 +165,7 @@ struct Reached<W> {
 }
 
 impl<'a, W: Weight> Search<'a, W> {
-    /// Nothing has been dealt with.
+    /// Creates a search without processed nodes.
     pub(super) fn new(
         links: &'a UncertainNetwork<W>,
         graph: &'a mut Graph<W>,
@@ -178,7 +182,7 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// Deals with a node, and with those that have to be dealt with before.
+    /// Processes a node, and the nodes that have to be processed before it.
     pub(super) fn settle(&mut self, node: NodeId) -> Result<(), Conflict<W>> {
         self.begin(node);
         match self.go_on() {
@@ -187,9 +191,10 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// Deals with a node, and with those that have to be dealt with before, whatever conflicts there
-    /// are: `on_cycle` hears of each, way by way, each from where the one before ends, and says whether to
-    /// look for more. Where a way has led to a conflict, it is not followed any further.
+    /// Processes a node, and the nodes that have to be processed before it, and continues after
+    /// conflicts. `on_cycle` receives each conflict as ways, each beginning where the previous one
+    /// ends, and returns whether the search continues. A way that has led to a conflict is not
+    /// followed any further.
     pub(super) fn settle_all(
         &mut self,
         node: NodeId,
@@ -203,8 +208,8 @@ impl<'a, W: Weight> Search<'a, W> {
         ControlFlow::Continue(())
     }
 
-    /// Deals with all that is under way, or until a cycle closes: where. Whoever goes on then goes on
-    /// without it.
+    /// Processes all frames until a cycle closes, and returns its place. The next call continues
+    /// without that cycle.
     fn go_on(&mut self) -> Option<Closed> {
         while let Some(frame) = self.frames.last_mut() {
             let Some(Reverse((distance, node))) = frame.queue.pop() else {
@@ -229,7 +234,7 @@ impl<'a, W: Weight> Search<'a, W> {
             match self.stage[node.index()] {
                 Stage::Underway => return Some(Closed::At(node)),
                 Stage::New => {
-                    // It comes back to this one when that node has been dealt with.
+                    // This node is continued when that node has been processed.
                     frame.queue.push(Reverse((distance, node)));
                     self.begin(node);
                 }
@@ -268,8 +273,8 @@ impl<'a, W: Weight> Search<'a, W> {
         });
     }
 
-    /// Goes on to the next upper-case edge of the last frame, or to the plain edges. `false` if
-    /// there is nothing left.
+    /// Starts the pass of the next upper-case edge of the last frame, or of the plain edges.
+    /// Returns `false` if there is none.
     fn next_pass(&mut self) -> bool {
         let Some(frame) = self.frames.last_mut() else {
             return false;
@@ -298,7 +303,7 @@ impl<'a, W: Weight> Search<'a, W> {
         true
     }
 
-    /// Notes a way that begins with that edge.
+    /// Records a way that begins with that edge.
     fn reach(&mut self, edge: EdgeId, distance: Extended<W>) {
         let from = self.graph.edges[edge].from;
         let Some(frame) = self.frames.last_mut() else {
@@ -326,8 +331,9 @@ impl<'a, W: Weight> Search<'a, W> {
         frame.reached.insert(from, reached);
     }
 
-    /// The shortest way from a node to the last frame's is known: keeps it as an edge. `false` if
-    /// it need not be followed any further as what it is now: a wait that is none.
+    /// Records the shortest way from a node to the last frame's node as an edge. Returns `false` if
+    /// the way need not be extended in its current form: a wait that is redundant, or that has
+    /// become a plain edge.
     fn keep(&mut self, node: NodeId) -> bool {
         let way = self.way(node);
         let links = self.links;
@@ -344,9 +350,9 @@ impl<'a, W: Weight> Search<'a, W> {
             origin: Origin::Way(way),
         };
         match frame.label {
-            // It waits for that in any case.
+            // The node comes after the link's end anyway.
             Some(link) if self.graph.is_after(node, links.link(link).end) => false,
-            // The link cannot have ended before: it holds in any case.
+            // The link cannot have ended before, so the wait is a plain edge.
             Some(link) if distance >= Extended::from(links.link(link).lower.clone()).negated() => {
                 if node == frame.node {
                     return false;
@@ -382,14 +388,14 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// Adds an edge that is not negative, unless it says nothing.
+    /// Adds an edge that is not negative, unless it is redundant.
     fn add(&mut self, edge: Edge<W>) {
         if !self.graph.is_after(edge.from, edge.to) {
             self.graph.add(edge);
         }
     }
 
-    /// The shortest way from a node to the last frame's, from now on.
+    /// Returns the shortest way from a node to the last frame's node, and fixes it.
     fn way(&mut self, node: NodeId) -> WayId {
         let way = self.way_to(self.frames.len() - 1, node);
         let frame = self.frames.last_mut();
@@ -399,13 +405,13 @@ impl<'a, W: Weight> Search<'a, W> {
         way
     }
 
-    /// The shortest way from a node to that frame's, as far as it is known.
+    /// Returns the shortest known way from a node to that frame's node.
     fn way_to(&mut self, frame: usize, node: NodeId) -> WayId {
         let edge = self.frames[frame].at(node).edge;
         self.way_by(frame, edge)
     }
 
-    /// The shortest way to that frame's node that has this edge first, as far as it is known.
+    /// Returns the shortest known way to that frame's node that begins with this edge.
     fn way_by(&mut self, frame: usize, edge: EdgeId) -> WayId {
         let frame = &self.frames[frame];
         let next = self.graph.edges[edge].to;
@@ -435,8 +441,8 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// The ways from where it closes to the last frame's node, and from each frame's node to the one before, down to
-    /// there again, are a cycle.
+    /// Returns the cycle that closes there: the ways from that place to the last frame's node, and
+    /// from each frame's node to the previous one, back to that place.
     fn cycle(&mut self, closed: Closed) -> Vec<WayId> {
         let node = match closed {
             Closed::At(node) => node,
@@ -459,7 +465,7 @@ impl<'a, W: Weight> Search<'a, W> {
         first.expect("an active node has a frame")
     }
 
-    /// The cycle that closes there, step by step.
+    /// Returns the conflict that closes there, step by step.
     fn conflict(&mut self, closed: Closed) -> Conflict<W> {
         let mut total = Extended::zero();
         let mut steps = Vec::new();

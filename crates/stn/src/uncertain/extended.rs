@@ -1,4 +1,4 @@
-//! Numbers with infinities among them that still add up.
+//! Numbers extended by infinities, with exact sums.
 
 use std::cmp::Ordering;
 
@@ -6,18 +6,18 @@ use crate::Weight;
 
 /// `infinite · ∞ + finite`, where ∞ is greater than every finite number.
 ///
-/// A contingent link without an upper bound may last longer than any number one may name. Taking
-/// it for one unnamed number above all others keeps sums and comparisons exact.
+/// A contingent link without an upper bound may exceed any duration. Representing it by one
+/// symbolic number above all others keeps sums and comparisons exact.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Extended<W> {
-    /// How many infinities.
+    /// Number of infinities.
     pub infinite: i64,
-    /// The rest.
+    /// The finite part.
     pub finite: W,
 }
 
 impl<W: Weight> Extended<W> {
-    /// The infinity.
+    /// Returns infinity.
     pub fn infinity() -> Self {
         Self {
             infinite: 1,
@@ -25,12 +25,12 @@ impl<W: Weight> Extended<W> {
         }
     }
 
-    /// The number itself; `None` if it is infinite.
+    /// Returns the number itself; `None` if it is infinite.
     pub fn into_finite(self) -> Option<W> {
         (self.infinite == 0).then_some(self.finite)
     }
 
-    /// The same with another finite part.
+    /// Returns the same number with another finite part.
     pub(crate) fn map<V>(self, number: impl FnOnce(W) -> V) -> Extended<V> {
         Extended {
             infinite: self.infinite,

@@ -1,4 +1,4 @@
-//! A network as the graph that dynamic controllability is decided on.
+//! Graph of a network, for the check of dynamic controllability.
 
 use std::num::NonZero;
 
@@ -8,10 +8,10 @@ use super::order::Order;
 use super::{LinkId, UncertainNetwork};
 use crate::{ConstraintId, NodeId, Weight, spend_step};
 
-/// An edge by its place in [`Graph::edges`].
+/// Identifier of an edge: its position in [`Graph::edges`].
 pub(super) type EdgeId = usize;
 
-/// `to - from <= bound`, or, for a wait, "until the link has ended".
+/// `to - from <= bound`; for a wait, only until the link has ended.
 #[derive(Clone, Debug)]
 pub(super) struct Edge<W> {
     pub(super) from: NodeId,
@@ -21,14 +21,14 @@ pub(super) struct Edge<W> {
     pub(super) origin: Origin,
 }
 
-/// The label of an edge: the case in which it holds.
+/// Label of an edge: the condition for it to hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Always.
+    /// It always holds.
     Plain,
-    /// If the world lets the link end early.
+    /// It holds if the link ends early.
     Lower(LinkId),
-    /// Until the link has ended.
+    /// It holds until the link has ended.
     Upper(LinkId),
 }
 
@@ -37,28 +37,29 @@ pub(super) enum Kind {
 pub(super) enum Origin {
     Requirement(ConstraintId),
     Link(LinkId),
-    /// It stands for a way.
+    /// Derived from a way.
     Way(WayId),
 }
 
-/// Where searches find more edges than this multiple of the network's, or where there are no more than
-/// that, it is asked whether an edge says anything.
+/// Redundant edges are detected if the search has found more than `FEW` times the network's own
+/// edges, or if the network has at most `SMALL` edges.
 const FEW: usize = 2;
 const SMALL: usize = 100;
 
-/// A way by its place in [`Graph::ways`].
+/// Identifier of a way: its position in [`Graph::ways`].
 pub(super) type WayId = usize;
 
-/// An edge, and the rest of the way behind it.
+/// An edge, and the way that follows it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Way {
     edge: u32,
-    /// One more than the way's number.
+    /// One more than the identifier of the way.
     rest: Option<NonZero<u32>>,
 }
 
 impl Way {
-    /// An edge, and what is left of a way after it. A network may have millions of them: numbers are kept short.
+    /// Creates a way from an edge and the way that follows it. Numbers are stored in 32 bits,
+    /// because a network may have millions of ways.
     pub(super) fn new(edge: EdgeId, rest: Option<WayId>) -> Self {
         let short = |number: usize| u32::try_from(number).expect("fewer than 2^32 ways");
         Self {
@@ -81,22 +82,21 @@ impl Way {
 pub(super) struct Graph<W> {
     pub(super) edges: Vec<Edge<W>>,
     pub(super) ways: Vec<Way>,
-    /// For each node, the edges not negative that end there, upper-case ones excepted: those of the
-    /// network, then those found.
+    /// For each node, the edges that end there and are not negative, except upper-case ones: those
+    /// of the network, then those found.
     pub(super) positive_into: Vec<Vec<EdgeId>>,
     /// For each node, the negative plain edges of the network that end there.
     pub(super) negative_into: Vec<Vec<EdgeId>>,
     /// For each node, the upper-case edges of the network that end there.
     pub(super) upper_into: Vec<Vec<EdgeId>>,
-    /// For each node, those that it comes after in every execution, because a negative edge of the
-    /// network leads to them, plain or of a link. (That of a link without any duration is not negative.)
+    /// For each node, the nodes that always come before it, because a negative edge of the network
+    /// leads to them, plain or of a link. (The edge of a link with duration 0 is not negative.)
     earlier: Vec<Vec<NodeId>>,
-    /// What follows from that, once it was asked.
+    /// Order that follows from `earlier`, computed on first use.
     order: Option<Order>,
-    /// Whether every edge that is found is kept.
+    /// `true` if redundant edges are kept as well.
     pub(super) is_full: bool,
-    /// The number of edges that are the network's own: two for each link, after those of the
-    /// requirements.
+    /// The number of the network's own edges: two for each link, after those of the requirements.
     pub(super) given: usize,
 }
 
@@ -148,7 +148,7 @@ impl<W: Weight> Graph<W> {
                 from: link.end,
                 to: link.activation,
                 bound: upper.negated(),
-                // A link without any duration has a plain edge back.
+                // The backward edge of a link with duration 0 is plain.
                 kind: if is_upper {
                     Kind::Upper(id)
                 } else {
@@ -161,13 +161,13 @@ impl<W: Weight> Graph<W> {
         graph
     }
 
-    /// The lower-case and the upper-case edge of a link.
+    /// Returns the lower-case and the upper-case edge of a link.
     pub(super) fn edges_of(&self, network: &UncertainNetwork<W>, link: LinkId) -> [EdgeId; 2] {
         let first = self.given - 2 * (network.links.len() - link.index());
         [first, first + 1]
     }
 
-    /// The same graph with other numbers, not to be searched any more.
+    /// Returns the same graph with another number type. It cannot be searched any more.
     pub(super) fn map<V>(self, number: impl Fn(W) -> V) -> Graph<V> {
         drop([self.positive_into, self.negative_into, self.upper_into]);
         let edges = self.edges.into_iter().map(|edge| Edge {
@@ -202,8 +202,8 @@ impl<W: Weight> Graph<W> {
         id
     }
 
-    /// Whether a node comes after another in every execution, as far as that is asked: it takes a while to
-    /// find out, and is worth it only where much is found.
+    /// Returns `true` if a node comes after another in every execution. Always `false` while the
+    /// search has found few edges in a large network, because the computation would not pay off.
     pub(super) fn is_after(&mut self, later: NodeId, first: NodeId) -> bool {
         let is_little = self.given > SMALL && self.edges.len() <= FEW * self.given;
         if self.is_full || is_little {
@@ -213,9 +213,10 @@ impl<W: Weight> Graph<W> {
         order.is_after(later, first)
     }
 
-    /// The edges of the network behind an edge, from its `from` to its `to`; at most so many.
+    /// Appends the edges of the network that an edge is derived from, from its `from` to its `to`,
+    /// at most `most`.
     ///
-    /// Whether these are all.
+    /// Returns `true` if these are all.
     pub(super) fn spelt_out(&self, edge: EdgeId, most: usize, into: &mut Vec<EdgeId>) -> bool {
         let mut stack = vec![edge];
         while let Some(id) = stack.pop() {
@@ -238,7 +239,7 @@ impl<W: Weight> Graph<W> {
         true
     }
 
-    /// One edge of the network in a conflict.
+    /// Returns the step of a conflict for an edge of the network.
     pub(super) fn step(&self, id: EdgeId) -> Step<W> {
         let edge = &self.edges[id];
         let ground = match (edge.kind, edge.origin) {

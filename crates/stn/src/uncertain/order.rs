@@ -1,25 +1,24 @@
-//! Which nodes come after others in every execution, so that it need not be searched each time:
-//! [`Order`].
+//! Precomputed order of nodes that is the same in every execution: [`Order`].
 
 use crate::NodeId;
 
-/// The limit on the chains that nodes are put into: each takes a number for each node.
+/// Limit on chains: each takes one number per node.
 const MOST_CHAINS: usize = 64;
 
-/// An order of nodes: chains, in which each node comes after the one before, and for each node the
-/// last one of each chain that it comes after.
+/// Order of nodes: chains of nodes that follow each other, and for each node the last node of each
+/// chain that precedes it.
 ///
-/// Of nodes that fit into no chain, and of those in a circle, it knows nothing.
+/// Incomplete for nodes that fit into no chain, and for nodes on a cycle.
 #[derive(Clone, Debug)]
 pub(super) struct Order {
-    /// For each node, its chain and its place there, from 1.
+    /// For each node, its chain and its position there, from 1.
     places: Vec<Option<(usize, u32)>>,
-    /// For each node and chain, the last place that it comes after, or its own; 0 is none.
+    /// For each node and chain, the last position that precedes it, or its own; 0 for none.
     latest: Vec<[u32; MOST_CHAINS]>,
 }
 
 impl Order {
-    /// From the nodes that each comes after, directly.
+    /// Computes the order from the direct predecessors of each node.
     pub(super) fn new(earlier: &[Vec<NodeId>]) -> Self {
         let count = earlier.len();
         let mut later: Vec<Vec<usize>> = vec![Vec::new(); count];
@@ -49,7 +48,8 @@ impl Order {
         order
     }
 
-    /// Puts a node at the end of a chain that it comes after, if there is one.
+    /// Appends a node to a chain whose last node precedes it, or begins a new chain if the limit
+    /// allows.
     fn place(
         &mut self,
         node: usize,
@@ -64,7 +64,8 @@ impl Order {
             }
         }
         let is_last = |chain: usize, place: u32| lengths[chain] == place;
-        // Directly after one that few others come after: they will look for a chain, too.
+        // Prefers the predecessor with the fewest other successors, because those need chains as
+        // well.
         let direct = before.iter().map(|first| first.index());
         let direct = direct.filter_map(|first| {
             let (chain, place) = self.places[first]?;
@@ -85,7 +86,7 @@ impl Order {
         self.latest[node] = latest;
     }
 
-    /// Whether one node is known to come after the other.
+    /// Returns `true` if one node is known to come after the other.
     pub(super) fn is_after(&self, later: NodeId, first: NodeId) -> bool {
         let place = self.places[first.index()];
         later != first
@@ -99,7 +100,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Each node comes after some with smaller numbers, or, in a circle, after anybody.
+        /// Each node comes after some nodes with smaller numbers, or, with cycles, after any nodes.
         #[test]
         fn what_is_known_is_so_and_in_narrow_orders_all_is_known(
             edges in prop::collection::vec((0..40_usize, 0..40_usize), 0..80),

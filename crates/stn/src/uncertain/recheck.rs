@@ -1,4 +1,4 @@
-//! Dynamic controllability again, after the bounds of one link have changed.
+//! Incremental check of dynamic controllability, after the bounds of one link have changed.
 
 use super::dynamic::{Search, Stage};
 use super::extended::Extended;
@@ -6,23 +6,23 @@ use super::graph::{EdgeId, Graph};
 use super::{Conflict, LinkId, UncertainNetwork};
 use crate::{NodeId, Weight};
 
-/// Leftovers of earlier searches may grow to this multiple of one search's results.
+/// Limit on unused results of earlier searches, as a multiple of one search's results.
 const MOST_LEFTOVERS: usize = 4;
 
-/// A dynamically controllable network whose links can be given other bounds, one at a time.
+/// Dynamically controllable network that supports changes of link bounds, one link at a time.
 ///
-/// What was found for one negative node depends on the nodes by which negative ways lead to it, and
-/// on the edges that end at these. Only what depends on the link is searched again, directly or by
-/// way of other nodes that do; in the networks of plans that is a few nodes of many.
+/// The edges found for a negative node depend on the nodes through which negative ways lead to it,
+/// and on the edges that end at these. Only nodes that depend on the link, directly or indirectly,
+/// are searched again. In the networks of plans these are few.
 #[derive(Clone, Debug)]
 pub struct Recheck<W> {
     network: UncertainNetwork<W>,
     graph: Graph<W>,
-    /// For each node, those by which negative ways lead to it.
+    /// For each node, the nodes through which negative ways lead to it.
     regions: Vec<Vec<NodeId>>,
-    /// For each node, how many of the edges that end there and are not negative are the network's.
+    /// For each node, the number of the network's own edges that end there and are not negative.
     given: Vec<usize>,
-    /// How many edges and ways the last search of the whole network found.
+    /// Number of edges and ways that the last search of the whole network found.
     fresh: usize,
 }
 
@@ -55,12 +55,12 @@ impl<W: Weight> Recheck<W> {
         })
     }
 
-    /// The network, with the bounds accepted last.
+    /// Returns the network, with the bounds accepted last.
     pub fn network(&self) -> &UncertainNetwork<W> {
         &self.network
     }
 
-    /// Gives a link other bounds, if the network stays dynamically controllable.
+    /// Changes the bounds of a link, if the network stays dynamically controllable.
     ///
     /// # Errors
     /// The cycle that shows that it does not; the network stays as it was.
@@ -73,7 +73,7 @@ impl<W: Weight> Recheck<W> {
         let link = self.network.links[id.index()].clone();
         let takes_time = |upper: &Option<W>| *upper != Some(W::zero());
         if takes_time(&link.upper) != takes_time(&upper) {
-            // The edges of a link that takes no time are of another kind.
+            // The edges of a link with duration 0 are of another kind.
             let mut network = self.network.clone();
             network.links[id.index()].lower = lower;
             network.links[id.index()].upper = upper;
@@ -82,7 +82,7 @@ impl<W: Weight> Recheck<W> {
         }
         let mut first = vec![link.activation];
         if lower != link.lower {
-            // Whoever comes by the link's end may go on along its lower-case edge.
+            // Ways through the link's end may continue along its lower-case edge.
             first.extend(self.nodes_by_way_of(link.end));
         }
         let dirty = self.depending_on(first);
@@ -133,7 +133,7 @@ impl<W: Weight> Recheck<W> {
         (link.lower, link.upper) = (lower, upper);
     }
 
-    /// Takes away what was found for these nodes.
+    /// Removes the edges found for these nodes, and returns them.
     fn forget(&mut self, nodes: &[NodeId]) -> Vec<Before> {
         let before = nodes.iter().map(|&node| Before {
             node,
@@ -143,13 +143,13 @@ impl<W: Weight> Recheck<W> {
         before.collect()
     }
 
-    /// The nodes to which negative ways lead by way of that one.
+    /// Returns the nodes to which negative ways lead through `node`.
     fn nodes_by_way_of(&self, node: NodeId) -> impl Iterator<Item = NodeId> + '_ {
         let nodes = self.network.requirements.nodes();
         nodes.filter(move |other| self.regions[other.index()].contains(&node))
     }
 
-    /// These nodes and all that depend on them, in order.
+    /// Returns these nodes and all that depend on them, in order.
     fn depending_on(&self, mut open: Vec<NodeId>) -> Vec<NodeId> {
         let count = self.network.requirements.node_count();
         let mut dependants = vec![Vec::new(); count];

@@ -1,5 +1,4 @@
-//! The rules by which a conflict follows from a network, so that it can be checked again with other
-//! bounds.
+//! Derivation of a conflict from a network, rule by rule, for checks with other bounds.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -9,15 +8,15 @@ use super::graph::{EdgeId, Graph, Kind, Origin, WayId};
 use super::{Ground, LinkId, UncertainNetwork};
 use crate::{ConstraintId, Weight};
 
-/// The limit on the parts of a refutation, or, of a larger network, one for each of its nodes: what is shared is
-/// spelt out each time.
+/// Limit on the parts of a refutation, or one for each node if the network has more nodes. Shared
+/// parts are written out at each occurrence.
 const MOST_PARTS: usize = 10_000;
 
 /// The limit on the parts of all refutations of a network, for each of its nodes.
 const MOST_PARTS_A_NODE: usize = 8;
 
-/// The limit on ways that lie in one another: what follows from what along a long plan would lie as deep as the plan is
-/// long.
+/// Limit on the nesting of ways. Derivations along a long plan can be nested as deeply as the plan
+/// is long.
 const MOST_DEPTH: usize = 200;
 
 /// One part of a way through the graph of a network, from its beginning to its end.
@@ -25,8 +24,8 @@ const MOST_DEPTH: usize = 200;
 pub enum Part {
     /// A requirement.
     Requirement(ConstraintId),
-    /// The lower-case edge of a link, from activation to end, as long as its lower bound. It may
-    /// stand there because what follows it on its way is negative.
+    /// Lower-case edge of a link, from activation to end, as long as its lower bound. It may be
+    /// used because the parts after it on its way sum up to a negative length.
     Early(LinkId),
     /// The upper-case edge of a link, from end to activation: minus its upper bound.
     Late(LinkId),
@@ -34,49 +33,50 @@ pub enum Part {
     Way(Way),
 }
 
-/// Parts one after the other.
+/// Sequence of parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Way {
-    /// Each begins where the one before ends.
+    /// The parts; each begins where the previous one ends.
     pub parts: Vec<Part>,
-    /// The way is a wait for the end of that link, taken for an edge that always holds, because it
-    /// is not longer than the link takes at least. Whatever the bounds, an edge of minus the link's
-    /// lower bound holds in its place: so the edge's length is the greater of the two.
+    /// If present, the way is a wait for the end of that link, used as an edge that always holds,
+    /// because it is no longer than the link's minimum duration. For all bounds, an edge of minus
+    /// the link's lower bound holds instead. So the edge's length is the greater of the two.
     pub unlabelled: Option<LinkId>,
 }
 
-/// Why a network is not dynamically controllable, rule by rule.
+/// Proof that a network is not dynamically controllable, rule by rule.
 ///
-/// The cycle of ways is semi-reducible as long as, in each way, what follows a
-/// [`Part::Early`] adds up to less than 0; if the cycle does so too, no strategy exists. That is a
-/// statement about every network with these requirements and links, whatever their bounds
-/// (Morris 2006, Morris & Muscettola 2005).
+/// The cycle of ways is semi-reducible if, in each way, the parts after a [`Part::Early`] add up to
+/// less than 0. If the cycle also adds up to less than 0, no strategy exists. That is true of every
+/// network with these requirements and links, whatever their bounds (Morris 2006, Morris &
+/// Muscettola 2005).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refutation {
-    /// The cycle; each way begins where the one before ends.
+    /// The cycle; each way begins where the previous one ends.
     pub cycle: Vec<Way>,
-    /// Whether the ways lie so deep in one another that only their steps are told, as one way. With other bounds that
-    /// proves something only if no link is in it both as [`Part::Early`] and as [`Part::Late`]: the steps are a cycle of
-    /// bounds then, and if they add up to less than 0, there is no schedule for these durations.
+    /// `true` if the ways are nested so deeply that only their steps are given, as one way. With
+    /// other bounds such a refutation proves something only if it contains no link both as
+    /// [`Part::Early`] and as [`Part::Late`]. The steps are then a cycle of bounds, and if they add
+    /// up to less than 0, there is no schedule for these durations.
     pub is_flat: bool,
 }
 
-/// Refutations, if there are any that are not too long to be told.
+/// Refutations of a network, except those that are too long.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refuted {
     /// The network is dynamically controllable.
     No,
-    /// It is not, and each of these is a reason.
+    /// It is not, and each of these is a proof.
     Because(Vec<Refutation>),
-    /// It is not, but to say why takes too many words.
+    /// It is not, but all proofs found are too long.
     TooLong,
 }
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// Why the network is not dynamically controllable, rule by rule: as many reasons, at most, as
-    /// come up when it is gone through once, and no more than `most`. The first one does not depend
-    /// on how many are wanted. Of several that close at one node, those are left out of which all links are found in
-    /// those before.
+    /// Returns proofs that the network is not dynamically controllable: at most `most`, and at most
+    /// those found in one pass over the network. The first one does not depend on `most`. Of
+    /// several cycles that close at one node, those are left out whose links all occur in earlier
+    /// ones.
     pub fn refutations(&self, most: usize) -> Refuted {
         let mut graph = Graph::new(self);
         let mut search = Search::new(self, &mut graph, false);
@@ -132,16 +132,16 @@ impl<W: Weight> UncertainNetwork<W> {
     }
 }
 
-/// What has been spelt out of a graph.
+/// Record of the edges that refutations have used so far.
 struct Told {
-    /// The edges that have, but for requirements.
+    /// The used edges, except requirements.
     edges: BTreeSet<EdgeId>,
     /// The limit on the parts of one refutation.
     most: usize,
 }
 
 impl Told {
-    /// Whether all edges of a way have been spelt out, but for requirements.
+    /// Returns `true` if all edges of a way, requirements excepted, have been used before.
     fn has<W: Weight>(&self, graph: &Graph<W>, way: WayId) -> bool {
         let mut edges = ways_from(graph, way).map(|way| graph.ways[way].edge());
         edges.all(|id| {
@@ -149,7 +149,7 @@ impl Told {
         })
     }
 
-    /// The parts of a way.
+    /// Returns the parts of a way.
     fn spelt_out<W: Weight>(
         &mut self,
         graph: &Graph<W>,
@@ -160,7 +160,7 @@ impl Told {
         if depth > MOST_DEPTH {
             return Err(TooMuch::Deep);
         }
-        // There are many of them, most of them short.
+        // Exact capacity, because there are many ways, most of them short.
         let mut parts = Vec::with_capacity(ways_from(graph, way).count());
         for way in ways_from(graph, way) {
             parts.push(self.part(graph, graph.ways[way].edge(), count, depth)?);
@@ -190,7 +190,7 @@ impl Told {
             (Origin::Requirement(id), _) => Part::Requirement(id),
             (Origin::Link(link), Kind::Lower(_)) => Part::Early(link),
             (Origin::Link(link), Kind::Upper(_)) => Part::Late(link),
-            // A link that takes no time: its end comes at least so much after its activation.
+            // A link of duration 0: its end comes at least that much after its activation.
             (Origin::Link(link), Kind::Plain) => Part::Way(Way {
                 parts: vec![Part::Late(link)],
                 unlabelled: Some(link),
@@ -205,7 +205,7 @@ impl Told {
         })
     }
 
-    /// The steps of a cycle one after the other; `None` if there are too many.
+    /// Returns the steps of a cycle as one way; `None` if there are too many.
     fn flat<W: Weight>(&mut self, graph: &Graph<W>, cycle: &[WayId]) -> Option<Way> {
         let mut edges = Vec::new();
         for way in cycle.iter().flat_map(|&way| ways_from(graph, way)) {
@@ -227,20 +227,20 @@ impl Told {
     }
 }
 
-/// Why a refutation is not told part by part.
+/// Reason why a refutation cannot be given part by part.
 enum TooMuch {
-    /// It has too many.
+    /// Too many parts.
     Long,
-    /// They lie too deep in one another.
+    /// Nested too deeply.
     Deep,
 }
 
-/// A way, what is left of it after its first edge, and so on.
+/// Returns a way, its remainder after the first edge, and so on.
 fn ways_from<W>(graph: &Graph<W>, way: WayId) -> impl Iterator<Item = WayId> + '_ {
     std::iter::successors(Some(way), |&way| graph.ways[way].rest())
 }
 
-/// The link for whose end a way waits.
+/// Returns the link whose end a way waits for.
 fn label<W: Weight>(graph: &Graph<W>, way: WayId) -> Option<LinkId> {
     let last = ways_from(graph, way).last()?;
     match graph.edges[graph.ways[last].edge()].kind {

@@ -1,4 +1,4 @@
-//! A world that beats every executor where a network is not dynamically controllable.
+//! Adversary that makes every executor fail if a network is not dynamically controllable.
 
 use std::collections::BTreeSet;
 
@@ -7,15 +7,15 @@ use elbowroom_num::{Delta, Rational};
 use super::{ContingentLink, LinkId, UncertainNetwork};
 use crate::{Constraint, Network, NodeId, Weight};
 
-/// How many parts make up a unit of the whole numbers in which times are compared.
+/// Number of parts per unit in the integer representation of times.
 const PARTS: i128 = 1 << 40;
 
-/// Chooses when links end, so that the executor loses if it can be made to lose.
+/// Adversary that chooses when links end, so that the executor fails whenever that can be forced.
 ///
-/// Where a network is not dynamically controllable, no executor can be sure to win. So whatever an
-/// executor has done, it loses either if a link ends now, or if it goes on: the spoiler asks which,
-/// each time that something has happened or could happen, and sees to it. It knows nothing of what
-/// the executor is going to do.
+/// If a network is not dynamically controllable, no executor can guarantee success. After any
+/// prefix of an execution, the executor can be made to fail either by ending a link now or by
+/// continuing it. The spoiler decides between the two each time that something has happened or
+/// could happen. It does not know the executor's next decisions.
 #[derive(Clone, Debug)]
 pub struct Spoiler {
     network: UncertainNetwork,
@@ -23,23 +23,23 @@ pub struct Spoiler {
 }
 
 impl Spoiler {
-    /// A spoiler for a network whose times count from `origin`.
+    /// Creates a spoiler for a network whose times are relative to `origin`.
     pub fn new(network: UncertainNetwork, origin: NodeId) -> Self {
         Self { network, origin }
     }
 
-    /// The network.
+    /// Returns the network.
     pub fn network(&self) -> &UncertainNetwork {
         &self.network
     }
 
-    /// The links that end now, in order. `happened` has the times of what has happened, by node,
+    /// Returns the links that end now, in order. `happened` has the times of past events, by node,
     /// counted from the origin.
     pub fn ends_now(&self, now: &Rational, happened: &[Option<Rational>]) -> Vec<LinkId> {
         let mut happened = happened.to_vec();
         let mut ending = Vec::new();
         let mut later = BTreeSet::new();
-        // The end of one link may activate another one that takes no time.
+        // The end of one link may activate another one with duration 0.
         while let Some(id) = self.next_candidate(now, &happened, &later) {
             let link = self.network.link(id);
             let begun = running_since(link, &happened);
@@ -58,7 +58,7 @@ impl Spoiler {
         ending
     }
 
-    /// A link that may end now, and of which it has not been decided that it ends later.
+    /// Returns a link that may end now, unless it is in `later`.
     fn next_candidate(
         &self,
         now: &Rational,
@@ -74,7 +74,7 @@ impl Spoiler {
         links.find(may_end)
     }
 
-    /// When to ask again if nothing happens before.
+    /// Returns the time of the next query if nothing happens before.
     pub fn next_look(&self, now: &Rational, happened: &[Option<Rational>]) -> Option<Rational> {
         let links = self.network.links().iter();
         let looks = links.flat_map(|link| {
@@ -85,7 +85,8 @@ impl Spoiler {
         looks.flatten().filter(|look| look > now).min()
     }
 
-    /// Whether no executor can be sure to win any more, if these links do not end now.
+    /// Returns `true` if no executor can guarantee success any more, provided that these links do
+    /// not end now.
     fn is_lost(
         &self,
         now: &Rational,
@@ -94,7 +95,8 @@ impl Spoiler {
     ) -> bool {
         let times = happened.iter().flatten().chain([now]);
         if let Some(unit) = self.network.unit_with(times) {
-            // Strictly less is less by a part of a unit that all of them together do not add up to.
+            // A strict bound is less by a part of a unit that is so small that all of them together
+            // do not add up to a unit.
             let whole = |number: &Delta| {
                 let (infinitesimal, _) = number.infinitesimal.as_small()?;
                 let real = unit.whole(&number.real)?;
@@ -109,7 +111,8 @@ impl Spoiler {
             .unwrap_or(true)
     }
 
-    /// The same in other numbers; `None` if some number is none of them.
+    /// Computes [`is_lost`](Self::is_lost) with another number type; `None` if some number cannot
+    /// be represented in it.
     fn is_lost_in<W: Weight>(
         &self,
         now: &Rational,
@@ -123,8 +126,8 @@ impl Spoiler {
         }
     }
 
-    /// The network with what has happened fixed and everything else not before now, or after now.
-    /// `None` if some number cannot be had.
+    /// Returns the network with past events fixed and all others not before now, or after now.
+    /// `None` if some number cannot be represented.
     fn rest<W: Weight>(
         &self,
         now: &Rational,
@@ -196,12 +199,12 @@ impl Spoiler {
 
 /// The remaining part of a network.
 enum Rest<W> {
-    /// Something has happened that cannot be made good.
+    /// Some past event violates a requirement.
     Lost,
     Network(UncertainNetwork<W>),
 }
 
-/// The time at which a link that is not over was activated.
+/// Returns the activation time of a running link.
 fn running_since(link: &ContingentLink, happened: &[Option<Rational>]) -> Option<Rational> {
     let is_over = happened[link.end.index()].is_some();
     happened[link.activation.index()]

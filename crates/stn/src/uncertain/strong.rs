@@ -5,17 +5,17 @@ use elbowroom_num::Rational;
 use super::{Ground, LinkId, UncertainNetwork};
 use crate::{Constraint, ConstraintId, Network, NodeId, Schedule, Weight};
 
-/// Requirements that no times fixed beforehand satisfy whatever the links do.
+/// Requirements that no fixed times satisfy for all durations of the links.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StrongConflict<W = Rational> {
     /// The requirements and the bounds of links that contradict each other, in the order of a
     /// cycle.
     pub grounds: Vec<Ground>,
-    /// By how much; negative. `None` if it is without limit, because a link may last for ever.
+    /// Length of the cycle; negative. `None` if it is unlimited, because a link has no upper bound.
     pub total: Option<W>,
 }
 
-/// A requirement between two points that the executor chooses, and what it comes from.
+/// Requirement between two points that the executor chooses, with the grounds that imply it.
 struct Reduced<W> {
     from: NodeId,
     to: NodeId,
@@ -25,8 +25,8 @@ struct Reduced<W> {
 }
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// Times for the points that the executor chooses with which every requirement holds, whatever
-    /// the links do. The ends of links are given the times that they have at their lower bounds.
+    /// Returns times for the points that the executor chooses that satisfy every requirement
+    /// whatever the links do. The ends of links get the times that they have at their lower bounds.
     ///
     /// A requirement on the end of a link has to hold at the link's worst bound, which leaves a
     /// simple network (Vidal & Fargier 1999).
@@ -81,8 +81,8 @@ impl<W: Weight> UncertainNetwork<W> {
         }
     }
 
-    /// The point that the executor chooses from which a node's time counts, and the links between,
-    /// in order.
+    /// Returns the executor's point that a node's time counts from, and the links between, in
+    /// order.
     fn chain(&self, node: NodeId) -> (NodeId, Vec<LinkId>) {
         let mut links = Vec::new();
         let mut root = node;
@@ -94,12 +94,12 @@ impl<W: Weight> UncertainNetwork<W> {
         (root, links)
     }
 
-    /// A requirement in terms of the points that the executor chooses.
+    /// Returns a requirement in terms of the points that the executor chooses.
     fn reduced(&self, id: ConstraintId) -> Reduced<W> {
         let constraint = self.requirements.constraint(id);
         let (from, from_links) = self.chain(constraint.from);
         let (to, to_links) = self.chain(constraint.to);
-        // Links that both have before them take as long for the one as for the other.
+        // Links before both points have the same duration for both.
         let shared = from_links
             .iter()
             .zip(&to_links)

@@ -1,4 +1,4 @@
-//! Networks in whole numbers, on which the searches are several times faster, and as exact.
+//! Networks in whole numbers, for which the searches are several times faster, and equally exact.
 
 use elbowroom_num::{CommonDenominator, Rational};
 
@@ -7,7 +7,7 @@ use super::graph::Graph;
 use super::{Conflict, ContingentLink, UncertainNetwork};
 use crate::{Constraint, Network};
 
-/// A network whose bounds are multiplied by a common denominator.
+/// Network whose bounds are multiplied by a common denominator.
 #[derive(Clone, Debug)]
 pub struct WholeNetwork {
     /// The network in these numbers.
@@ -25,8 +25,8 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// How many units a number is; `None` if that is no whole number, or one so large that sums
-    /// might overflow.
+    /// Converts a number to units; `None` if the result is not a whole number, or is so large that
+    /// sums might overflow.
     pub fn whole(self, number: &Rational) -> Option<i64> {
         let whole = self.denominator.whole(number)?;
         (-self.largest..=self.largest)
@@ -34,15 +34,14 @@ impl Unit {
             .then_some(whole)
     }
 
-    /// This number of units.
+    /// Converts a number of units to a fraction.
     pub fn fraction(self, whole: i64) -> Rational {
         self.denominator.fraction(whole)
     }
 }
 
 impl UncertainNetwork<Rational> {
-    /// The network in whole numbers; `None` if that takes numbers so large that sums might
-    /// overflow.
+    /// Converts the network to whole numbers; `None` if sums of these numbers might overflow.
     pub fn whole(&self) -> Option<WholeNetwork> {
         let unit = self.unit()?;
         let mut requirements = Network::with_nodes(self.requirements.node_count());
@@ -76,7 +75,7 @@ impl UncertainNetwork<Rational> {
         self.unit_with([])
     }
 
-    /// A unit in which these times can be added to the bounds.
+    /// Returns a unit for sums of these times and the bounds.
     pub(super) fn unit_with<'a>(
         &'a self,
         times: impl IntoIterator<Item = &'a Rational>,
@@ -86,8 +85,8 @@ impl UncertainNetwork<Rational> {
         let bounds = bounds.chain(self.links.iter().map(|link| &link.lower));
         let bounds = bounds.chain(self.links.iter().filter_map(|link| link.upper.as_ref()));
         let denominator = CommonDenominator::of(bounds.chain(times))?;
-        // A way that is searched is no longer than one bound, or, beside an infinity, than one for
-        // each node; and a conflict is at most one such way for each node.
+        // A way in the search is no longer than one bound, or with infinite bounds, one for each
+        // node. A conflict has at most one such way for each node.
         let nodes = i64::try_from(self.requirements.node_count()).ok()? + 2;
         let ways = if self.links.iter().any(|link| link.upper.is_none()) {
             nodes.checked_mul(nodes)?
@@ -100,7 +99,7 @@ impl UncertainNetwork<Rational> {
         })
     }
 
-    /// [`dynamic`](Self::dynamic), in whole numbers where they do.
+    /// Like [`dynamic`](Self::dynamic), but computes in whole numbers if possible.
     ///
     /// # Errors
     /// The cycle that shows that the network is not dynamically controllable.
@@ -109,8 +108,8 @@ impl UncertainNetwork<Rational> {
         Ok(Dispatchable::new(self.clone(), graph))
     }
 
-    /// [`executable`](Self::executable), in whole numbers where they do, of a network that is in the form
-    /// afterwards.
+    /// Like [`executable`](Self::executable), but computes in whole numbers if possible, and moves
+    /// the network into the form.
     ///
     /// # Errors
     /// The network, and the cycle that shows that it is not dynamically controllable.

@@ -1,16 +1,15 @@
-//! Dynamic controllability as a game of two players in whole time, played out in full.
+//! Dynamic controllability as a game of two players in whole time, enumerated completely.
 //!
-//! At each time the world says first which links end, then the executor lets one point happen after
-//! the other; links that these activate and that may take no time can end at once. The executor
-//! wins if all points happen up to the horizon and every requirement holds.
+//! At each time the world first decides which links end, then the executor executes points one
+//! after the other. Links that these activate can end at once if they may have duration 0. The
+//! executor wins if all points happen by the horizon and every requirement holds.
 
 use std::collections::BTreeMap;
 
 use elbowroom_stn::uncertain::{ContingentLink, UncertainNetwork};
 use elbowroom_stn::{Constraint, Network, NodeId};
 
-/// A network with whole bounds, of which node 0 happens at 0, and no node before it or after the
-/// horizon.
+/// Network with whole bounds. Node 0 happens at 0, and all other nodes between 0 and the horizon.
 pub(crate) struct Board {
     pub(crate) count: usize,
     pub(crate) horizon: i64,
@@ -21,7 +20,7 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    /// The board as a network.
+    /// Returns the board as a network.
     pub(crate) fn network(&self) -> UncertainNetwork<i64> {
         let mut network = Network::with_nodes(self.count);
         let node = |index: usize| NodeId(u32::try_from(index).unwrap());
@@ -44,7 +43,7 @@ impl Board {
         UncertainNetwork::new(network, links.collect()).unwrap()
     }
 
-    /// Whether the executor has a strategy that wins whatever the world does.
+    /// Returns `true` if the executor has a strategy that wins whatever the world does.
     pub(crate) fn executor_wins(&self) -> bool {
         let mut times = vec![None; self.count];
         times[0] = Some(0);
@@ -52,12 +51,12 @@ impl Board {
             board: self,
             known: BTreeMap::new(),
         };
-        // What node 0 activates may end at once.
+        // Links that node 0 activates may end at once.
         let began = game.activated(&times, 0, 0);
         game.world_moves(0, &times, &began)
     }
 
-    /// A random board.
+    /// Generates a random board.
     pub(crate) fn random(random: &mut Random) -> Self {
         let count = 3 + random.below(4);
         let horizon = 4 + i64::try_from(random.below(4)).unwrap();
@@ -67,7 +66,7 @@ impl Board {
         for _ in 0..most_links {
             let end = 1 + random.below(count - 1);
             let activation = random.below(count);
-            // Ends of smaller number come first, so that links never go round in a circle.
+            // Activations have smaller numbers than ends, so that links never form a cycle.
             if activation >= end || is_end[end] {
                 continue;
             }
@@ -92,7 +91,7 @@ impl Board {
 
 struct Game<'a> {
     board: &'a Board,
-    /// For moments at which it is the executor's turn, whether it wins.
+    /// For positions at the executor's turn, `true` if it wins.
     known: BTreeMap<(i64, Vec<Option<i64>>), bool>,
 }
 
@@ -105,7 +104,7 @@ impl Game<'_> {
         })
     }
 
-    /// The links that a node has activated just now and that may end at once.
+    /// Returns the links that a node has just activated and that may end at once.
     fn activated(&self, times: &[Option<i64>], node: usize, _now: i64) -> Vec<usize> {
         let links = self.board.links.iter().enumerate();
         links
@@ -116,7 +115,7 @@ impl Game<'_> {
             .collect()
     }
 
-    /// The world chooses which of these links end now.
+    /// Returns `true` if the executor wins for every choice of which of these links end now.
     fn world_moves(&mut self, now: i64, times: &[Option<i64>], links: &[usize]) -> bool {
         let Some((&first, rest)) = links.split_first() else {
             return self.executor_moves(now, times);
@@ -177,7 +176,7 @@ impl Game<'_> {
     }
 }
 
-/// A generator of random numbers (`SplitMix64`), the same on every machine.
+/// Generator of random numbers (`SplitMix64`), the same on every machine.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {

@@ -1,8 +1,8 @@
-//! Bellman and Ford's algorithm, in the plainest form there is.
+//! Bellman and Ford's algorithm, in its simplest form.
 
 use elbowroom_stn::{Network, NodeId, Weight};
 
-/// Distances from `root`, or `None` if they never settle.
+/// Returns distances from `root`, or `None` if there is a negative cycle.
 pub(crate) fn distances<W: Weight>(network: &Network<W>, root: NodeId) -> Option<Vec<Option<W>>> {
     let mut distances: Vec<Option<W>> = vec![None; network.node_count()];
     distances[root.index()] = Some(W::zero());
@@ -26,7 +26,7 @@ pub(crate) fn distances<W: Weight>(network: &Network<W>, root: NodeId) -> Option
     None
 }
 
-/// Distances between all pairs, or `None` if the network is inconsistent.
+/// Returns distances between all pairs, or `None` if the network is inconsistent.
 pub(crate) fn all_distances<W: Weight>(network: &Network<W>) -> Option<Vec<Vec<Option<W>>>> {
     network
         .nodes()

@@ -1,12 +1,12 @@
-//! Networks of the kind that plans have.
+//! Networks similar to those of plans.
 
 use elbowroom_stn::uncertain::{ContingentLink, UncertainNetwork};
 use elbowroom_stn::{Constraint, Network, NodeId};
 
 use crate::game::Random;
 
-/// Jobs in rows, as plans have them: each action is a link, starts wait for ends of the same row
-/// and now and then of another one, some rows have deadlines, some differences are bounded above.
+/// Returns jobs in rows: each action is a link, starts wait for ends of the same row and sometimes
+/// of another one, some rows have deadlines, and some differences are bounded above.
 pub(crate) fn rows(random: &mut Random) -> UncertainNetwork<i64> {
     let rows = 1 + random.below(3);
     let length = 1 + random.below(5);

@@ -1,4 +1,4 @@
-//! What happenings change.
+//! Changes made by happenings.
 
 use std::collections::BTreeMap;
 
@@ -14,8 +14,8 @@ use crate::linear::Linear;
 use elbowroom_plan::{InstanceId, NodeId};
 
 impl Compiler<'_> {
-    /// The continuous changes that begin at the start of an instance, with their rates; `None` is
-    /// an undefined one.
+    /// Returns the continuous changes that begin at the start of an instance, with their rates;
+    /// `None` for an undefined rate.
     pub(super) fn drifts(
         &self,
         run: &Run,
@@ -56,7 +56,7 @@ impl Compiler<'_> {
         Ok(drifts)
     }
 
-    /// Whether anything from the node on may change what the expression reads.
+    /// Returns `true` if the node or a later one may change a fluent that the expression reads.
     pub(super) fn changes_later(&self, expression: &Expression, node: NodeId) -> bool {
         let mut read = Vec::new();
         expression.visit_fluents(&mut |fluent| read.push(fluent));
@@ -86,8 +86,8 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// The changes that come about, with right-hand sides read on arrival; deletions first, so
-    /// that an addition by the same happening wins.
+    /// Returns the changes that take place, with right-hand sides read on arrival. Deletions come
+    /// first, so that an addition by the same happening wins.
     pub(super) fn read_changes<'e>(
         &self,
         run: &Run,
@@ -112,7 +112,7 @@ impl Compiler<'_> {
                     let old = reading.linear(&Expression::Fluent(*fluent))?;
                     let new = updated(&reading, *operator, old, value)?;
                     if new.is_none() {
-                        // An effect without a value breaks the plan, whatever the times are.
+                        // An effect without a value makes the plan invalid, whatever the times are.
                         obligations.direct.push(Obligation {
                             requirement: Requirement::Defined { node },
                             bad_cases: vec![BadCase {
@@ -133,8 +133,8 @@ impl Compiler<'_> {
         Ok(recorded)
     }
 
-    /// A continuous change without a value or a rate breaks the plan, unless its action takes no
-    /// time.
+    /// Adds the obligation of a continuous change without a value or a rate: its action has
+    /// duration 0.
     pub(super) fn never_takes_time(
         &self,
         run: &Run,
@@ -153,13 +153,14 @@ impl Compiler<'_> {
     }
 }
 
-/// A change read, not yet recorded.
+/// Change that was read, but not recorded yet.
 pub(super) enum Recorded {
     Fact(FactId, bool),
     Fluent(FluentId, FluentChange),
 }
 
-/// Several updates of one fluent by one happening must all be increases and decreases.
+/// Adds the obligation that several updates of one fluent by one happening are all increases and
+/// decreases.
 fn forbid_conflicts(
     run: &Run,
     node: NodeId,
@@ -189,7 +190,7 @@ pub(super) fn record(run: &mut Run, node: NodeId, changes: Vec<Recorded>) {
     }
 }
 
-/// A fluent after an update; `None` if a number it needs is undefined.
+/// Returns the value of a fluent after an update; `None` if a number it needs is undefined.
 pub(super) fn updated(
     reading: &Reading<'_>,
     operator: UpdateOperator,

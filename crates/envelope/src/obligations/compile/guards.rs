@@ -7,8 +7,8 @@ use super::super::{Obligations, Refusal, Requirement};
 use super::{Compiler, Run, oblige};
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-/// Which part of which effect's guard: effects of the start come before those of the end, and
-/// those before continuous ones.
+/// Identifier of a part of an effect's guard: effects of the start come before those of the end,
+/// and those before continuous ones.
 pub(super) type GuardId = (InstanceId, usize, GuardPart);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,7 +18,7 @@ pub(super) enum GuardPart {
 }
 
 impl Compiler<'_> {
-    /// Settles every guard that is read at the node; `Some` if one can turn out either way.
+    /// Decides every guard that is read at the node. Returns `Some` if the outcome of one is open.
     pub(super) fn decide_guards(
         &self,
         run: &mut Run,
@@ -31,7 +31,7 @@ impl Compiler<'_> {
             }
             let (instance, index, _) = id;
             if run.outcomes.get(&(instance, index, GuardPart::AtStart)) == Some(&false) {
-                // The effect will not come about, whatever else its guard says.
+                // The effect does not take place, whatever the rest of its guard.
                 run.outcomes.insert(id, false);
                 continue;
             }
@@ -67,7 +67,7 @@ impl Compiler<'_> {
         Ok(None)
     }
 
-    /// The non-trivial guards read on arrival at a node.
+    /// Returns the non-trivial guards read on arrival at a node.
     pub(super) fn guards_read_at(
         &self,
         node: NodeId,
@@ -127,7 +127,7 @@ impl Compiler<'_> {
     }
 }
 
-/// The changes of effects, with whether their guards hold in this run.
+/// Returns the changes of effects, each with `true` if its guard holds in this run.
 pub(super) fn effects<'e>(
     run: &Run,
     instance: InstanceId,

@@ -1,14 +1,14 @@
 //! Processes and events: the symbolic run between two happenings of the plan.
 //!
-//! Where the plan's happenings keep their order, and nature's turns — events, and processes that
-//! start and stop — keep theirs among them, the moment of each turn is a linear expression in the
-//! times before it: a number that changes at a constant rate reaches its threshold so much later.
-//! The run follows the course that nature takes at the nominal values, and demands that it is
-//! the same in every schedule: in each part between two turns no event's condition comes to hold,
-//! and processes stay at work or at rest. Within a part all numbers are linear in time, so what
-//! holds throughout it is decided at its two ends.
+//! Let the order of the plan's happenings and of nature's turns (events, and processes that start
+//! and stop) be fixed. Then the time of each turn is a linear expression in the times before it,
+//! because a number that changes at a constant rate reaches its threshold after a linear delay. The
+//! run follows the course that nature takes at the nominal values, and requires the same course in
+//! every schedule: in each part between two turns, no event's condition becomes true, and processes
+//! stay active or inactive. All numbers are linear in time within a part, so conditions throughout
+//! it are decided at its two ends.
 //!
-//! What is demanded is enough, not always needed: a plan may work with another course, too.
+//! The requirement is sufficient, but not necessary: a plan may also work with another course.
 
 mod condition;
 mod course;
@@ -27,23 +27,23 @@ use crate::obligations::{
 };
 use course::Course;
 
-/// What goes on without a plan, as far as that is the same for the whole run.
+/// Behaviour of the world without the plan, as far as it is the same for the whole run.
 pub(super) struct Nature {
-    /// What each event reads and writes.
+    /// Footprint of each event.
     footprints: Vec<Footprint>,
-    /// What must hold in every state.
+    /// Conditions that must hold in every state.
     always: Vec<Condition>,
     /// The facts that events change.
     facts: BTreeSet<FactId>,
     /// The fluents that processes and events change.
     fluents: BTreeSet<FluentId>,
-    /// The schedule whose course is followed.
+    /// The nominal schedule, whose course is followed.
     times: Schedule,
-    /// The values of parameters in it.
+    /// The nominal values of the parameters.
     values: Valuation,
 }
 
-/// An event that has happened.
+/// Event that has happened.
 #[derive(Clone)]
 pub(super) struct Occurrence {
     event: usize,
@@ -53,7 +53,8 @@ pub(super) struct Occurrence {
 }
 
 impl Nature {
-    /// `None` if nothing happens without a plan.
+    /// Collects the behaviour; `None` if there are no processes, events or constraints on all
+    /// states.
     pub(super) fn of(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -109,7 +110,8 @@ impl Nature {
         Ok(Some(nature))
     }
 
-    /// Rates of actions are read at their starts.
+    /// Refuses rates of actions that nature changes, because they are read at the start of the
+    /// action.
     fn refuse_changing_rates(&self, task: &Task, plan: &ParametrizedPlan) -> Result<(), Refusal> {
         for instance in &plan.plan.instances {
             let Some(body) = instance.action.durative() else {
@@ -131,7 +133,7 @@ impl Nature {
         Ok(())
     }
 
-    /// Whether a condition reads what processes and events change.
+    /// Returns `true` if a condition reads facts or fluents that processes and events change.
     pub(super) fn changes(&self, task: &Task, condition: &Condition) -> bool {
         let mut reads = false;
         task.visit_facts_of(condition, &mut |fact| reads |= self.facts.contains(&fact));
@@ -143,7 +145,7 @@ impl Nature {
 }
 
 impl Compiler<'_> {
-    /// What goes on from a happening to the next one.
+    /// Runs nature from a happening to the next one.
     pub(super) fn pass(
         &self,
         nature: &Nature,
@@ -155,7 +157,7 @@ impl Compiler<'_> {
         self.keep_from_events(nature, run, node, obligations);
         let mut course = Course::after((self, nature), run, (node, next), obligations);
         if node == NodeId::ZERO {
-            // The initial state counts, too.
+            // The initial state must be stable as well.
             course.stays()?;
         }
         course.happens_now()?;
@@ -175,7 +177,8 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// A happening of the plan keeps ε away from the events before it that it interferes with.
+    /// Adds the obligation that a happening of the plan is ε away from earlier events that it
+    /// interferes with.
     fn keep_from_events(
         &self,
         nature: &Nature,
@@ -194,7 +197,7 @@ impl Compiler<'_> {
             if !nature.footprints[*event].interferes_with(&own) {
                 continue;
             }
-            // The distance, less ε, is negative.
+            // Violated if the distance minus ε is negative.
             let mut distance = Linear::difference(NodeId::ZERO, node).minus(at);
             distance.constant -= self.task.epsilon();
             let name = &self.task.autonomous().events[*event].name;
@@ -216,7 +219,8 @@ impl Compiler<'_> {
         }
     }
 
-    /// Conditional effects that may come about or not are not followed together with nature.
+    /// Returns the refusal of conditional effects with open outcomes, which are not supported
+    /// together with nature.
     pub(super) fn guard_depends(&self, node: NodeId) -> Refusal {
         Refusal::Nature {
             place: self.plan.plan.node_words(self.task, node),
@@ -227,7 +231,7 @@ impl Compiler<'_> {
     }
 }
 
-/// Adds an obligation, unless it cannot be violated. Differences of two times are told as such.
+/// Adds an obligation, unless it cannot be violated. Differences of two times are stored as such.
 fn oblige_nature(
     obligations: &mut Obligations,
     requirement: Requirement,
@@ -251,7 +255,7 @@ fn oblige_nature(
         }
         bad_cases.push(bad);
     }
-    // Numbers often stay as they are, and what is required is the same again.
+    // Numbers often do not change, so that the same requirement occurs again.
     let is_known = |known: &Obligation| {
         matches!(known.requirement, Requirement::Nature { .. }) && known.bad_cases == bad_cases
     };
@@ -263,7 +267,7 @@ fn oblige_nature(
     }
 }
 
-/// `to - from + constant <= 0` as a bound on a difference.
+/// Converts `to - from + constant <= 0` to a bound on a difference.
 fn as_difference(inequality: &Inequality) -> Option<Difference> {
     let Linear {
         constant,

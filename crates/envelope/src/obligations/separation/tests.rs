@@ -1,10 +1,10 @@
-//! The nearest interfering pairs, beside the plain way to find them.
+//! The nearest interfering pairs, compared with a direct search.
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// Some things done to a few facts and fluents.
+/// Generates footprints over a few facts and fluents.
 fn footprints() -> impl Strategy<Value = Vec<Footprint>> {
     let uses = prop::collection::vec((0..6, 0..3_u32), 0..4);
     let footprint = uses.prop_map(|uses| {
@@ -25,7 +25,7 @@ fn footprints() -> impl Strategy<Value = Vec<Footprint>> {
     prop::collection::vec(footprint, 0..25)
 }
 
-/// All pairs are looked at, and kept if no third footprint is between.
+/// Examines all pairs, and keeps those without a third footprint between them.
 fn plainly(footprints: &[Footprint]) -> Vec<(usize, usize)> {
     let count = footprints.len();
     let mut is_before = vec![vec![false; count]; count];

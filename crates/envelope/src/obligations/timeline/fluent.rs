@@ -1,4 +1,4 @@
-//! What becomes of one fluent.
+//! History of one fluent.
 
 use std::collections::BTreeSet;
 
@@ -8,12 +8,12 @@ use super::super::precedence::{Around, Side};
 use crate::linear::Linear;
 use elbowroom_plan::NodeId;
 
-/// One change of a fluent.
+/// Change of a fluent.
 #[derive(Clone, Debug)]
 pub(crate) enum FluentChange {
     /// It gets a value, or loses it (an effect whose right-hand side is undefined).
     Assign(Option<Linear>),
-    /// It moves by an amount.
+    /// It changes by an amount.
     Shift(Linear),
     /// A continuous change with this rate begins; no times occur in the rate.
     Drift(Linear),
@@ -21,24 +21,24 @@ pub(crate) enum FluentChange {
     DriftEnd(NodeId),
 }
 
-/// What some changes have made of a fluent.
+/// State of a fluent after some changes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Standing {
     pub(super) base: Option<Linear>,
     drifts: Vec<Drift>,
 }
 
-/// A continuous change under way.
+/// Active continuous change.
 #[derive(Clone, Debug)]
 struct Drift {
     began: NodeId,
-    /// From here on it is not in the base yet.
+    /// The base includes the change up to this node.
     counted: NodeId,
     rate: Linear,
 }
 
 impl Standing {
-    /// One more change, the next one.
+    /// Applies the next change.
     pub(super) fn apply(&mut self, node: NodeId, change: &FluentChange) {
         match change {
             FluentChange::Assign(value) => {
@@ -53,7 +53,7 @@ impl Standing {
                 }
             }
             FluentChange::Drift(rate) => {
-                // Nearly always the only one, and how things stand is kept for many moments.
+                // It is nearly always the only one, and such states are stored for many moments.
                 if self.drifts.is_empty() {
                     self.drifts.reserve_exact(1);
                 }
@@ -73,7 +73,7 @@ impl Standing {
         }
     }
 
-    /// The value at a moment after these changes and before all others.
+    /// Returns the value at a moment after these changes and before all others.
     pub(super) fn value(&self, moment: NodeId) -> Option<Linear> {
         let drifts = self.drifts.iter();
         drifts.fold(self.base.clone(), |base, drift| {
@@ -81,14 +81,15 @@ impl Standing {
         })
     }
 
-    /// The rates of the continuous changes under way.
+    /// Returns the rates of the active continuous changes.
     pub(super) fn rates(&self) -> impl Iterator<Item = &Linear> {
         self.drifts.iter().map(|drift| &drift.rate)
     }
 }
 
 impl Drift {
-    /// `base + rate * (until - counted)`; rates hold no times, so the product is always representable.
+    /// Returns `base + rate * (until - counted)`. Rates contain no times, so the product can always
+    /// be represented.
     fn added_to(&self, base: Option<Linear>, until: NodeId) -> Option<Linear> {
         let mut base = base?;
         let difference = Linear::difference(self.counted, until);
@@ -97,25 +98,25 @@ impl Drift {
     }
 }
 
-/// The changes of a fluent along a plan.
+/// Changes of a fluent along a plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FluentHistory {
     first: Standing,
     pub(super) events: Vec<(NodeId, FluentChange)>,
-    /// After all events.
+    /// State after all events.
     last: Standing,
-    /// For each event that gives a value: its position, and how things stand after it.
+    /// For each assignment: its position, and the state after it.
     assigned: Vec<(usize, Standing)>,
 }
 
 impl FluentHistory {
-    /// Its first value.
+    /// Sets the initial value.
     pub(super) fn put(&mut self, value: Option<Linear>) {
         self.first.base.clone_from(&value);
         self.last.base = value;
     }
 
-    /// One more change.
+    /// Appends a change.
     pub(super) fn push(&mut self, node: NodeId, change: FluentChange) {
         self.last.apply(node, &change);
         if matches!(change, FluentChange::Assign(Some(_))) {
@@ -124,12 +125,12 @@ impl FluentHistory {
         self.events.push((node, change));
     }
 
-    /// After all events.
+    /// Returns the state after all events.
     pub(super) fn last(&self) -> &Standing {
         &self.last
     }
 
-    /// After those events for which `cut` is true.
+    /// Returns the state after those events for which `cut` is true.
     pub(super) fn standing(&self, cut: &dyn Fn(NodeId) -> bool) -> Standing {
         let mut standing = self.first.clone();
         for (node, change) in self.events.iter().filter(|(node, _)| cut(*node)) {
@@ -138,11 +139,11 @@ impl FluentHistory {
         standing
     }
 
-    /// What of this matters to a moment inside an action. Collects the events of which it is not known on which side
-    /// of the moment they are.
+    /// Returns the part of the history that is relevant to a moment inside an action. Collects the
+    /// events that may be on either side of the moment.
     ///
-    /// Whatever else changes a fluent interferes with what gives it a value, so that before one that has happened
-    /// all earlier ones have, and after one that is to come so are all later ones.
+    /// Every change of a fluent interferes with its assignments. So all changes before a past
+    /// assignment are past, and all changes after a future assignment are in the future.
     pub(super) fn near(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
         let here = self
             .events

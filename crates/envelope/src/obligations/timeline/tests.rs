@@ -14,7 +14,7 @@ fn atom(number: usize) -> Condition {
     })
 }
 
-/// Predicate 0 is basic, the others are derived with one rule each; all are in the table.
+/// Returns a task with predicate 0 basic, and the others derived with one rule each.
 fn task(bodies: Vec<Condition>) -> Task {
     let predicates = (0..=bodies.len()).map(|number| Predicate {
         name: format!("p{number}"),
@@ -39,8 +39,8 @@ fn task(bodies: Vec<Condition>) -> Task {
     })
 }
 
-/// Whether `p` followed by the number is true when everything in the timeline has happened, or
-/// nothing has.
+/// Returns the value of `p` followed by the number, when everything in the timeline has happened,
+/// or nothing has.
 fn read(
     task: &Task,
     timeline: &Timeline,
@@ -61,7 +61,7 @@ fn read(
     reading.fact(fact.expect("in the table"))
 }
 
-/// `p0` becomes true.
+/// Returns a timeline in which `p0` becomes true.
 fn opened(task: &Task) -> Timeline {
     let mut timeline = Timeline::default();
     let fact = task.find_fact(PredicateId(0), &[]);
@@ -80,7 +80,7 @@ fn a_long_chain_follows_the_cut() {
 
 #[test]
 fn facts_that_all_rest_on_each_other_are_read_once() {
-    // All paths through forty facts are too many to try.
+    // Forty facts have too many paths to enumerate.
     let last = 40;
     let any_other = |_| Condition::Or((1..=last).map(atom).collect());
     let mut bodies: Vec<_> = (1..=last).map(any_other).collect();

@@ -8,8 +8,8 @@ use elbowroom_stn::NodeId as NetworkNode;
 
 use crate::proved::Strategy;
 
-/// What an executor has to keep to beside the plan's own constraints; `None` if the network is not
-/// dynamically controllable.
+/// Returns the constraints that an executor has to satisfy in addition to the plan's own; `None` if
+/// the network is not dynamically controllable.
 pub(super) fn strategy(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Strategy> {
     let plan_network = plan.uncertain_network(envelope).ok()?;
     let network = &plan_network.network;
@@ -43,7 +43,7 @@ pub(super) fn strategy(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) ->
         .filter(|(ends, bound)| given.get(*ends) != Some(*bound));
     let edges = found.map(|(&(from, to), bound)| (node(from), node(to), bound.clone()));
 
-    // For each node and duration the longest wait; without limit is the longest.
+    // The longest wait for each node and duration; a wait without limit is the longest.
     let mut waits: BTreeMap<(NodeId, usize), Option<Rational>> = BTreeMap::new();
     for (waiting, link, delay) in form.waits_found() {
         let own = network.link(link);
@@ -67,7 +67,7 @@ pub(super) fn strategy(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) ->
     })
 }
 
-/// Nodes keep their positions.
+/// Converts a node; its position is the same.
 fn node(node: NetworkNode) -> NodeId {
     NodeId::from(node.index())
 }

@@ -19,7 +19,7 @@ enum Place {
 }
 
 impl Nominal<'_> {
-    /// Adds conditions that hold in the nominal schedule; now and then one that does not.
+    /// Adds conditions that hold in the nominal schedule, and sometimes one that does not.
     pub(super) fn add_conditions(&mut self) {
         let mut places = vec![Place::Goal, Place::Goal];
         for (index, schema) in self.case.problem.schemas.iter().enumerate() {
@@ -100,7 +100,8 @@ impl Nominal<'_> {
         }
     }
 
-    /// A comparison that holds by a little, as far as the judge can tell the value.
+    /// Returns a comparison that holds by a small margin, as far as the validator can compute the
+    /// value.
     fn near(&mut self, place: Place, left: &Expression) -> (Comparison, Rational) {
         let comparison = *self.dice.pick(&[
             Comparison::AtLeast,
@@ -150,7 +151,7 @@ impl Nominal<'_> {
         (comparison, right)
     }
 
-    /// Bounds on durations, as domains have them.
+    /// Adds bounds on durations, as domains have them.
     pub(super) fn add_durations(&mut self) {
         let starts: Vec<_> = self.durations();
         for (index, duration) in starts {

@@ -9,7 +9,7 @@ use crate::case::{Gap, instance_of};
 use crate::system::System;
 
 impl Nominal<'_> {
-    /// Constraints around the nominal schedule: on durations, on happenings that interfere, on
+    /// Adds constraints around the nominal schedule: on durations, on happenings that interfere, on
     /// those that change what an over-all condition reads, and some at random.
     pub(super) fn add_gaps(&mut self) {
         let nodes = self.nodes();
@@ -57,7 +57,7 @@ impl Nominal<'_> {
         }
     }
 
-    /// A limit that changes nothing but the size of the numbers: machine integers no longer do.
+    /// Adds a limit that only makes the numbers too large for machine integers.
     pub(super) fn add_far_limit(&mut self) {
         let nodes = self.nodes();
         let to = *self.dice.pick(&nodes[1..]);
@@ -69,7 +69,7 @@ impl Nominal<'_> {
         });
     }
 
-    /// A constraint so many halves wide around the nominal difference, or without end.
+    /// Adds a constraint around the nominal difference, `width` halves wide, or unbounded.
     fn add_gap(&mut self, from: Node, to: Node, width: i64, least: Option<Rational>) {
         let gap = &self.time(to) - &self.time(from);
         let slack = Rational::new(width, 2);
@@ -93,8 +93,8 @@ impl Nominal<'_> {
         });
     }
 
-    /// Looks for schedules that do not work at the nominal values, and narrows constraints until
-    /// none is found: so that a good part of the boxes is inside.
+    /// Searches for invalid schedules at the nominal values, and narrows constraints until none is
+    /// found, so that many of the boxes are inside.
     pub(super) fn tighten(&mut self) {
         for _ in 0..8 {
             let (_, plan) = self.case.build();
@@ -134,7 +134,7 @@ impl Nominal<'_> {
     }
 }
 
-/// Whether an over-all condition of the running action reads what the footprint writes.
+/// Returns `true` if an over-all condition of the running action reads what the footprint writes.
 fn over_all_reads(
     task: &Task,
     plan: &elbowroom_plan::ParametrizedPlan,

@@ -1,4 +1,4 @@
-//! Numbers become parameters.
+//! Replacement of numbers by parameters.
 
 use elbowroom_model::Task;
 use elbowroom_model::problem::{Expression, Unknown};
@@ -10,7 +10,7 @@ use crate::case::Gap;
 use crate::numbers;
 
 impl Nominal<'_> {
-    /// Makes one to four numbers parameters, or, where parameters are to be shared, puts one or
+    /// Replaces one to four numbers by parameters or, if parameters are to be shared, puts one or
     /// two of them in up to five places.
     pub(super) fn open_numbers(&mut self) {
         let count = match self.theme {
@@ -94,7 +94,7 @@ impl Nominal<'_> {
         }
     }
 
-    /// One number in an action or the goal, or all numbers there that equal it.
+    /// Opens one number in an action or the goal, or all numbers there that equal it.
     fn open_constant(&mut self) {
         let mut found = Vec::new();
         numbers::visit(&mut self.case.problem.clone(), &mut |leaf| {
@@ -148,7 +148,7 @@ impl Nominal<'_> {
         self.case.timed.insert(group, parameter);
     }
 
-    /// A parameter that is there already in one more place, where its nominal value fits.
+    /// Puts an existing parameter in one more place, where its nominal value fits.
     fn open_again(&mut self) {
         if self.case.parameters.is_empty() {
             return;

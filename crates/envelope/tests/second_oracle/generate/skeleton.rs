@@ -11,7 +11,7 @@ use elbowroom_num::Rational;
 use super::Theme;
 use crate::dice::Dice;
 
-/// Actions with effects only, and timed initials.
+/// Generates actions with effects only, and timed initials.
 pub(super) fn skeleton(dice: &mut Dice, theme: Theme) -> Problem {
     let (facts, fluents) = (1 + dice.below(3), 1 + dice.below(2));
     let name = |prefix: &str, index: usize| format!("{prefix}{index}");
@@ -83,7 +83,7 @@ pub(super) fn skeleton(dice: &mut Dice, theme: Theme) -> Problem {
     problem
 }
 
-/// A derived predicate over the others, and now and then over a number.
+/// Adds a derived predicate over the others, and sometimes over a number.
 fn derive(dice: &mut Dice, problem: &mut Problem) {
     let facts = problem.predicates.len();
     problem.predicates.push(Predicate {
@@ -115,7 +115,7 @@ fn derive(dice: &mut Dice, problem: &mut Problem) {
     }
 }
 
-/// A fact or its opposite.
+/// Generates a fact or its negation.
 pub(super) fn fact(dice: &mut Dice, facts: usize) -> Condition {
     let atom = Condition::Atom(atom(dice.below(facts)));
     if dice.chance(50) {
@@ -179,7 +179,7 @@ fn body(dice: &mut Dice, facts: usize, fluents: usize, theme: Theme) -> Body {
     }
 }
 
-/// How many effects in a hundred depend on a condition.
+/// Returns the percentage of effects that depend on a condition.
 fn guarded(theme: Theme) -> usize {
     if theme == Theme::Guards { 40 } else { 4 }
 }

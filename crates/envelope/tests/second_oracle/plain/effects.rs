@@ -1,4 +1,4 @@
-//! What a group of happenings changes.
+//! Changes made by a group of happenings.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::search::{Context, Running, Search, Step, Trouble, World};
 use super::truth::Want;
 use crate::polynomial::Polynomial;
 
-/// Which effect's guard, and which part of it.
+/// Part of an effect's guard.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
     Now,
@@ -28,7 +28,7 @@ pub(super) struct Guard<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// The guards read at a node.
+    /// Returns the guards read at a node.
     pub(super) fn guards(&self, world: &World, node: usize) -> Result<Vec<Guard<'a>>, Trouble> {
         let mut guards = Vec::new();
         let duration = self.context(world, node).duration;
@@ -76,7 +76,7 @@ impl<'a> Search<'a> {
         Ok(guards)
     }
 
-    /// Goes on with each combination of the guards' outcomes.
+    /// Continues with each combination of the guards' outcomes.
     pub(super) fn decide(
         &mut self,
         world: &World,
@@ -109,7 +109,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Carries out the group's effects and goes on with the next group, or looks at the goal.
+    /// Applies the group's effects and continues with the next group, or checks the goal.
     fn apply(
         &mut self,
         mut world: World,
@@ -216,7 +216,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// What a node changes.
+    /// Returns the changes of a node.
     fn changes(&self, node: usize, outcomes: &BTreeMap<GuardKey, bool>) -> Vec<&'a Change> {
         let effects = match self.node(node) {
             Node::Zero => return Vec::new(),
@@ -225,7 +225,7 @@ impl<'a> Search<'a> {
             Node::Start(id) => &self.durative(id).start.effects,
             Node::End(id) => &self.durative(id).end.effects,
         };
-        // Of an action that takes no time, the guards read at the start are in the same group.
+        // For an action with duration 0, the guards read at the start are in the same group.
         let is_off = |index: usize| match self.node(node) {
             Node::End(id) => {
                 let start = self.plan.plan.start(id).index();

@@ -1,4 +1,4 @@
-//! What a group of happenings requires.
+//! Requirements of a group of happenings.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::polynomial::{Polynomial, Symbol};
 use crate::system::Relation;
 
 impl Search<'_> {
-    /// The conditions of a group, and its distance from others.
+    /// Checks the conditions of a group, and its distance from others.
     pub(super) fn arrive(&mut self, world: &World, group: &[usize]) -> Step {
         for &node in group {
             let context = self.context(world, node);
@@ -62,8 +62,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Interfering happenings are at least epsilon apart. Of two timed initials that is asked only
-    /// if the time of one is open.
+    /// Checks that interfering happenings are at least epsilon apart. For two timed initials, that
+    /// is only required if the time of one is open.
     fn separate(&mut self, world: &World, group: &[usize]) -> Step {
         for (position, &node) in group.iter().enumerate() {
             for &other in world.placed.iter().chain(&group[..position]) {
@@ -96,7 +96,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether the time of a timed initial depends on a parameter: no constraint fixes it.
+    /// Returns `true` if the time of a timed initial depends on a parameter: no constraint fixes
+    /// it.
     fn is_open(&self, node: usize) -> bool {
         !self.plan.plan.constraints.iter().any(|constraint| {
             constraint.to.index() == node

@@ -1,4 +1,4 @@
-//! From group to group of simultaneous happenings.
+//! Enumeration of the orders of happenings, by groups of simultaneous ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,10 +11,10 @@ use super::{Break, GaveUp};
 use crate::polynomial::{Polynomial, Symbol};
 use crate::system::{Relation, System};
 
-/// Why the search ended without an answer.
+/// Reason why the search ended without an answer.
 pub(super) enum Trouble {
     GaveUp(GaveUp),
-    /// This is not linear.
+    /// This polynomial is not linear.
     Product(Polynomial),
 }
 
@@ -25,9 +25,9 @@ pub(super) struct Search<'a> {
     pub(super) plan: &'a ParametrizedPlan,
     pub(super) epsilon: &'a Rational,
     pub(super) system: System,
-    /// Values of parameters that multiply something.
+    /// Values of the multiplied parameters.
     pub(super) fixed: BTreeMap<usize, Rational>,
-    /// How many more groups may be looked at.
+    /// Number of further groups that may be examined.
     pub(super) left: usize,
     pub(super) found: Option<Break>,
 }
@@ -47,12 +47,12 @@ pub(super) struct World {
 #[derive(Clone)]
 pub(super) struct Running {
     pub(super) is_new: bool,
-    /// What the guards read at the start said, of end effects and of continuous ones.
+    /// Values of the guards read at the start, of end effects and of continuous ones.
     pub(super) end_guards: Vec<bool>,
     pub(super) continuous: Vec<bool>,
 }
 
-/// What a condition or expression is read in.
+/// State in which a condition or expression is evaluated.
 #[derive(Clone)]
 pub(super) struct Context {
     pub(super) facts: Vec<bool>,
@@ -105,7 +105,7 @@ impl<'a> Search<'a> {
     }
 
     pub(super) fn report(&mut self, what: String) {
-        // The last check may have been about something narrower that was not feasible.
+        // The last check may have been about a narrower system that was not feasible.
         if !self.system.is_feasible() {
             return;
         }
@@ -149,7 +149,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// The group comes next, everything else after it.
+    /// Makes the group the next one, with everything else after it.
     fn close(&mut self, world: &World, group: &[usize]) -> Step {
         if self.found.is_some() {
             return Ok(());
@@ -174,7 +174,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// The time between the last group and the node.
+    /// Advances the time from the last group to the node.
     fn pass(&mut self, world: &mut World, node: usize) -> Step {
         let Some(&last) = world.last.first() else {
             return Ok(());
@@ -200,8 +200,8 @@ impl<'a> Search<'a> {
         let since = Polynomial::difference(Symbol::Moment, Symbol::Time(last));
         let until = Polynomial::difference(Symbol::Time(node), Symbol::Moment);
         for (&id, running) in &world.running {
-            // The over-all interval is open; at a group within it, the state after the group
-            // counts.
+            // The over-all interval is open; at a group within it, the state after the group is
+            // relevant.
             let since_relation = if running.is_new {
                 Relation::Below
             } else {
@@ -226,7 +226,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// The rates of the continuous effects at work.
+    /// Returns the rates of the active continuous effects.
     fn rates(&self, world: &World) -> Result<Vec<(FluentId, Option<Polynomial>)>, Trouble> {
         let mut rates = Vec::new();
         let mut moving = BTreeSet::new();

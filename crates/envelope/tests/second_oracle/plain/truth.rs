@@ -1,4 +1,4 @@
-//! The ways in which conditions can be true or false.
+//! Ways for conditions to be true or false.
 
 use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_model::problem::{Comparison, Unknown};
@@ -9,7 +9,7 @@ use super::search::{Context, Search, Step, Trouble};
 use crate::polynomial::Polynomial;
 use crate::system::Relation;
 
-/// The truth that is looked for. A comparison with an undefined number is neither true nor false.
+/// Wanted truth value. A comparison with an undefined number is neither true nor false.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Want {
     True,
@@ -42,8 +42,8 @@ impl Search<'_> {
         })
     }
 
-    /// Calls `then` in each way in which all conditions have the wanted truth and some schedule is
-    /// left.
+    /// Calls `then` in each way for all conditions to have the wanted truth, provided that some
+    /// schedule remains.
     pub(super) fn ways(
         &mut self,
         mut wanted: Vec<Wanted<'_>>,
@@ -121,7 +121,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The value; `None` where it is undefined.
+    /// Returns the value; `None` if it is undefined.
     pub(super) fn value(
         &self,
         expression: &Expression,
@@ -167,7 +167,7 @@ impl Search<'_> {
     }
 }
 
-/// The ways in which `left comparison right` is true, or false.
+/// Returns the ways for `left comparison right` to be true, or false.
 fn literal(
     comparison: Comparison,
     left: &Polynomial,

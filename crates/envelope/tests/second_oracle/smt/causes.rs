@@ -1,8 +1,8 @@
-//! Plans without numbers that change: no positions, only who comes before whom.
+//! Encoding of plans without changing numbers: no positions, only precedence.
 //!
-//! A fact is true at a moment exactly if something made it so before (the beginning counts) and
-//! nothing made it false in between. Time points that interfere must not coincide, which is
-//! asked for by itself; what is said here of coinciding ones does not matter then.
+//! A fact is true at a moment exactly if something made it true before (the beginning counts) and
+//! nothing made it false in between. Time points that interfere must not coincide, which is a
+//! separate requirement, so the encoding of coinciding ones does not matter.
 
 use elbowroom_model::ground::{Change, Condition, Effect, Expression, FactId};
 use elbowroom_model::problem::Comparison;
@@ -12,7 +12,7 @@ use elbowroom_plan::{DecoupledEnvelope, Node};
 use super::text::{and, not, number, or};
 use super::{Encoder, NotEncoded, in_box};
 
-/// When a condition is read.
+/// Moment at which a condition is read.
 #[derive(Clone, Copy)]
 enum Moment {
     /// On arrival at a time point.
@@ -24,8 +24,8 @@ enum Moment {
 }
 
 impl Encoder<'_> {
-    /// What holds in all schedules for values in the box; leaves what may go wrong in
-    /// `violations`.
+    /// Returns the text that holds in all schedules for values in the box; adds the possible
+    /// violations to `violations`.
     pub(super) fn causes(&mut self, envelope: &DecoupledEnvelope) -> Result<String, NotEncoded> {
         self.check_no_changing_numbers()?;
         self.network();
@@ -53,7 +53,7 @@ impl Encoder<'_> {
         Ok(format!("{}{}", self.text, in_box(envelope)))
     }
 
-    /// It must hold right after the start, and after each time point before the end.
+    /// Requires a condition right after the start, and after each time point before the end.
     fn never_broken(
         &mut self,
         condition: &Condition,
@@ -102,7 +102,8 @@ impl Encoder<'_> {
         if are_plain { Ok(()) } else { Err(NotEncoded) }
     }
 
-    /// The truth that a time point gives to a fact, if any. Additions come after deletions.
+    /// Returns the truth value that a time point assigns to a fact, if any. Additions come after
+    /// deletions.
     fn sets(&self, node: usize, fact: FactId) -> Option<bool> {
         let changes: Vec<&Change> = if let Node::Timed(group) = self.node(node) {
             self.task.timed()[group].changes.iter().collect()
@@ -134,7 +135,7 @@ impl Encoder<'_> {
         })
     }
 
-    /// The value of an expression of fluents that nothing changes.
+    /// Returns the value of an expression of fluents that nothing changes.
     fn constant(&self, expression: &Expression) -> Result<Rational, NotEncoded> {
         let initial = &self.task.initial().values;
         let value = expression.evaluate(&mut |leaf| match leaf {

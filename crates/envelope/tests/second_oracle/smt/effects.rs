@@ -8,7 +8,7 @@ use super::text::{and, not, number, or, sum};
 use super::{At, Encoder, NotEncoded};
 
 impl<'a> Encoder<'a> {
-    /// Constants for what the guards read at an action's start say: of end effects, then of
+    /// Declares constants for the guards read at an action's start: of end effects, then of
     /// continuous ones.
     pub(super) fn declare_guards(&mut self) {
         for (id, body) in self.durative() {
@@ -37,7 +37,7 @@ impl<'a> Encoder<'a> {
         Ok(())
     }
 
-    /// Copies of facts and fluents after each position, and of fluents on arrival.
+    /// Defines copies of facts and fluents after each position, and of fluents on arrival.
     pub(super) fn effects(&mut self) -> Result<(), NotEncoded> {
         let (facts, fluents) = (self.task.fact_count(), self.task.fluent_count());
         for fact in 0..facts {
@@ -74,7 +74,7 @@ impl<'a> Encoder<'a> {
         Ok(())
     }
 
-    /// A constant with a value; only another name for it, if the value is simple.
+    /// Defines a constant with a value, or only an alias if the value is simple.
     fn copy(&mut self, name: &str, sort: &str, value: &str) {
         if value.contains(' ') {
             self.line(&format!("(declare-const {name} {sort})"));
@@ -84,7 +84,7 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// How much a fluent moves continuously from position `from` until the time `until`, which
+    /// Returns the continuous change of a fluent from position `from` until the time `until`, which
     /// comes before position `next` or at it.
     pub(super) fn drift(
         &self,
@@ -126,7 +126,7 @@ impl<'a> Encoder<'a> {
         Ok(format!("(ite {runs} (* {rate} (- {until} tau{from})) 0.0)"))
     }
 
-    /// The effects of a node with the formula for whether they happen at position `k`.
+    /// Returns the effects of a node, each with the formula that it happens at position `k`.
     fn changes(&self, node: usize, k: usize) -> Result<Vec<(String, &'a Change)>, NotEncoded> {
         if self.at(node, k) == "false" {
             return Ok(Vec::new());

@@ -1,4 +1,4 @@
-//! What may go wrong.
+//! Encoding of violations.
 
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::{Condition, Expression};
@@ -84,7 +84,7 @@ impl Encoder<'_> {
         Ok(())
     }
 
-    /// One moment for each action, after each position.
+    /// Requires over-all conditions at one moment for each action, after each position.
     pub(super) fn over_all(&mut self) -> Result<(), NotEncoded> {
         for (id, body) in self.durative() {
             if body.over_all.is_trivial() {
@@ -116,7 +116,7 @@ impl Encoder<'_> {
         Ok(())
     }
 
-    /// The goal is read after the last position.
+    /// Requires the goal, which is read after the last position.
     pub(super) fn goal(&mut self) -> Result<(), NotEncoded> {
         let holds = self.condition(&self.plan.goal, &At::After(self.count()), None)?;
         self.violations.push(not(&holds));

@@ -1,19 +1,19 @@
-//! Which positions a time point may have among all time points, by time.
+//! Possible positions of a time point among all time points, by time.
 
 use std::ops::RangeInclusive;
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan};
 
-/// For each time point but zero, the positions it may have; the first is 1.
+/// Possible positions of each time point but zero; the first is 1.
 pub(crate) struct Places {
     ranges: Vec<RangeInclusive<usize>>,
-    /// `[i][j]`: the most that time point `j` can come after `i`.
+    /// `[i][j]`: the greatest time from time point `i` to `j`.
     farthest: Vec<Vec<Option<Rational>>>,
 }
 
 impl Places {
-    /// Any order is possible.
+    /// Allows any order.
     pub(crate) fn any(plan: &ParametrizedPlan) -> Self {
         let count = plan.plan.nodes.len() - 1;
         Self {
@@ -22,9 +22,10 @@ impl Places {
         }
     }
 
-    /// The positions in schedules whose parameters lie in the box. `None` if there are none.
+    /// Returns the positions in schedules whose parameters lie in the box; `None` if there are
+    /// none.
     ///
-    /// What comes before a time point in all schedules comes before it in the order, too.
+    /// If a node comes before a time point in all schedules, it also comes before it in the order.
     pub(crate) fn within(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Self> {
         let farthest = farthest(plan, envelope);
         let count = plan.plan.nodes.len();
@@ -49,7 +50,7 @@ impl Places {
         Some(Self { ranges, farthest })
     }
 
-    /// `t_first < t_second` as text; less than that, where the network knows.
+    /// Returns `t_first < t_second` as text, simplified if the network decides it.
     pub(super) fn is_before(&self, first: usize, second: usize) -> String {
         if self
             .least_gap(first, second)
@@ -66,7 +67,7 @@ impl Places {
         }
     }
 
-    /// How much later `second` is than `first`, at least.
+    /// Returns the least time from `first` to `second`.
     pub(super) fn least_gap(&self, first: usize, second: usize) -> Option<Rational> {
         self.farthest[second][first].as_ref().map(|most| -most)
     }
@@ -76,7 +77,8 @@ impl Places {
     }
 }
 
-/// `[i][j]`: the most that time point `j` can come after `i`, by Floyd and Warshall's algorithm.
+/// Computes `[i][j]`, the greatest time from time point `i` to `j`, by Floyd and Warshall's
+/// algorithm.
 fn farthest(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Vec<Vec<Option<Rational>>> {
     let count = plan.plan.nodes.len();
     let mut most = vec![vec![None; count]; count];

@@ -1,4 +1,4 @@
-//! Small pieces of text.
+//! Helpers for SMT-LIB text.
 
 use elbowroom_num::Rational;
 
@@ -31,7 +31,7 @@ pub(super) fn or(parts: &[String]) -> String {
     junction("or", ("false", "true"), parts)
 }
 
-/// `empty` says nothing among the parts, `decided` says it all.
+/// Joins parts; `empty` is the neutral part, and `decided` the absorbing one.
 fn junction(operator: &str, (empty, decided): (&str, &str), parts: &[String]) -> String {
     if parts.iter().any(|part| part == decided) {
         return decided.to_owned();

@@ -1,11 +1,12 @@
-//! What happens beyond the bounds of a link, and whether the rest can be executed all the same.
+//! Executability of the remaining network after a link has violated its bounds.
 //!
-//! Everything that was found from the upper bound of a link is an edge to its activation, or to what comes before that;
-//! everything that was found from its lower bound says what has to happen before its end. Once the link is under way,
-//! both are about what has happened, and edges between time points that have not happened do not depend on its bounds. So
-//! where they turn out to be wrong, the form stays a form of the rest. What remains to be seen is whether each time
-//! point next to what has happened has room left, and, while the link goes on, which time points have to wait for its end
-//! now.
+//! Each edge derived from the upper bound of a link ends at the link's activation, or at an earlier
+//! time point. Each edge derived from its lower bound requires that something happens before the
+//! link's end. While the link is running, both kinds of edges concern past events only. Edges
+//! between time points that have not happened do not depend on the link's bounds. So if the bounds
+//! turn out to be wrong, the network is still a dispatchable form of the remaining network. Two
+//! checks are needed: each neighbour of a past event must have a non-empty window, and, while the
+//! link is running, some time points have to wait for its end from now on.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -16,7 +17,7 @@ use crate::uncertain::{Extended, LinkId};
 use crate::{NodeId, Weight, WindowEnd, spend_step};
 
 impl<W: Weight> Dispatcher<W> {
-    /// When a link that began then ends at the latest; `None` if there is no such time.
+    /// Returns the latest end of a link that began at `begun`; `None` if there is none.
     pub(super) fn last_end(&self, id: LinkId, begun: &W) -> Option<W> {
         if let Some((_, until)) = self.prolonged.iter().find(|(other, _)| *other == id) {
             return until.clone();
@@ -25,8 +26,8 @@ impl<W: Weight> Dispatcher<W> {
         upper.map(|upper| begun.plus(upper))
     }
 
-    /// Whether all that is known of a node that the world decides on permits that it happens then, but for the bounds of
-    /// its own link.
+    /// Returns `true` if a node that the world decides on may happen at `time` by all known
+    /// constraints except the bounds of its own link.
     pub(super) fn permits(&self, node: NodeId, time: &W) -> bool {
         let has_happened = |node: &NodeId| self.happened[node.index()].is_some();
         let (earliest, latest) = self.window(node);
@@ -38,9 +39,10 @@ impl<W: Weight> Dispatcher<W> {
             && self.form.before(node).iter().all(has_happened)
     }
 
-    /// Whether all goes on to work after a node has happened outside the bounds of its link, and
-    /// [nothing else](super::Missed::is_only_link): everything next to it can still happen, now or later, and whatever
-    /// other links do within their bounds the executor satisfies every requirement.
+    /// Returns `true` if the remaining network is still executable after `node` has happened
+    /// outside the bounds of its link, and [nothing else](super::Missed::is_only_link) was
+    /// violated. Every neighbour can then still happen, now or later, and the executor satisfies
+    /// every requirement as long as the other links stay within their bounds.
     pub fn bears(&self, node: NodeId, now: &W) -> bool {
         let form = &self.form;
         let after = form.leaving(node).map(|(to, ..)| to);
@@ -58,7 +60,8 @@ impl<W: Weight> Dispatcher<W> {
         true
     }
 
-    /// Whether a node that has not happened can happen now or later, as far as its window, its waits and its link know.
+    /// Returns `true` if a node that has not happened can happen now or later, by its window, its
+    /// waits and its link.
     fn has_room(&self, node: NodeId, now: &W) -> bool {
         let Some((latest, _)) = &self.windows[node.index()][WindowEnd::Latest as usize] else {
             return true;
@@ -68,7 +71,8 @@ impl<W: Weight> Dispatcher<W> {
         }
         if let Some(id) = self.form.network().ending_at(node) {
             let activation = self.form.network().link(id).activation;
-            // What is not under way has to be begun in time: its activation has room, or not.
+            // A link that is not running has to be activated in time, which the window of its
+            // activation ensures.
             return self.happened(activation).is_none_or(|begun| {
                 let last = self.last_end(id, begun);
                 last.is_some_and(|last| last <= *latest)
@@ -78,12 +82,12 @@ impl<W: Weight> Dispatcher<W> {
         earliest.is_ok_and(|earliest| earliest.is_none_or(|earliest| earliest <= latest))
     }
 
-    /// Takes a link that is under way for one that ends by `until`, or whenever it likes, whatever its upper bound says.
-    /// Time points that could have relied on that bound wait for its end from now on. Nothing that has not happened
-    /// happens before `now`.
+    /// Replaces the latest end of a running link by `until`, or removes it if `until` is `None`,
+    /// whatever its upper bound. Time points that depended on that bound wait for the link's end
+    /// from now on. Events in the future happen no earlier than `now`.
     ///
-    /// `false`, and nothing is changed, if the executor could not be sure any more to satisfy every requirement, or if the
-    /// link is not under way.
+    /// Returns `false` and changes nothing if the executor could no longer guarantee every
+    /// requirement, or if the link is not running.
     pub fn prolong(&mut self, id: LinkId, until: Option<&W>, now: &W) -> bool {
         let last = until.cloned().map_or_else(Extended::infinity, Into::into);
         let Ok(waiting) = self.waiting(id, &last, now) else {
@@ -108,22 +112,25 @@ impl<W: Weight> Dispatcher<W> {
         true
     }
 
-    /// The latest time, `until` at most, by which a link that is under way may be taken to end
-    /// ([`prolong`](Self::prolong)); `None` if there is none.
+    /// Returns the latest time, `until` at most, that [`prolong`](Self::prolong) accepts as the
+    /// latest end of a running link; `None` if there is none.
     pub fn prolongable(&self, id: LinkId, until: &W, now: &W) -> Option<W> {
         let mut last = until.clone();
         while last >= *now {
             match self.waiting(id, &last.clone().into(), now) {
                 Ok(_) => return Some(last),
-                // All that it bears on moves with it: by this much it has to be earlier at least.
+                // All derived times move with it, so it has to be earlier by at least this much.
                 Err(by) => last = last.minus(&by?.into_finite()?),
             }
         }
         None
     }
 
-    /// What has to wait for the end of a link that ends by `last`; if that is too late, by how much at least, where that
-    /// would help.
+    /// Returns the nodes that have to wait for the end of a link that ends by `last`.
+    ///
+    /// # Errors
+    /// If `last` is too late: by how much at least, or `None` if an earlier time would not help
+    /// either.
     fn waiting(
         &self,
         id: LinkId,
@@ -170,7 +177,8 @@ impl<W: Weight> Dispatcher<W> {
         Ok(waiting)
     }
 
-    /// What may not happen long before a node that may not happen before that time, but for the end of the link itself.
+    /// Propagates the earliest time of `node` backwards along edges that are not negative: their
+    /// sources may not happen too long before `node`. Skips the end of the link itself.
     fn reach_before(
         &self,
         node: NodeId,
@@ -186,13 +194,15 @@ impl<W: Weight> Dispatcher<W> {
     }
 }
 
-/// The nodes that have to wait for the end of a link.
+/// Nodes that have to wait for the end of a link.
 struct Waiting<W> {
-    /// Each with the time until which it waits, as far as is known, and the edge by which that follows.
+    /// Nodes, each with the time until which it waits, as far as is known, and the edge that
+    /// implies it.
     known: Vec<(NodeId, Extended<W>, EdgeId)>,
-    /// Their places in that list.
+    /// Position of each node in that list.
     places: BTreeMap<NodeId, usize>,
-    /// Those to be looked at, the latest time first, so that each is looked at once; the times are negated.
+    /// Nodes to process, the latest time first, so that each is processed once. The times are
+    /// negated.
     open: BinaryHeap<Reverse<(Extended<W>, NodeId)>>,
 }
 
@@ -224,7 +234,7 @@ impl<W: Weight> Waiting<W> {
         }
     }
 
-    /// The next node, until when it waits, and the edge by which that follows.
+    /// Returns the next node, the time until which it waits, and the edge that implies it.
     fn next(&mut self) -> Option<(NodeId, Extended<W>, EdgeId)> {
         while let Some(Reverse((negated, node))) = self.open.pop() {
             spend_step();

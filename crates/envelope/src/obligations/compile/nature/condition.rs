@@ -1,5 +1,5 @@
-//! What breaks the truth of a condition at a moment, right after it, and throughout a part in
-//! which numbers change at constant rates.
+//! Violations of a condition at a moment, right after it, and throughout a part with constant rates
+//! of change.
 
 use std::collections::BTreeMap;
 
@@ -14,25 +14,25 @@ use crate::obligations::dnf::{Alternatives, always_if};
 use crate::obligations::timeline::Reading;
 use crate::obligations::{Inequality, Refusal};
 
-/// How many alternatives a condition may unfold into.
+/// Limit on the alternatives of a condition.
 const MOST_ALTERNATIVES: usize = 4096;
 
-/// A number that changes at a constant rate: `value` now, `rate` per unit of time.
+/// Number that changes at a constant rate: `value` now, `rate` per unit of time.
 pub(super) struct Moving {
     pub(super) value: Linear,
     pub(super) rate: Linear,
 }
 
-/// Numbers now, and how they change.
+/// Current values, and their rates of change.
 pub(super) struct View<'a> {
     pub(super) task: &'a Task,
     pub(super) reading: Reading<'a>,
     pub(super) rates: &'a BTreeMap<FluentId, Linear>,
-    /// The schedule that is followed, and its values.
+    /// The nominal schedule, and the nominal values.
     pub(super) nominal: (&'a Schedule, &'a Valuation),
 }
 
-/// When a condition is read in the schedule that is followed, in time from now.
+/// Time, from now, at which a condition is read in the nominal schedule.
 #[derive(Clone, Copy)]
 pub(super) enum When<'t> {
     At(&'t Rational),
@@ -40,12 +40,12 @@ pub(super) enum When<'t> {
 }
 
 impl View<'_> {
-    /// A number in the schedule that is followed.
+    /// Returns the value of an expression in the nominal schedule.
     pub(super) fn nominally(&self, value: &Linear) -> Rational {
         value.value(self.nominal.0, self.nominal.1)
     }
 
-    /// Whether a condition holds in the schedule that is followed.
+    /// Returns `true` if a condition holds in the nominal schedule.
     pub(super) fn holds(&self, condition: &Condition, when: When<'_>) -> Result<bool, Refusal> {
         Ok(match condition {
             Condition::Fact(fact) => self.reading.fact(*fact)?,
@@ -70,8 +70,8 @@ impl View<'_> {
         })
     }
 
-    /// Whether one of the parts has the truth value; else the other value. Parts without numbers
-    /// decide first, so that others need not have values.
+    /// Returns `truth` if one of the parts has this truth value, else the other value. Parts
+    /// without numbers are evaluated first, so that the numbers of the others need not be defined.
     fn decided(&self, parts: &[Condition], truth: bool, when: When<'_>) -> Result<bool, Refusal> {
         for part in facts_first(parts) {
             if self.holds(part, when)? == truth {
@@ -81,7 +81,7 @@ impl View<'_> {
         Ok(!truth)
     }
 
-    /// `left - right`.
+    /// Returns `left - right`.
     pub(super) fn difference(
         &self,
         left: &Expression,
@@ -92,13 +92,13 @@ impl View<'_> {
         Ok(Moving { value, rate })
     }
 
-    /// A number now.
+    /// Returns the current value of an expression.
     pub(super) fn value(&self, expression: &Expression) -> Result<Linear, Refusal> {
         let value = self.reading.linear(expression)?;
         value.ok_or_else(|| self.obstacle(expression, "has no value"))
     }
 
-    /// By how much a number changes per unit of time, if that does not change.
+    /// Returns the rate of change of an expression, if it is constant.
     fn rate(&self, expression: &Expression) -> Result<Linear, Refusal> {
         let curved = || self.obstacle(expression, "does not change at a constant rate");
         Ok(match expression {
@@ -154,7 +154,7 @@ impl View<'_> {
         }
     }
 
-    /// How a condition can fail to be as wanted right after now.
+    /// Returns the ways in which a condition can differ from the wanted value right after now.
     pub(super) fn broken_after(
         &self,
         condition: &Condition,
@@ -179,8 +179,8 @@ impl View<'_> {
         })
     }
 
-    /// How a condition can fail to be as wanted at some moment of the open part from now until
-    /// `then`, when so much time has elapsed.
+    /// Returns the ways in which a condition can differ from the wanted value at some moment of the
+    /// open part from now until `then`, after `elapsed`.
     pub(super) fn broken_throughout(
         &self,
         (then, elapsed): (&View<'_>, &Linear),
@@ -198,7 +198,7 @@ impl View<'_> {
             let now = &demand.now.value;
             let mut broken = vec![vec![above(now, true)], vec![above(&then, true)]];
             if demand.is_strict {
-                // Happenings may fall together, so that there is no moment between them.
+                // If both happenings coincide, there is no moment between them.
                 broken.push(vec![
                     above(now, false),
                     above(&then, false),
@@ -209,7 +209,8 @@ impl View<'_> {
         })
     }
 
-    /// How a condition can fail to be as wanted, where `leaf` says it of an inequality.
+    /// Returns the ways in which a condition can differ from the wanted value. `leaf` computes them
+    /// for an inequality.
     fn broken(
         &self,
         condition: &Condition,
@@ -220,7 +221,7 @@ impl View<'_> {
             Condition::Fact(fact) => always_if(self.reading.fact(*fact)? != wanted),
             Condition::Not(part) => self.broken(part, !wanted, leaf)?,
             Condition::And(parts) | Condition::Or(parts) => {
-                // All parts have to be as wanted, or one of them.
+                // All parts must have the wanted value, or one of them.
                 if matches!(condition, Condition::And(_)) == wanted {
                     let mut any = Vec::new();
                     for part in parts {
@@ -273,8 +274,8 @@ impl View<'_> {
         Ok(product)
     }
 
-    /// A comparison, or its opposite, as inequalities that all have to hold. Of two different
-    /// numbers the greater one is known from the schedule that is followed.
+    /// Converts a comparison, or its negation, to inequalities that all have to hold. For a
+    /// disequality, the nominal schedule decides which side is greater.
     fn demands<'e>(
         &self,
         comparison: Comparison,
@@ -314,16 +315,16 @@ impl View<'_> {
     }
 }
 
-/// A number that must be at most zero, or negative.
+/// Number that must be at most zero, or negative.
 struct Demand<'e> {
     now: Moving,
-    /// It is the difference of these, or its opposite.
+    /// The number is the difference of these, or its negation.
     sides: (&'e Expression, &'e Expression),
     is_negated: bool,
     is_strict: bool,
 }
 
-/// `number > 0`, or `number >= 0`.
+/// Returns `number > 0`, or `number >= 0`.
 fn above(number: &Linear, is_strict: bool) -> Inequality {
     Inequality {
         expression: number.scaled(&Rational::from(-1)),
@@ -331,7 +332,7 @@ fn above(number: &Linear, is_strict: bool) -> Inequality {
     }
 }
 
-/// The parts, those without numbers first.
+/// Returns the parts, those without numbers first.
 fn facts_first(parts: &[Condition]) -> impl Iterator<Item = &Condition> {
     let has_numbers = |part: &&Condition| {
         let mut has = false;

@@ -23,39 +23,39 @@ use crate::obligations::timeline::{Reading, Timeline};
 use crate::obligations::{Inequality, Obligations, Refusal, Requirement};
 use part::Part;
 
-/// How many turns of events and processes there may be between two happenings of the plan.
+/// Limit on the turns of events and processes between two happenings of the plan.
 const MOST_TURNS: usize = 200;
 
-/// The state at a moment, and what has been changed since the happening before.
+/// Symbolic state at a moment, and the changes since the previous happening.
 pub(super) struct Course<'a> {
     compiler: &'a Compiler<'a>,
     nature: &'a Nature,
     node: NodeId,
     next: Option<NodeId>,
-    /// The actions under way, each with its over-all conditions that nature may break; and, of no
-    /// action, what must always hold.
+    /// Running actions, each with its over-all conditions that nature may violate. The entry
+    /// without an action holds the conditions on all states.
     running: Vec<(Option<InstanceId>, Vec<&'a Condition>)>,
-    /// The continuous changes of these.
+    /// The continuous changes of the running actions.
     drifts: Vec<(FluentId, Linear)>,
-    /// What holds and counts now.
+    /// Facts and values now.
     now: Timeline,
     at: Linear,
     rates: BTreeMap<FluentId, Linear>,
-    /// Whether each process is at work.
+    /// For each process, `true` if it is active.
     at_work: Vec<bool>,
     /// The events that have happened at this moment.
     fired: BTreeSet<usize>,
-    /// Whether the next happening must not fall together with this moment.
+    /// `true` if the next happening must not coincide with this moment.
     must_go_on: bool,
     facts: BTreeSet<FactId>,
     fluents: BTreeSet<FluentId>,
     occurred: Vec<Occurrence>,
-    /// The events that had happened before the happening.
+    /// The events before the happening.
     earlier: &'a [Occurrence],
     obligations: &'a mut Obligations,
 }
 
-/// What nature has changed.
+/// Changes made by nature.
 pub(super) struct Changed {
     pub(super) facts: Vec<(FactId, bool)>,
     pub(super) values: Vec<(FluentId, Option<Linear>)>,
@@ -63,7 +63,7 @@ pub(super) struct Changed {
 }
 
 impl<'a> Course<'a> {
-    /// Right after a happening.
+    /// Creates the course right after a happening.
     pub(super) fn after(
         (compiler, nature): (&'a Compiler<'a>, &'a Nature),
         run: &'a Run,
@@ -106,7 +106,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// What it has come to.
+    /// Returns the changes at the end of the course.
     pub(super) fn end(self) -> Changed {
         let reading = self.reading(&self.now);
         let truth = |fact: &FactId| (*fact, reading.fact(*fact).unwrap_or_default());
@@ -125,7 +125,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Lets the events happen whose conditions hold at the moment.
+    /// Executes the events whose conditions hold at the moment.
     pub(super) fn happens_now(&mut self) -> Result<(), Refusal> {
         loop {
             let mut ready = Vec::new();
@@ -142,13 +142,13 @@ impl<'a> Course<'a> {
             if ready.is_empty() {
                 return Ok(());
             }
-            // Of a happening at the same moment, the changes would come first.
+            // The changes of a happening at the same moment would come before the event.
             self.must_go_on |= self.node != NodeId::ZERO && !self.has_moved();
             self.happen(&ready, false)?;
         }
     }
 
-    /// From right after the moment to the arrival at the next happening.
+    /// Follows the course from right after the moment to the arrival at the next happening.
     pub(super) fn goes_on_until(&mut self, next: NodeId) -> Result<(), Refusal> {
         self.expect_order(next)?;
         for _ in 0..MOST_TURNS {
@@ -185,7 +185,7 @@ impl<'a> Course<'a> {
         )))
     }
 
-    /// Goes on to a turn, or a pause.
+    /// Advances to a turn, or to a pause.
     fn turn_after(&mut self, part: Part) -> Result<(), Refusal> {
         self.expect_later(&part.to)?;
         self.advance(part, false)?;
@@ -193,7 +193,7 @@ impl<'a> Course<'a> {
         self.happens_now()
     }
 
-    /// In the end.
+    /// Adds the conditions at the end of the plan.
     pub(super) fn stays(&mut self) -> Result<(), Refusal> {
         self.demand_conditions_now(true)
     }
@@ -216,7 +216,7 @@ impl<'a> Course<'a> {
             task: self.compiler.task,
             timeline,
             cut: None,
-            // Nothing drifts on a snapshot, so the moment of reading does not matter.
+            // A snapshot has no drifts, so the moment of reading does not matter.
             moment: NodeId::ZERO,
             action: action.map(|id| (plan.start(id), plan.end(id))),
             substitution: &self.compiler.substitution,
@@ -246,7 +246,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Rules that compare numbers would have to be followed while these change.
+    /// Refuses rules that compare numbers, because their value may change during a part.
     fn refuse_derived_numbers(&self, condition: &Condition, name: &str) -> Result<(), Refusal> {
         let (mut own, mut all) = (0_usize, 0_usize);
         condition.visit_fluents(&mut |_| own += 1);
@@ -269,8 +269,8 @@ impl<'a> Course<'a> {
         oblige_nature(self.obligations, requirement, assumptions, broken);
     }
 
-    /// [`demand`](Self::demand), of the course that is followed: it goes on as it does, unless the
-    /// order of what falls together is not known.
+    /// Adds the requirement ([`demand`](Self::demand)) that the course stays as in the nominal
+    /// schedule. Refused if the order of coinciding turns is unknown.
     fn expect(&mut self, course: &str, broken: Alternatives) -> Result<(), Refusal> {
         if self.is_nominally(&broken) {
             return Err(self.obstacle(
@@ -282,7 +282,7 @@ impl<'a> Course<'a> {
         Ok(())
     }
 
-    /// Whether one of the alternatives comes about in the schedule that is followed.
+    /// Returns `true` if one of the alternatives holds in the nominal schedule.
     fn is_nominally(&self, alternatives: &Alternatives) -> bool {
         let holds = |inequality: &Inequality| {
             let value = &inequality.expression;
@@ -292,7 +292,7 @@ impl<'a> Course<'a> {
         alternatives.iter().any(|case| case.iter().all(holds))
     }
 
-    /// The condition is as wanted at this moment.
+    /// Requires that the condition has the wanted value at this moment.
     fn expect_now(
         &mut self,
         condition: &Condition,
@@ -308,10 +308,10 @@ impl<'a> Course<'a> {
         self.expect(course, broken)
     }
 
-    /// The next happening does not come before this moment, nor at it where that makes a
+    /// Requires that the next happening does not come before this moment, nor at it if that makes a
     /// difference.
     fn expect_order(&mut self, next: NodeId) -> Result<(), Refusal> {
-        // Happenings of one time are followed in the order of their numbers.
+        // Simultaneous happenings are processed in the order of their numbers.
         let is_later = self.must_go_on || !self.has_moved() && next < self.node;
         let broken = Inequality {
             expression: time_of(next).minus(&self.at),
@@ -322,7 +322,7 @@ impl<'a> Course<'a> {
         self.expect(&course, vec![vec![broken]])
     }
 
-    /// The turn comes after this moment.
+    /// Requires that the turn comes after this moment.
     fn expect_later(&mut self, turn: &Linear) -> Result<(), Refusal> {
         let broken = Inequality {
             expression: turn.minus(&self.at),
@@ -332,7 +332,7 @@ impl<'a> Course<'a> {
         self.expect(course, vec![vec![broken]])
     }
 
-    /// Goes on to a later moment; `is_arrival` at the next happening.
+    /// Advances to a later moment; `is_arrival` if it is the next happening.
     fn advance(&mut self, part: Part, is_arrival: bool) -> Result<(), Refusal> {
         for (course, broken) in part.expected {
             self.expect(&course, broken)?;
@@ -340,7 +340,7 @@ impl<'a> Course<'a> {
         for (course, broken) in part.demanded {
             self.demand(&course, broken);
         }
-        // The timeline itself knows what changes because of the plan alone.
+        // The timeline already contains the changes by the plan alone.
         let moved = self.rates.keys().copied();
         (self.fluents).extend(moved.filter(|fluent| self.nature.fluents.contains(fluent)));
         self.now = part.then;

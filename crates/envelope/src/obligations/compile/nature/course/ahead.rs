@@ -1,4 +1,4 @@
-//! The moment at which something turns next.
+//! The moment of nature's next turn.
 
 use std::collections::BTreeSet;
 
@@ -11,8 +11,8 @@ use crate::linear::Linear;
 use crate::obligations::Refusal;
 
 impl Course<'_> {
-    /// The moment of the next turn before `until`: where an event's condition comes to hold, or a
-    /// process starts or stops, in the schedule that is followed.
+    /// Returns the moment of the next turn before `until`: an event's condition becomes true, or a
+    /// process starts or stops, in the nominal schedule.
     pub(super) fn next_turn(&self, until: &Linear) -> Result<Option<Linear>, Refusal> {
         let view = self.view(&self.now);
         let length = view.nominally(until) - view.nominally(&self.at);
@@ -33,7 +33,7 @@ impl Course<'_> {
             for (condition, at_work) in &conditions {
                 let is_then = view.holds(condition, When::At(&elapsed))?;
                 let is_after = view.holds(condition, When::RightAfter(&elapsed))?;
-                // On arrival at the next happening, what holds right after it is not settled yet.
+                // On arrival at the next happening, the state right after it is not known yet.
                 let is_turned = match at_work {
                     None if elapsed == length => is_then,
                     None => is_then || is_after,
@@ -51,7 +51,7 @@ impl Course<'_> {
         Ok(None)
     }
 
-    /// The moment, so much later, at which these conditions turn.
+    /// Returns the moment, nominally `elapsed` from now, at which these conditions change.
     fn moment_of(
         &self,
         view: &View<'_>,
@@ -83,8 +83,8 @@ impl Course<'_> {
     }
 }
 
-/// After how much time, in the schedule that is followed, the numbers of a condition reach its
-/// bounds; and, if that can be said, in all schedules.
+/// Returns the times from now at which the numbers of a condition reach its bounds in the nominal
+/// schedule and, if known, in all schedules.
 pub(super) fn zeros(
     view: &View<'_>,
     condition: &Condition,
@@ -95,7 +95,7 @@ pub(super) fn zeros(
     for (left, right) in &sides {
         let moving = match view.difference(left, right) {
             Ok(moving) => moving,
-            // What has no value, or changes along a curve, does no harm where a fact decides.
+            // An undefined or non-linear number is harmless if a fact decides the condition.
             Err(_) if is_decided_by_facts(view, condition)? => continue,
             Err(refusal) => return Err(refusal),
         };
@@ -111,7 +111,7 @@ pub(super) fn zeros(
     Ok(zeros)
 }
 
-/// Whether a conjunction is false because of a fact.
+/// Returns `true` if a conjunction is false because of a fact.
 fn is_decided_by_facts(view: &View<'_>, condition: &Condition) -> Result<bool, Refusal> {
     for conjunct in condition.conjuncts() {
         let mut has_numbers = false;

@@ -1,4 +1,4 @@
-//! Events that happen.
+//! Execution of events.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,8 @@ use crate::linear::Linear;
 use crate::obligations::{Inequality, Refusal};
 
 impl Course<'_> {
-    /// Some events happen at once, all in the same state; right after the moment, or at it.
+    /// Executes some events simultaneously, all in the same state; right after the moment, or at
+    /// it.
     pub(super) fn happen(&mut self, ready: &[usize], is_after: bool) -> Result<(), Refusal> {
         let events = &self.nature_of_task().events;
         for (position, &event) in ready.iter().enumerate() {
@@ -90,7 +91,8 @@ impl Course<'_> {
         Ok(())
     }
 
-    /// At one moment an event happens once, be it on arrival at a happening or because of it.
+    /// Requires that an event happens only once at one moment, either on arrival at a happening or
+    /// because of it.
     fn demand_not_again(&mut self, event: usize) {
         if self.has_moved() {
             return;
@@ -108,7 +110,8 @@ impl Course<'_> {
         self.demand(&course, vec![vec![broken]]);
     }
 
-    /// A fluent after an update; `old` is its value if it has been updated at this moment before.
+    /// Returns the value of a fluent after an update; `old` is its value if it has already been
+    /// updated at this moment.
     fn updated(
         &self,
         operator: UpdateOperator,

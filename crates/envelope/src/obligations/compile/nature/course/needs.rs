@@ -1,5 +1,5 @@
-//! The conditions that must hold throughout: the over-all ones that processes and events may break,
-//! and constraints on the course.
+//! Conditions that must hold throughout: over-all conditions that processes and events may violate,
+//! and constraints on all states.
 
 use elbowroom_model::ground::Condition;
 use elbowroom_plan::InstanceId;
@@ -20,7 +20,8 @@ impl Course<'_> {
         }
     }
 
-    /// They hold at this moment; `may_begin`: those of an action that starts here need not yet.
+    /// Requires the conditions at this moment. With `may_begin`, those of an action that starts
+    /// here are not required yet.
     pub(super) fn demand_conditions_now(&mut self, may_begin: bool) -> Result<(), Refusal> {
         let plan = &self.compiler.plan.plan;
         let node = self.node;
@@ -29,9 +30,9 @@ impl Course<'_> {
         self.demand_conditions(&begins)
     }
 
-    /// The same before anything happens at this moment; `is_next`: at the next happening, where an
-    /// action that ends there needs nothing any more. What must always hold must do so after all
-    /// that happens.
+    /// Requires the conditions at this moment before anything happens. With `is_next`, the moment
+    /// is the next happening, and an action that ends there needs nothing any more. Conditions on
+    /// all states are only required after everything has happened.
     pub(super) fn demand_conditions_on_arrival(&mut self, is_next: bool) -> Result<(), Refusal> {
         let plan = &self.compiler.plan.plan;
         let next = self.next;

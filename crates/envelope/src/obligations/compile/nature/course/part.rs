@@ -1,4 +1,4 @@
-//! What a part has to keep to, in which nothing turns and all numbers change at constant rates.
+//! Requirements on a part: an interval without turns, with constant rates of change.
 
 use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_num::Rational;
@@ -11,22 +11,23 @@ use crate::obligations::Refusal;
 use crate::obligations::dnf::Alternatives;
 use crate::obligations::timeline::Timeline;
 
-/// A part from now on.
+/// Part of the course that begins now.
 pub(super) struct Part {
     pub(super) to: Linear,
-    /// What holds and counts when it ends.
+    /// Facts and values at its end.
     pub(super) then: Timeline,
-    /// How the course can become another one than that which is followed.
+    /// Ways in which the course can deviate from the nominal one.
     pub(super) expected: Vec<(String, Alternatives)>,
-    /// How what must hold throughout can fail to.
+    /// Ways to violate the conditions that must hold throughout.
     pub(super) demanded: Vec<(String, Alternatives)>,
-    /// A moment before its end at which to look again: it is too long for one look. Of a condition
-    /// that is false, for example, one part is false at first and another one later.
+    /// An intermediate moment at which the part has to be split, because it cannot be checked as a
+    /// whole. For example, a condition may be false throughout because of one conjunct at first and
+    /// another one later.
     pub(super) pause: Option<Linear>,
 }
 
 impl Course<'_> {
-    /// The part that ends at a moment.
+    /// Returns the part that ends at a moment.
     pub(super) fn part_until(&self, to: Linear) -> Result<Part, Refusal> {
         let elapsed = to.minus(&self.at);
         let mut then = self.now.clone();
@@ -64,7 +65,7 @@ impl Course<'_> {
                 demanded.push((self.need(*id, condition), broken));
             }
         }
-        // Of several at one moment, the first that was found.
+        // Ties go to the first one found.
         let first = pauses
             .into_iter()
             .reduce(|first, other| if other.0 < first.0 { other } else { first });
@@ -77,8 +78,8 @@ impl Course<'_> {
         })
     }
 
-    /// The moments within the part at which numbers of a condition reach their bounds, if as
-    /// planned it does not count as being the same throughout.
+    /// Returns the moments within the part at which numbers of a condition reach their bounds, if
+    /// the check of the whole part does not confirm the nominal course.
     fn pause_in(
         &self,
         view: &View<'_>,

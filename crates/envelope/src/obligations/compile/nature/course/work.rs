@@ -1,4 +1,4 @@
-//! Which processes are at work, and how numbers change then.
+//! Active processes, and the rates of change that they cause.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use crate::linear::Linear;
 use crate::obligations::Refusal;
 
 impl Course<'_> {
-    /// Finds out which processes are at work right after the moment, and lets the events happen
+    /// Determines the processes that are active right after the moment, and executes the events
     /// whose conditions hold right after it.
     pub(super) fn settle(&mut self) -> Result<(), Refusal> {
         loop {
@@ -29,7 +29,7 @@ impl Course<'_> {
                 }
             }
             if ready.is_empty() {
-                // In the part that follows, no event's condition holds; that says it all.
+                // No event's condition holds in the part that follows, which is enough.
                 return Ok(());
             }
             for (course, broken) in demands {
@@ -72,7 +72,7 @@ impl Course<'_> {
         }
     }
 
-    /// The rates of all numbers that change, when these processes are at work.
+    /// Returns the rates of all numbers that change while these processes are active.
     fn rates_under(&self, on: &[bool]) -> Result<BTreeMap<FluentId, Linear>, Refusal> {
         let mut rates: BTreeMap<FluentId, Linear> = BTreeMap::new();
         for (fluent, rate) in &self.drifts {
