@@ -12,7 +12,7 @@ pub(crate) mod plan;
 pub(crate) mod report;
 pub(crate) mod run;
 pub(crate) mod serve;
-pub(crate) mod shell;
+pub(crate) mod completions;
 pub(crate) mod stn;
 mod threads;
 pub(crate) mod val;

@@ -57,7 +57,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod balance;
+mod uniform_slack;
 mod best;
 mod control;
 mod cut;
@@ -68,40 +68,40 @@ mod feasibility;
 mod frontier;
 mod guarantee;
 mod irr;
-mod known;
-mod learn;
+mod cut_pool;
+mod cut_generation;
 pub mod linear;
 mod method;
 mod objection;
 pub mod obligations;
 mod oracle;
-mod proved;
-mod ray;
+mod proof;
+mod line_search;
 pub mod reduction;
 mod repair;
 mod row;
 mod sharpen;
 pub mod soundness;
 
-pub use balance::{Balance, Share, balance};
+pub use uniform_slack::{UniformSlack, DeviationBounds, max_uniform_slack};
 pub use best::{
-    BestProof, BestRun, BestSettings, BestStep, Case, Moved, NEVER, Objective, Reasons, Source,
-    Stopped, Touch, best, volume_foot,
+    BestProof, BestRun, BestSettings, BestStep, ProofCase, BoxVariable, LOG_OF_ZERO, Objective, OptimalityProof, BoundSource,
+    BlockedVariable, TangentPoint, best, volume_foot,
 };
 pub use control::{ControlConflict, ControlGround};
-pub use cut::{Cut, Ground, ProofPart, ProofWay};
-pub use enforce::enforced;
-pub use exact::{Body, Component, ExactError, Flat, Piece, Region, RegionRow, RegionSource, exact};
+pub use cut::{Cut, Ground, ProofPart, ProofPath};
+pub use enforce::with_obligations;
+pub use exact::{BoundedRegion, Component, ExactError, Polygon, Piece, Region, RegionRow, RegionSource, exact};
 pub use frontier::Growth;
 pub use guarantee::Guarantee;
 pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};
 pub use method::Method;
 pub use objection::Objection;
 pub use oracle::Oracle;
-pub use proved::{
-    ConditionProof, ControlProof, Impossible, Refutation, ScheduleCase, Strategy, Summand,
-    TimeRule, Unfailing,
+pub use proof::{
+    ConditionProof, ControlProof, RefutedCase, Refutation, ScheduleCase, Strategy, Summand,
+    TimeRule, ImpossibilityProof,
 };
-pub use repair::{Changeable, Hindrance, Repair, RepairLimits, RepairRun, repair};
+pub use repair::{Changeable, BindingConstraint, Repair, RepairLimits, RepairRun, repair};
 pub use row::Row;
 pub use sharpen::sharpen;

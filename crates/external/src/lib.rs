@@ -45,9 +45,9 @@
 
 mod clock;
 mod command;
-mod judge;
-mod log;
-mod mailbox;
+mod plan_check;
+mod output_parser;
+mod channel;
 mod outcome;
 #[cfg(target_os = "linux")]
 mod processes;
@@ -61,9 +61,9 @@ mod supervise;
 mod workspace;
 
 pub use command::{Command, CommandError};
-pub use judge::Repair;
+pub use plan_check::Repair;
 pub use outcome::{Event, Found, Outcome, Report, Statistics};
-pub use registry::{Habits, Kind, Planner, PlannerError, REGISTRY, Registered};
+pub use registry::{ExitPhrases, Kind, Planner, PlannerError, REGISTRY, Registered};
 pub use request::{Question, Request};
 pub use run::plan;
 pub use settings::Settings;

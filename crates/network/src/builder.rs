@@ -7,7 +7,7 @@ use elbowroom_stn::uncertain::{BadLink, ContingentLink, LinkId, UncertainNetwork
 use elbowroom_stn::{Constraint, Network, NodeId};
 
 use crate::file::{Correlation, Duration, Format, GivenWait, NetworkFile};
-use crate::mistake::Report;
+use crate::report::Report;
 use crate::number::Bound;
 
 /// Network that is being read.

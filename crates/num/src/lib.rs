@@ -27,18 +27,18 @@
 //! # Ok::<(), elbowroom_num::ParseRationalError>(())
 //! ```
 
-pub mod chance;
+pub mod log_concave;
 mod delta;
 mod denominator;
-pub mod enclosed;
+pub mod enclosures;
 mod interval;
 mod rational;
 pub mod simplex;
-mod total;
+mod accumulator;
 pub mod work;
 
 pub use delta::Delta;
 pub use denominator::CommonDenominator;
 pub use interval::{End, Interval, Side};
 pub use rational::{ParseRationalError, Rational};
-pub use total::Total;
+pub use accumulator::Accumulator;

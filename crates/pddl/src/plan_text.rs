@@ -4,7 +4,7 @@ mod duration;
 mod form;
 mod line;
 mod lines;
-mod near;
+mod action_like_text;
 mod printed;
 mod read;
 mod step;

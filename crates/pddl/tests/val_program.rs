@@ -15,7 +15,7 @@ mod cases;
 #[path = "val_program/conditional.rs"]
 mod conditional;
 #[path = "val_program/course.rs"]
-mod course;
+mod trajectory;
 #[path = "val_program/equal.rs"]
 mod equal;
 #[path = "val_program/program.rs"]

@@ -50,7 +50,7 @@ use crate::parameter::ParametrizedPlan;
 pub fn read(source: impl Into<Source>, task: &Task) -> Result<ParametrizedPlan, Diagnostics> {
     let source = source.into();
     let (file, mut mistakes) = syntax::parse(&source);
-    if let Some(feature) = task.beyond_boxes() {
+    if let Some(feature) = task.unsupported_by_boxes() {
         let message = format!("networks do not respect {feature} yet, which the problem has");
         mistakes.error(0..0, message);
     }

@@ -34,20 +34,20 @@ pub mod interface;
 pub mod knowledge;
 pub mod message;
 
-mod census;
+mod discovery;
 mod goals;
 mod hub;
 mod lifecycle;
-mod mirror;
+mod problem_sync;
 mod progress;
 mod tree;
 mod world;
 
-pub use census::Census;
+pub use discovery::PerformerDiscovery;
 pub use goals::Goals;
-pub use hub::{Action, Effect, Hub, Ticket, Told};
+pub use hub::{Action, Effect, Hub, ActionHandle, ActionUpdate};
 pub use lifecycle::Lifecycle;
-pub use mirror::{Answer, Call, CallId, Key, Mirror, Seen};
+pub use problem_sync::{Answer, Call, CallId, Key, ProblemSync, ExternalChange};
 pub use progress::{Progress, plan_text};
 pub use tree::sub_goal;
 pub use world::{Command, World};

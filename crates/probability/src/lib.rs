@@ -63,10 +63,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod account;
+pub mod loss_analysis;
 mod actions;
 mod belief;
-mod circumstances;
+mod search_state;
 pub mod dispatch;
 pub mod likelihoods;
 mod model;
@@ -77,10 +77,10 @@ mod total_order;
 
 pub use actions::{Unsupported, all_actions, all_actions_under};
 pub use belief::Belief;
-pub use circumstances::{Circumstances, Running};
+pub use search_state::{SearchState, Running};
 pub use dispatch::{Choice, LayerDispatch, NextHappening, Reconsider};
-pub use likelihoods::{Flip, Likelihoods, Rate};
+pub use likelihoods::{SpontaneousChange, Likelihoods, Rate};
 pub use model::{Model, Semantics};
 pub use network::{Happenings, Loss, LossCause, PrunedNetwork, Reading, TooCoupled};
-pub use search::{Candidates, Found, OrderSearch, SearchSettings, SearchStop};
+pub use search::{Candidates, SearchResult, OrderSearch, SearchSettings, SearchStop};
 pub use total_order::{Layer, Slot, TotalOrderPlan};

@@ -40,8 +40,8 @@ mod run;
 mod stepper;
 mod stop;
 mod task;
-mod trouble;
-mod watch;
+mod errors;
+mod progress_observer;
 mod world;
 
 use pyo3::prelude::*;
@@ -68,7 +68,7 @@ mod native {
     #[pymodule_export]
     use crate::task::{Task, read};
     #[pymodule_export]
-    use crate::trouble::panic_for_test;
+    use crate::errors::panic_for_test;
 
     use pyo3::prelude::*;
 

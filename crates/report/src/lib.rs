@@ -28,10 +28,10 @@
 
 pub mod exact;
 pub mod lattice;
-pub mod line;
+pub mod schema;
 pub mod plane;
 pub mod plot;
-pub mod short;
+pub mod decimal;
 pub mod statistics;
 pub mod table;
 pub mod trace;

@@ -33,21 +33,21 @@
 //! # Ok::<(), elbowroom_text::Diagnostics>(())
 //! ```
 
-mod below;
+mod cdf;
 pub mod draw;
 mod model;
-mod paced;
+mod duration_control;
 mod pattern;
 mod sim;
-mod unreliable;
+mod fault_injection;
 
-pub use below::{Side, rounding_edge};
+pub use cdf::{Side, rounding_edge};
 pub use draw::{Distribution, Purpose};
 pub use model::{
-    Amount, Becoming, Exogenous, ExogenousChange, Failing, Failure, Hazard, Outcome, OutcomeChange,
-    Reports, Rule, Template, WorldModel,
+    Amount, FactOutcome, ExogenousEvent, ExogenousChange, FailureRule, FailureTime, Hazard, Outcome, OutcomeChange,
+    ReportReliability, Rule, Template, WorldModel,
 };
-pub use paced::{Begun, Durations, Pace, Paced};
+pub use duration_control::{StartedAction, FixedDurations, DurationController, ControlledWorld};
 pub use pattern::ActionPattern;
-pub use sim::{Seen, SimWorld};
-pub use unreliable::Unreliable;
+pub use sim::{ObservedChanges, SimWorld};
+pub use fault_injection::FaultInjector;

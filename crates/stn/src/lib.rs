@@ -49,17 +49,17 @@
 //! # Ok::<(), elbowroom_stn::NegativeCycle>(())
 //! ```
 
-pub mod branching;
+pub mod corner_search;
 mod bridges;
 mod consistency;
 mod consistent;
 mod direction;
-mod few;
+mod small_map;
 mod ids;
 mod implied;
 mod lists;
 mod minimal;
-mod moving;
+mod incremental_windows;
 mod network;
 mod paths;
 mod schedule;
@@ -74,7 +74,7 @@ pub use consistent::{Checkpoint, ConsistentNetwork};
 pub use direction::Direction;
 pub use ids::{ConstraintId, NodeId};
 pub use minimal::Minimal;
-pub use moving::{Grounds, MovingWindows, OutOfWindow, WindowEnd};
+pub use incremental_windows::{Grounds, IncrementalWindows, OutOfWindow, WindowEnd};
 pub use network::{Constraint, Network};
 pub use paths::ShortestPaths;
 pub use schedule::Schedule;
@@ -82,7 +82,7 @@ pub use weight::Weight;
 pub use windows::{Window, Windows};
 
 /// Counts a step of a propagation.
-fn spend_step() {
+fn count_step() {
     elbowroom_num::work::spend(STEP_WORK);
 }
 

@@ -28,9 +28,9 @@ mod graph;
 mod order;
 mod recheck;
 mod refutation;
-mod spoiler;
+mod adversary;
 mod strong;
-mod whole;
+mod integer_network;
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -44,10 +44,10 @@ pub use dispatchable::{Dispatchable, DispatchableEdge, Wait};
 pub use dispatcher::{Dispatcher, Missed};
 pub use extended::Extended;
 pub use recheck::Recheck;
-pub use refutation::{Part, Refutation, Refuted, Way};
-pub use spoiler::Spoiler;
+pub use refutation::{Part, Refutation, Refuted, RefutationPath};
+pub use adversary::Adversary;
 pub use strong::StrongConflict;
-pub use whole::{Unit, WholeNetwork};
+pub use integer_network::{Unit, IntegerNetwork};
 
 /// Contingent link `lower <= end - activation <= upper`; the world chooses the difference.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -168,7 +168,7 @@ impl<W: Weight> UncertainNetwork<W> {
             links,
             ending,
         };
-        match network.circle() {
+        match network.activation_cycle() {
             Some(link) => Err(BadLink::Circular(link)),
             None => Ok(network),
         }
@@ -205,7 +205,7 @@ impl<W: Weight> UncertainNetwork<W> {
     }
 
     /// Returns a link on a cycle of links, where the end of each link activates the next one.
-    fn circle(&self) -> Option<LinkId> {
+    fn activation_cycle(&self) -> Option<LinkId> {
         let mut is_known = BTreeSet::new();
         for first in self.link_ids() {
             let mut path = BTreeSet::new();

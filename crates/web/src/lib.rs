@@ -22,7 +22,7 @@ pub mod abi;
 mod answer;
 mod question;
 mod reply;
-mod watch;
+mod deadline_observer;
 
 use std::time::Duration;
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::number::{count, whole};
+use super::number::{count, integer};
 
 #[derive(Args, Debug)]
 #[command(after_long_help = FORMATS_HELP)]

@@ -10,7 +10,7 @@ use std::thread;
 use std::time::Duration;
 
 use elbowroom::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
-use elbowroom::flow;
+use elbowroom::pipeline;
 use elbowroom::model::expression::Expression;
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
@@ -243,7 +243,7 @@ fn run(job: &Job, options: &Options) -> Row {
             problem: &problem,
         },
         &settings,
-        &mut flow::repaired,
+        &mut pipeline::reschedule,
         &mut |event| {
             if let Event::Plan { found, .. } = event {
                 makespans.push(found.makespan.clone());

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use crate::builder::Builder;
 use crate::file::{Format, NetworkFile};
-use crate::mistake::Report;
+use crate::report::Report;
 use crate::number::Bound;
 
 /// Limit on nodes: more than any such file has.

@@ -4,11 +4,11 @@
 use elbowroom_num::Rational;
 use elbowroom_stn::NodeId;
 
-use super::{bound, bound_or, list, number, required};
+use super::{bound, optional_bound, list, number, required};
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Correlation, Duration, Format, GivenWait, NetworkFile};
 use crate::json::{Json, Value};
-use crate::mistake::Report;
+use crate::report::Report;
 use crate::number::Bound;
 
 /// The value of the member `format`.
@@ -92,8 +92,8 @@ fn ends(
 }
 
 fn bounds(json: &Json<'_>, report: &mut Report) -> Option<(Bound, Bound)> {
-    let lower = bound_or(json, "lower", Bound::NegativeInfinity, report);
-    let upper = bound_or(json, "upper", Bound::Infinity, report);
+    let lower = optional_bound(json, "lower", Bound::NegativeInfinity, report);
+    let upper = optional_bound(json, "upper", Bound::Infinity, report);
     lower.zip(upper)
 }
 

@@ -15,7 +15,7 @@ use elbowroom_stn::NodeId;
 use super::REFUSED_HELP;
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Format, GivenWait, NetworkFile};
-use crate::mistake::Report;
+use crate::report::Report;
 use crate::number::Bound;
 use crate::xml::{self, Element};
 

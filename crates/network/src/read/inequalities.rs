@@ -9,7 +9,7 @@ use super::{bound, point_name};
 use crate::builder::Builder;
 use crate::file::{Format, NetworkFile};
 use crate::json::Json;
-use crate::mistake::Report;
+use crate::report::Report;
 use crate::number::Bound;
 
 /// Returns `true` if a document has this form: an object that maps node numbers to lists.

@@ -14,7 +14,7 @@ use super::{bound, list, number, point_name, required};
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Correlation, Duration, Format, NetworkFile};
 use crate::json::Json;
-use crate::mistake::Report;
+use crate::report::Report;
 use crate::number::Bound;
 
 /// The number that the library writes for infinity.
