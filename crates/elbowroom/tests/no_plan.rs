@@ -24,7 +24,7 @@ use elbowroom::pddl::read_problem;
 use elbowroom::planner::{Answer, Settings, plan};
 use elbowroom::text::Source;
 use elbowroom::verify::Exact;
-use elbowroom::verify::no_plan::{MutexPair, Kind, NoPlan, NoPlanFlaw, verify_no_plan};
+use elbowroom::verify::no_plan::{Kind, MutexPair, NoPlan, NoPlanFlaw, verify_no_plan};
 use game::Random;
 
 fn task(domain: &str, problem: &str) -> Task {
@@ -138,7 +138,7 @@ fn certificate_of_weaker_problem_does_not_deny_a_plan() {
         if is_solved {
             assert!(certificate(&whole).is_err(), "{domain}\n{problem}");
         }
-        let less = draft.with_less();
+        let less = draft.smaller_variants();
         for own in less.iter().chain(std::iter::once(&draft)) {
             let (own_domain, own_problem) = own.text();
             let task = task(&own_domain, &own_problem);

@@ -24,10 +24,10 @@ use elbowroom::envelope::{Guarantee, Objective};
 use elbowroom::execute::Execution;
 use elbowroom::execution::run::{PlanningTime, RunSettings, TimeoutRule};
 use elbowroom::execution::{Entry, NoPlanner, Recorder};
-use elbowroom::pipeline;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl;
+use elbowroom::pipeline;
 use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 use sources::Origin;
@@ -191,7 +191,7 @@ fn run_of_a_random_plan_starts_under_its_reported_envelope() {
     for seed in 0..400 {
         let problem = solvable::problem(seed).expect("a problem");
         let task = Arc::new(problem.task());
-        if task.only_judged().is_some() || task.left_to_the_judge().is_some() {
+        if task.validator_only_feature().is_some() || task.unsupported_by_analysis().is_some() {
             continue;
         }
         let source = pddl::Source::new("plan", problem.plan.as_str());

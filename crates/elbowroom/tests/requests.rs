@@ -21,7 +21,9 @@ use std::sync::{Arc, Mutex};
 
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::{PlanningTime, RunSettings};
-use elbowroom::execution::{Subject, Cause, Decided, Decision, Entry, PreparedPlan, GuaranteeLevel, Recorder};
+use elbowroom::execution::{
+    Cause, Decided, Decision, Entry, GuaranteeLevel, PreparedPlan, Recorder, Subject,
+};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl;
@@ -248,7 +250,7 @@ fn plan_of_a_random_problem_is_requested_once_and_not_rejected() {
     for seed in (0..500).chain([1590]) {
         let problem = solvable::problem(seed).expect("a problem");
         let task = Arc::new(problem.task());
-        if task.only_judged().is_some() || task.left_to_the_judge().is_some() {
+        if task.validator_only_feature().is_some() || task.unsupported_by_analysis().is_some() {
             continue;
         }
         let source = pddl::Source::new("plan", problem.plan.as_str());

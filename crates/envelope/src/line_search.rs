@@ -25,7 +25,7 @@ pub(crate) struct LineSearch {
     pub(crate) most: Vec<Option<Rational>>,
 }
 
-/// Largest box along a [`Ray`], as bounds on its number.
+/// Largest box along a [`LineSearch`], as bounds on its number.
 #[derive(Clone, Debug)]
 pub(crate) struct SearchBounds {
     /// The box with this number is inside the envelope.
@@ -164,10 +164,7 @@ impl LineSearch {
 
     /// Returns the greatest number up to `most` that satisfies a cut.
     fn cut_limit(&self, cut: &Cut, most: &Rational) -> Option<Rational> {
-        let left = cut
-            .rows
-            .iter()
-            .filter_map(|row| self.row_limit(row, most));
+        let left = cut.rows.iter().filter_map(|row| self.row_limit(row, most));
         left.max()
     }
 

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::ops::ControlFlow;
 
 use elbowroom_envelope::{
-    BestRun, BestSettings, Guarantee, Objective, Oracle, Settings, balance, best, irr,
+    BestRun, BestSettings, Guarantee, Objective, Oracle, Settings, best, irr, max_uniform_slack,
 };
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan};

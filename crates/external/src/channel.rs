@@ -23,7 +23,7 @@ struct Inner {
     is_closed: bool,
 }
 
-/// Result of [`Mailbox::take`].
+/// Result of [`PlanQueue::take`].
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Received {
     Text(String),
@@ -98,6 +98,9 @@ mod tests {
 
     #[test]
     fn empty_queue_times_out() {
-        assert_eq!(PlanQueue::default().pop_timeout(Duration::ZERO), Received::TimedOut);
+        assert_eq!(
+            PlanQueue::default().pop_timeout(Duration::ZERO),
+            Received::TimedOut
+        );
     }
 }

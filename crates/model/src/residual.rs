@@ -18,7 +18,7 @@ impl Situation {
     ///
     /// Its initial state is the situation's state, and its timed initials are the pending ones,
     /// shifted. Facts and fluents keep their numbers. Running actions are not part of it; a plan
-    /// contains their remaining parts, see [`Situation::rest_of_plan`]. [`Task::problem`] is still
+    /// contains their remaining parts, see [`Situation::remaining_plan`]. [`Task::problem`] is still
     /// the original problem, with its initial facts and times. Constraints on the course of the
     /// whole plan, other than [deadlines](Task::with_deadlines), cannot be evaluated from here; the
     /// validator reports this.
@@ -38,7 +38,7 @@ impl Situation {
         rest
     }
 
-    /// Converts a plan from here to a plan of [`Situation::rest_of_task`].
+    /// Converts a plan from here to a plan of [`Situation::remaining_task`].
     ///
     /// Each running action becomes an action that starts at 0, without conditions or effects at its
     /// start, with the remaining duration and the same end.

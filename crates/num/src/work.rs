@@ -54,7 +54,7 @@ impl Stop {
 
     /// Makes computations of this thread obey this request instead of any other.
     ///
-    /// Threads that are started later do not inherit it: pass [`Stop::of_this_thread`] on to them.
+    /// Threads that are started later do not inherit it: pass [`Stop::current`] on to them.
     pub fn install_for_thread(&self) {
         STOP.set(Some(self.clone()));
     }

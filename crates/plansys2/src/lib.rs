@@ -7,7 +7,7 @@
 //! `actions_hub`. The program `elbowroom-plansys2` connects the two with standard input and output
 //! and with DDS. It is built with the feature `dds`.
 //!
-//! [`Mirror`] synchronizes `PlanSys2`'s problem expert with a run, in both directions. [`Goals`],
+//! [`ProblemSync`] synchronizes `PlanSys2`'s problem expert with a run, in both directions. [`Goals`],
 //! [`Lifecycle`], [`Progress`] and [`sub_goal`] are for the replacement of `PlanSys2`'s planner and
 //! executor.
 //!
@@ -45,9 +45,9 @@ mod world;
 
 pub use discovery::PerformerDiscovery;
 pub use goals::Goals;
-pub use hub::{Action, Effect, Hub, ActionHandle, ActionUpdate};
+pub use hub::{Action, ActionHandle, ActionUpdate, Effect, Hub};
 pub use lifecycle::Lifecycle;
-pub use problem_sync::{Answer, Call, CallId, Key, ProblemSync, ExternalChange};
+pub use problem_sync::{Answer, Call, CallId, ExternalChange, Key, ProblemSync};
 pub use progress::{Progress, plan_text};
 pub use tree::sub_goal;
 pub use world::{Command, World};

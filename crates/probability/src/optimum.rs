@@ -8,7 +8,7 @@
 //!   probability, deletions first. Otherwise nothing happens.
 //! - *End* a running action whose end condition holds. With the probability of its end, its end
 //!   effects take place likewise. Otherwise it has failed, none of them takes place, and facts
-//!   change by one of the outcomes of its failure ([`Aftermath`](crate::likelihoods::Aftermath)).
+//!   change by one of the outcomes of its failure ([`FailureOutcome`](crate::likelihoods::Aftermath)).
 //!   In both cases, it is no longer running. Instantaneous actions are tried like starts, and are
 //!   not running afterwards.
 //! - *Abandon* a running action: its end effects will not take place. This is not a step.
@@ -28,14 +28,14 @@
 
 mod process;
 mod small_world;
-mod value_iteration;
 mod table;
+mod value_iteration;
 
 use elbowroom_model::State;
 use elbowroom_plan::{InstanceId, NodeId};
 
-use crate::search_state::SearchState;
 use crate::dispatch::{Choice, NextHappening, goal_holds};
+use crate::search_state::SearchState;
 use crate::total_order::Slot;
 
 pub use process::Perturbed;

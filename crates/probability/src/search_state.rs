@@ -1,4 +1,4 @@
-//! State of a plan's execution: [`Circumstances`].
+//! State of a plan's execution: [`SearchState`].
 
 use std::collections::BTreeMap;
 
@@ -33,7 +33,7 @@ pub struct SearchState {
 pub struct Running {
     /// The action.
     pub instance: InstanceId,
-    /// Its start time; not after [`Circumstances::now`].
+    /// Its start time; not after [`SearchState::now`].
     pub start: Rational,
 }
 

@@ -15,7 +15,7 @@ use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::likelihoods;
 use elbowroom_probability::search::SearchResult;
 use elbowroom_probability::{
-    Candidates, SearchState, Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings,
+    Candidates, Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings, SearchState,
     Semantics, TotalOrderPlan,
 };
 use rand::{Rng, SeedableRng};
@@ -107,7 +107,9 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
     let mut begun = plain.beginning_with(first.clone());
     let hasty = begun.best_order(&case.circumstances, &mut |_| ControlFlow::Break(()));
     let hasty = hasty.unwrap().order;
-    let patiently = begun.best_order(&case.circumstances, &mut patient).unwrap();
+    let patiently = begun
+        .best_order(&case.circumstances, &mut never_interrupt)
+        .unwrap();
     let probability =
         |order: &Option<TotalOrderPlan>| order.as_ref().map_or(0.0, |o| o.probability);
     let (hasty, patiently) = (probability(&hasty), probability(&patiently.order));
@@ -119,7 +121,7 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
     assert!(hasty <= best_known * (1.0 + 1e-9), "{words}");
     // The second query is answered from the cache.
     let again = search
-        .best_order(&case.circumstances, &mut patient)
+        .best_order(&case.circumstances, &mut never_interrupt)
         .unwrap();
     assert_eq!((again.order, again.sequences), (found.order.clone(), 0));
     Compared {

@@ -10,8 +10,8 @@ use elbowroom_num::Rational;
 use elbowroom_plan::NodeId;
 use elbowroom_probability::dispatch::{goal_holds, lattermost_layer, never_interrupt};
 use elbowroom_probability::{
-    Choice, SearchState, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running,
-    SearchSettings, Semantics, TotalOrderPlan,
+    Choice, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running, SearchSettings,
+    SearchState, Semantics, TotalOrderPlan,
 };
 
 /// Pseudorandom numbers.
@@ -192,8 +192,8 @@ fn cached_layers_equal_recomputed_layers() {
                 && search.is_goal_settled(&now.now)
                 && goal_holds(search.model(), &now);
             // A copy, so that both continue from the same order.
-            let chosen = dispatch.clone().choose(&now, &mut patient).unwrap();
-            let followed = dispatch.choose(&now, &mut patient).unwrap();
+            let chosen = dispatch.clone().choose(&now, &mut never_interrupt).unwrap();
+            let followed = dispatch.choose(&now, &mut never_interrupt).unwrap();
             assert_eq!(chosen, followed);
             match (followed, expected) {
                 (Choice::GoalReached, _) => assert!(is_over),

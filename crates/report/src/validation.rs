@@ -9,9 +9,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use elbowroom_execution::run::{PROBLEM_GOAL_NAME, GoalReader, RunSnapshot, Verdict};
+use elbowroom_execution::run::{GoalReader, PROBLEM_GOAL_NAME, RunSnapshot, Verdict};
 use elbowroom_execution::{
-    Command, Ending, Entry, Event, GoalChange, Measured, Observation, BeliefState, Request, ActionHandle,
+    ActionHandle, BeliefState, Command, Ending, Entry, Event, GoalChange, Measured, Observation,
+    Request,
 };
 use elbowroom_model::ground::{Action, Body, Condition};
 use elbowroom_model::validate::{Execution, MeasuredAmount, Violation};
@@ -318,7 +319,13 @@ impl<'a> Validation<'a> {
         }
     }
 
-    fn process_end(&mut self, ticket: ActionHandle, time: &Rational, succeeded: bool, measured: &[Measured]) {
+    fn process_end(
+        &mut self,
+        ticket: ActionHandle,
+        time: &Rational,
+        succeeded: bool,
+        measured: &[Measured],
+    ) {
         let Some(start) = self.starts.get(&ticket) else {
             return;
         };
@@ -431,8 +438,10 @@ impl<'a> Validation<'a> {
         match verdict {
             Verdict::GoalReached => {
                 let goals = std::mem::take(&mut self.goals);
-                let unmet =
-                    self.unmet(goals.iter().map(|goal| &goal.condition), Execution::reaches_goal);
+                let unmet = self.unmet(
+                    goals.iter().map(|goal| &goal.condition),
+                    Execution::reaches_goal,
+                );
                 if !unmet.is_empty() {
                     self.record_finding(Invalid::NotReached { time, unmet });
                 } else if !self.execution.is_idle() {
@@ -441,7 +450,8 @@ impl<'a> Validation<'a> {
             }
             Verdict::Unsolvable => {
                 let mut goals = self.goals.iter();
-                let holds = goals.all(|goal| self.execution.reaches_goal(&goal.condition) == Some(true));
+                let holds =
+                    goals.all(|goal| self.execution.reaches_goal(&goal.condition) == Some(true));
                 if holds && !self.goals.is_empty() && self.execution.is_idle() {
                     self.record_finding(Invalid::Reached { time });
                 }

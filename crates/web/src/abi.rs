@@ -30,7 +30,7 @@ pub extern "C" fn elbowroom_reserve(length: usize) -> *mut u8 {
 pub unsafe extern "C" fn elbowroom_release(start: *mut u8, length: usize) {
     let slice = std::ptr::slice_from_raw_parts_mut(start, length);
     // SAFETY: by this function's contract, the memory is a boxed slice of that length from
-    // `handed_over`.
+    // `into_raw_reply`.
     drop(unsafe { Box::from_raw(slice) });
 }
 

@@ -24,7 +24,7 @@ pub(crate) struct NetworkArgs {
     #[arg(allow_negative_numbers = true)]
     pub(crate) simulate: Option<u64>,
     /// Seed of the random numbers
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer)]
     #[arg(allow_negative_numbers = true, requires = "simulate")]
     pub(crate) seed: u64,
     /// Distribution of the durations

@@ -11,7 +11,7 @@ use elbowroom::num::Rational;
 
 use super::CalendarArgs;
 use super::envelope::{BoxMethod, Guarantee, Objective, controllable};
-use super::number::{count, factor, positive, positive_or_zero, timeout, integer};
+use super::number::{count, factor, integer, positive, positive_or_zero, timeout};
 use super::plan::EMBEDDED;
 use crate::exit::Failure;
 use elbowroom_executive::http::Address;
@@ -59,11 +59,11 @@ pub(crate) struct RunArgs {
     pub(crate) planning_budget: Rational,
     /// Number of states that the embedded planner may evaluate for a plan; without it, only
     /// --planning-budget limits them
-    #[arg(long, value_name = "N", value_parser = whole)]
+    #[arg(long, value_name = "N", value_parser = integer)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) planner_states: Option<u64>,
     /// Number of states after the first plan, in search of a better one
-    #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = whole)]
+    #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = integer)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) improve_states: u64,
     /// Let a ground action overlap itself in plans of the embedded planner: start again before it has ended.
@@ -124,7 +124,7 @@ pub(crate) struct RunArgs {
         long,
         value_name = "N",
         default_value_t = 0,
-        value_parser = whole,
+        value_parser = integer,
         allow_negative_numbers = true,
         conflicts_with = "world_process"
     )]

@@ -39,8 +39,8 @@ use crate::calendar::with_calendar;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::terminal::{ERROR, styled};
 use crate::output::{self, Output};
+use crate::terminal::{ERROR, styled};
 use crate::time_limit::Stopwatch;
 use page::Page;
 use progress_line::ProgressLine;
@@ -170,7 +170,7 @@ pub(super) fn checked(
     check_vary(&task, &spec.vary).map_err(|error| {
         Failure::new(error, "`elbowroom help envelope` says what --vary can name")
     })?;
-    spec.check().map_err(contradiction)?;
+    spec.check().map_err(contradiction_failure)?;
     Ok((Arc::new(task), first))
 }
 

@@ -1,7 +1,7 @@
 //! Specification of a run as data: [`RunSpec`].
 
-mod text_form;
 mod assembly;
+mod text_form;
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ use crate::pipeline;
 pub(crate) use text_form::{as_text, listed};
 use text_form::{positive, required};
 
-pub use assembly::{FirstPlanError, SpecError, AdversaryError};
+pub use assembly::{AdversaryError, FirstPlanError, SpecError};
 
 /// Name for a run without a planner.
 pub const NO_PLANNER: &str = "none";
@@ -68,7 +68,7 @@ pub struct RunSpec {
     /// A world that ends each action at the worst time; left out if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spoiler: Option<AdversarySettings>,
-    /// The planner: [`EMBEDDED`], [`NOBODY`], or the name or command line of another one.
+    /// The planner: [`EMBEDDED`], [`NO_PLANNER`], or the name or command line of another one.
     pub planner: String,
     /// Time limit of another planner for better plans than its first, in seconds; left out if the
     /// first plan is used.

@@ -281,7 +281,7 @@ impl TimedWorld {
     }
 
     /// Returns `true` if cancelling an action may be useful for an agent that can do so at any
-    /// time: by [`Act::may_be_cancelled`], or because a later end may be better for facts that can
+    /// time: by [`ActionModel::may_be_cancelled`], or because a later end may be better for facts that can
     /// be deleted.
     pub(super) fn can_gain_by_cancelling(&self, act: usize) -> bool {
         let act = &self.acts[act];
@@ -298,7 +298,8 @@ fn latest(events: &[Event], model: &WorldModel) -> Result<f64, NotTabulated> {
             continue;
         };
         let beyond = |time: f64| {
-            let share = rule.probability_of_side(time, Side::AtMost, 0.0, model.resolution.to_f64());
+            let share =
+                rule.probability_of_side(time, Side::AtMost, 0.0, model.resolution.to_f64());
             share.map(|share| 1.0 - share)
         };
         let mut time: f64 = 1.0;

@@ -16,7 +16,7 @@ pub struct Polygon {
     pub rows: Vec<PolygonRow>,
 }
 
-/// One side of a [`Flat`]: the factors of both parameters, the bound of the sum, and `true` if the
+/// One side of a [`Polygon`]: the factors of both parameters, the bound of the sum, and `true` if the
 /// bound itself is excluded.
 type PolygonRow = ([Rational; 2], Rational, bool);
 

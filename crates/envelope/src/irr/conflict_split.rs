@@ -1,4 +1,4 @@
-//! Division of long conflicts into conditions on few ends each: [`Pieces`].
+//! Division of long conflicts into conditions on few ends each: [`ConflictSplit`].
 //!
 //! If windows follow each other, a plan may be late by a little more in each of them, until it is
 //! too late in one. There are as many such conflicts as pairs of windows, and the longer they are,

@@ -7,10 +7,10 @@ use elbowroom_model::ground::{Action, Body, Condition, FactId, FluentId, Guard};
 use elbowroom_model::{RunningAction, Task};
 use elbowroom_num::{Interval, Rational};
 
-use super::{Doubt, BeliefState, RunningActionState, decide_guards};
+use super::{BeliefState, Doubt, RunningActionState, decide_guards};
 use crate::event::ActionHandle;
 
-/// A [`Progression`] without its task and without the actions of its running instances.
+/// A [`BeliefState`] without its task and without the actions of its running instances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeliefStateParts {
     /// The present time.
@@ -25,7 +25,7 @@ pub struct BeliefStateParts {
     pub facts_on_arrival: BTreeMap<FactId, bool>,
     /// The same for values.
     pub values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
-    /// Facts that are in doubt ([`Progression::doubt`]); `facts` has their truth before.
+    /// Facts that are in doubt ([`BeliefState::doubt`]); `facts` has their truth before.
     pub doubtful_facts: BTreeMap<FactId, Vec<Doubt>>,
     /// Fluents whose values are in doubt.
     pub doubtful_values: BTreeMap<FluentId, Vec<Doubt>>,

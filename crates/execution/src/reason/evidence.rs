@@ -1,4 +1,4 @@
-//! The explanation of a reason: [`Behind`], and its text.
+//! The explanation of a reason: [`Evidence`], and its text.
 
 use std::fmt;
 

@@ -266,7 +266,7 @@ pub struct Report {
     pub reasons: Vec<Reason>,
     /// If no plan reaches the goal any more: the parts of the goal that can never become true
     /// again, and since when, as far as that is known
-    /// ([`Run::explaining`](super::Run::explaining)).
+    /// ([`Run::with_explanations`](super::Run::explaining)).
     pub dead_end: Vec<Reason>,
     /// The number of actions started.
     pub starts: usize,

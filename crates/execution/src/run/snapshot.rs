@@ -3,7 +3,7 @@
 //!
 //! There are two kinds of such moments. When a plan is adopted, the executor forgets the earlier
 //! one, and its further state follows from the plan and the belief. When the run is idle and no
-//! action is running, there is no plan. A run that is restored from a [`Stand`] makes the same
+//! action is running, there is no plan. A run that is restored from a [`RunSnapshot`] makes the same
 //! decisions as this one. To keep the snapshot small, the run forgets part of its past at these
 //! moments, whether or not its record is rotated: late reports on actions that ended long ago are
 //! ignored from then on. Only the texts of explanations and reports depend on the length of the
@@ -15,13 +15,13 @@ use elbowroom_model::{Situation, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use super::action_log::KnownStart;
-use super::work_queue::PendingStep;
-use super::plan_start::PlanStart;
 use super::goals::OpenGoal;
+use super::plan_start::PlanStart;
+use super::work_queue::PendingStep;
 use super::{RefusalBackoff, Run, Verdict};
-use crate::event::{GoalTerms, ActionHandle};
-use crate::executor::PlanEvent;
 use crate::belief_state::BeliefState;
+use crate::event::{ActionHandle, GoalTerms};
+use crate::executor::PlanEvent;
 
 /// Snapshot of an executive that adopts a plan, or is idle with no action running.
 #[derive(Clone, Debug)]
@@ -259,7 +259,8 @@ impl Run<'_> {
             RunPhase::Adopting(takes_up) => {
                 let task = self.task_with_goals(&problem, &takes_up.goals);
                 self.restore_goal_change(takes_up.pending_goal_change.clone());
-                self.work_queue.push(PendingStep::RestoreAdoption(task, takes_up));
+                self.work_queue
+                    .push(PendingStep::RestoreAdoption(task, takes_up));
             }
         }
         self

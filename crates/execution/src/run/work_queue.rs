@@ -9,12 +9,12 @@ use elbowroom_num::Rational;
 use super::plan_start::{PlanStart, preparation_failure};
 use super::snapshot::PlanAdoption;
 use super::{Next, Run, Stop};
-use crate::event::{Command, ActionHandle};
-use crate::executor::{PreparedPlan, PlanEvent};
+use crate::event::{ActionHandle, Command};
+use crate::executor::{PlanEvent, PreparedPlan};
 use crate::preparation::PrepareError;
 use crate::reason::{Cause, Reason};
 
-/// A task. All tasks are instantaneous in the world, except for [`Todo::Pass`] and [`Todo::Close`].
+/// A task. All tasks are instantaneous in the world, except for [`PendingStep::Wait`] and [`PendingStep::Close`].
 pub(super) enum PendingStep {
     /// Begin with this plan, or make one.
     Begin(Option<TimeTriggeredPlan>),
@@ -70,7 +70,9 @@ impl Run<'_> {
                 // A given plan is not shifted, unlike the remaining steps of a late plan.
                 let verdict = validate(&self.task, &plan, &validate::Settings::default());
                 if let Verdict::Invalid(violation) = verdict {
-                    return Err(preparation_failure(&PrepareError::Invalid(Box::new(violation))));
+                    return Err(preparation_failure(&PrepareError::Invalid(Box::new(
+                        violation,
+                    ))));
                 }
                 let situation = Situation::initial(&self.task);
                 self.adopt_plan(PlanStart::of(&plan, &situation, &[]));
@@ -94,7 +96,8 @@ impl Run<'_> {
             PendingStep::Adopt(made) => self.adopt(made),
             PendingStep::AdoptPrepared(mission) => self.begin_prepared_plan(&mission)?,
             PendingStep::RestoreAdoption(task, it) => {
-                self.work_queue.push(PendingStep::ReportNews(it.plan_events.clone()));
+                self.work_queue
+                    .push(PendingStep::ReportNews(it.plan_events.clone()));
                 let course = PlanStart {
                     plan: &it.plan,
                     situation: &it.situation,

@@ -26,7 +26,7 @@ pub enum ReadResult {
     Line(String),
     /// More than [`LONGEST_LINE`] bytes without a line feed.
     LineTooLong,
-    /// More than [`LONGEST_ANSWER`] unread bytes.
+    /// More than [`MAX_ANSWER`] unread bytes.
     AnswerTooLong,
     /// No line arrived before the timeout.
     Timeout,

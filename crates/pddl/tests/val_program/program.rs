@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use elbowroom_model::Task;
-use elbowroom_model::validate::{ViolationKind, Settings, Verdict, validate};
+use elbowroom_model::validate::{Settings, Verdict, ViolationKind, validate};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan, read_problem};
 

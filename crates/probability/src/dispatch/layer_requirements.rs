@@ -1,4 +1,4 @@
-//! Index of the layers of an order that fit, updated incrementally: [`Demands`].
+//! Index of the layers of an order that fit, updated incrementally: [`LayerRequirements`].
 
 use std::collections::BTreeMap;
 

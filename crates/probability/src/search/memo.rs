@@ -16,8 +16,8 @@ use elbowroom_plan::{InstanceId, Node};
 use indexmap::IndexMap;
 
 use super::nominal::{Nominal, Truth};
-use super::time_slack::TimeSlack;
 use super::separations::Separations;
+use super::time_slack::TimeSlack;
 use crate::model::{Model, Requirement, visit_facts};
 use crate::network::{Number, PrunedNetwork, Snapshot};
 
@@ -40,7 +40,7 @@ struct Key {
     /// `true` if the last happening is a timed initial. Such a sequence may not be an order; see
     /// `OrderSearch::may_be_over`.
     is_timed_last: bool,
-    /// If facts change with time: see [`PrunedNetwork::times_to_come`].
+    /// If facts change with time: see [`PrunedNetwork::pending_times`].
     times: Vec<i64>,
     truths: Vec<Truth>,
     numbers: Vec<Number>,

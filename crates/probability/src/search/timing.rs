@@ -5,12 +5,12 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 
 use super::separations::Separations;
-use crate::search_state::SearchState;
 use crate::model::Model;
+use crate::search_state::SearchState;
 
 /// The whole network of an order, happening by happening.
 ///
-/// The search itself needs less, and uses a faster method ([`super::room::Rooms`]).
+/// The search itself needs less, and uses a faster method ([`super::room::TimeSlacks`]).
 #[derive(Clone, Debug)]
 pub(super) struct Timing<'s> {
     separations: &'s Separations,

@@ -8,7 +8,7 @@
 //! conditions are satisfied: the start comes after the happenings at that time that make the
 //! literal true, and the end before those that make it false. Such an order exists unless starts,
 //! or ends, wait for each other in a cycle. Literals for which a cycle is possible are left out of
-//! [`Process::over_all`] ([`leave_out_circles`]), and so are all literals of an action that may
+//! [`Process::over_all`] ([`drop_cyclic_literals`]), and so are all literals of an action that may
 //! have duration 0.
 //!
 //! Numbers and disjunctions of over-all conditions are left out as well.
@@ -245,7 +245,10 @@ impl Process {
         let flows = self
             .durative()
             .is_some_and(|body| !body.continuous.is_empty());
-        is_fixed && self.initial_start.is_none() && !flows && snaps.into_iter().all(|s| !s.changes_numbers)
+        is_fixed
+            && self.initial_start.is_none()
+            && !flows
+            && snaps.into_iter().all(|s| !s.changes_numbers)
     }
 }
 

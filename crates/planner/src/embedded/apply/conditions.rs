@@ -151,14 +151,15 @@ impl Stepper<'_> {
             .then_some(())
     }
 
-    /// As [`keeps_conditions`](Self::keeps_conditions), where numbers depend on times and are
+    /// As [`preserves_conditions`](Self::keeps_conditions), where numbers depend on times and are
     /// watched as they change.
     fn preserves_facts(&self, state: &State) -> Option<()> {
         let symbolic = state.symbolic.as_ref()?;
         let may_pass = |test: u32, open: &OpenAction| {
             let mut is_governed = false;
             let difference = &self.compiled.tests[test as usize].difference;
-            difference.visit_fluents(&mut |fluent| is_governed |= symbolic.is_time_dependent(fluent));
+            difference
+                .visit_fluents(&mut |fluent| is_governed |= symbolic.is_time_dependent(fluent));
             is_governed
                 || difference.reads_duration()
                 || state.test_holds(self.compiled, test, open.duration.as_ref())

@@ -99,7 +99,7 @@ mod threaded {
         }
     }
 
-    /// As [`side_by_side`](super::side_by_side), with several threads. The calling thread only
+    /// As [`run_parallel`](super::side_by_side), with several threads. The calling thread only
     /// receives, since `hear` may be bound to it.
     pub(super) fn run_threads<R: Send>(
         jobs: Vec<Job<'_, R>>,

@@ -134,7 +134,10 @@ impl Unfolding<'_> {
                     lifted_number(task, right),
                 );
                 let matter = LiteralSubject::Number(self.numbers.position(number));
-                Some(vec![vec![Literal { subject, truth }]])
+                Some(vec![vec![Literal {
+                    subject: matter,
+                    truth,
+                }]])
             }
             ground::Condition::Fact(fact) if task.is_derived(*fact) => {
                 if self.open.contains(fact) {
@@ -150,7 +153,10 @@ impl Unfolding<'_> {
             ground::Condition::Fact(fact) => {
                 let (predicate, objects) = task.atom(*fact);
                 let matter = LiteralSubject::Fact(predicate, objects);
-                Some(vec![vec![Literal { subject, truth }]])
+                Some(vec![vec![Literal {
+                    subject: matter,
+                    truth,
+                }]])
             }
             ground::Condition::Not(part) => self.clauses(part, !truth),
             ground::Condition::And(parts) => self.joined(parts, truth, truth),
