@@ -211,7 +211,7 @@ fn whatever_happens_while_plans_are_made_ready_what_is_done_is_valid_and_plays_b
             is_ready |= line.contains("\"event\":\"plan\"");
             *seen.entry("begun meanwhile").or_default() += usize::from(is_start(line) && !is_ready);
         }
-        for (what, note) in [("kept", "is kept"), ("outdated", "while the plan was made")] {
+        for (what, note) in [("kept", "is kept"), ("outdated", "events during planning")] {
             let notes = told.notes.iter().filter(|it| it.contains(note));
             *seen.entry(what).or_default() += notes.count();
         }
