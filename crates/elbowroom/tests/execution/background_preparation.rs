@@ -225,7 +225,7 @@ fn random_events_during_preparation_keep_run_valid_and_replayable() {
             is_ready |= line.contains("\"event\":\"plan\"");
             *seen.entry("begun meanwhile").or_default() += usize::from(is_start(line) && !is_ready);
         }
-        for (what, note) in [("kept", "is kept"), ("outdated", "while the plan was made")] {
+        for (what, note) in [("kept", "is kept"), ("outdated", "events during planning")] {
             let notes = told.notes.iter().filter(|it| it.contains(note));
             *seen.entry(what).or_default() += notes.count();
         }
