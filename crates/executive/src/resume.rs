@@ -106,8 +106,7 @@ impl InterruptedRun {
         }
         let read = |journal: &Journal| {
             let stored = Stored::read(&journal.text);
-            stored
-                .map_err(|error| unreadable_journal_error(&name, &error.to_string(), OTHER_VERSION))
+            stored.map_err(|error| other_version_error(&name, &error))
         };
         let mut stored = read(&journal)?;
         if let Some(end) = end_by_world(&stored.lines) {
@@ -209,15 +208,10 @@ impl InterruptedRun {
         } = settings;
         let name = path.display().to_string();
         let source = WorldSource::of(&spec, embedded)?;
-        let wrong = |error: &dyn fmt::Display| {
-            unreadable_journal_error(&name, &error.to_string(), OTHER_VERSION)
-        };
+        let wrong = |error: &dyn fmt::Display| other_version_error(&name, error);
         // Before any other fact is mentioned: the table of facts has to be as it was.
         let snapshot = stored.snapshot().map_err(|error| wrong(&error))?;
-        let stand = snapshot
-            .as_ref()
-            .map(|it| it.to_run_snapshot(task))
-            .transpose();
+        let stand = snapshot.as_ref().map(|it| it.restored(task)).transpose();
         let stand = stand.map_err(|why| wrong(&format!("line 2: {why}")))?;
         let now = snapshot.as_ref().map(|it| it.now().clone());
         let first = spec.has_plan.then(|| stored.first_plan(task));
@@ -303,6 +297,11 @@ impl InterruptedRun {
 /// Advice for an intact journal that cannot be interpreted.
 const OTHER_VERSION: &str = "it may be of another version of this program: go on with that one, or begin a new \
                              run with another journal";
+
+/// Error of a journal that another version has written.
+fn other_version_error(name: &str, error: &dyn fmt::Display) -> Error {
+    unreadable_journal_error(name, &error.to_string(), OTHER_VERSION)
+}
 
 /// Returns the error for a journal that cannot be resumed.
 fn unreadable_journal_error(name: &str, message: &str, advice: &str) -> Error {

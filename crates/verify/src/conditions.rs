@@ -96,7 +96,7 @@ impl Checker<'_> {
                     }
                 }
                 FailureCase::Never(sum) => {
-                    self.check_contradiction(sum, (&differences, &[]), self.intervals)?
+                    self.check_contradiction(sum, (&differences, &[]), self.intervals)?;
                 }
                 FailureCase::Ways(ways) => {
                     for way in ways {

@@ -154,7 +154,7 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
         match origin {
             Edge::TimeZero => {}
             Edge::AtLeast(constraint) => {
-                needs.extend(describe_lower_bound(explainer, constraint, valuation))
+                needs.extend(describe_lower_bound(explainer, constraint, valuation));
             }
             Edge::AtMost(constraint) => {
                 let next = walked[(position + 1) % walked.len()];

@@ -76,7 +76,7 @@ impl BeliefState {
         let motion = self.motion().unwrap_or_default();
         let mut is_moving = false;
         self.task.visit_fluents_of(condition, &mut |fluent| {
-            is_moving |= motion.is_changing(fluent)
+            is_moving |= motion.is_changing(fluent);
         });
         is_moving
     }

@@ -575,7 +575,7 @@ impl Run<'_> {
         let reason = search.reason.clone();
         match self.next_attempt(search.guess) {
             NextAttempt::Guess(guess) => {
-                self.search(reason, guess, ExecutionDuringSearch::RunningActionsOnly)
+                self.search(reason, guess, ExecutionDuringSearch::RunningActionsOnly);
             }
             NextAttempt::CancelOverdue => self.cancel_overdue(reason),
             NextAttempt::ContinuePlan => {

@@ -456,7 +456,7 @@ impl Simulation {
         for it in &seen {
             match it {
                 ExternalChange::Fact(it, truth) => {
-                    self.believe(it.trim_matches(['(', ')']), *truth)
+                    self.believe(it.trim_matches(['(', ')']), *truth);
                 }
                 ExternalChange::Value(_, value) => self.count(*value),
             }

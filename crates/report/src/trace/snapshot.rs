@@ -206,7 +206,7 @@ impl SnapshotLine {
     /// # Errors
     /// A message if the task lacks some of these facts, numbers or actions, or has others before
     /// them.
-    pub fn to_run_snapshot(&self, task: &Arc<Task>) -> Result<RunSnapshot, String> {
+    pub fn restored(&self, task: &Arc<Task>) -> Result<RunSnapshot, String> {
         for (index, name) in self.facts.keys().enumerate() {
             if fact(task, name)? != FactId(to_u32(index)) {
                 return Err(position_error(name));

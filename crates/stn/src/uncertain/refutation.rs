@@ -111,7 +111,7 @@ impl<W: Weight> UncertainNetwork<W> {
                             cycle: vec![steps],
                             is_flat: true,
                         }
-                    }))
+                    }));
                 }
                 Err(RefutationLimit::Long) => {}
             }

@@ -36,7 +36,7 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
     let task = Arc::new(super::task(&spec, output)?);
     let snapshot = stored.snapshot();
     let snapshot = snapshot.map_err(|error| unreadable(error.to_string()))?;
-    let stand = snapshot.map(|it| it.to_run_snapshot(&task)).transpose();
+    let stand = snapshot.map(|it| it.restored(&task)).transpose();
     let stand = stand.map_err(|why| unreadable(format!("line 2: {why}")))?;
     let first = if spec.has_plan {
         let first = stored.first_plan(&task);

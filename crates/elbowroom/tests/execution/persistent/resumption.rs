@@ -138,7 +138,7 @@ fn run_resumed_from_idle_snapshot_behaves_identically() {
             let stored = Stored::read(&format!("{header}\n{snapshot}\n{rest}\n")).expect("whole");
             let task = example_task();
             let snapshot = stored.snapshot().expect("a snapshot");
-            let rested = snapshot.map(|it| it.to_run_snapshot(&task).expect("of this task"));
+            let rested = snapshot.map(|it| it.restored(&task).expect("of this task"));
             assert!(rested.is_some(), "the snapshot is read");
             let mut replay = Replay::new(&stored, Arc::clone(&task));
             let interruption = replay.interruption();
@@ -209,7 +209,7 @@ fn snapshot_of_earlier_format_can_be_resumed() {
     let stored = Stored::read(&format!("{header}\n{earlier}\n")).expect("whole");
     let task = example_task();
     let line = stored.snapshot().expect("of the form").expect("there");
-    let stand = line.to_run_snapshot(&task).expect("of this task");
+    let stand = line.restored(&task).expect("of this task");
     assert!(matches!(stand.phase, RunPhase::Idle { .. }) && stand.goals.open.is_empty());
     assert!(stand.starts.is_empty() && stand.started > 0 && !stand.is_paused);
     let (now, first) = (stand.belief.time().clone(), stand.started as u64);
@@ -263,7 +263,7 @@ fn snapshot_of_another_problem_is_rejected() {
     let stored = read(&other).expect("it can be read");
     let line = stored.snapshot().expect("a snapshot").expect("there");
     let error = line
-        .to_run_snapshot(&example_task())
+        .restored(&example_task())
         .expect_err("there is no such fact");
     assert!(error.contains("no fact `(steam)`"), "{error}");
     let other = read(&snapshot.replacen("\"now\"", "\"then\"", 1)).expect("it can be read");

@@ -214,7 +214,7 @@ impl Case {
         let stored = Stored::read(&format!("{}\n", all.join("\n"))).expect("whole");
         let task = self.task();
         let line = stored.snapshot().expect("a snapshot");
-        let stand = line.map(|it| it.to_run_snapshot(&task).expect("of this task"));
+        let stand = line.map(|it| it.restored(&task).expect("of this task"));
         assert_eq!(stand.is_some(), snapshot.is_some());
         let mut replay = Replay::new(&stored, Arc::clone(&task));
         let interruption = replay.interruption();
@@ -345,10 +345,7 @@ fn mismatched_snapshot_is_rejected() {
         assert!(busy.contains(from), "{busy}");
         let stored = Stored::read(&format!("{HEADER}\n{}\n", busy.replace(from, to)));
         let error = match stored.expect("a trace").snapshot() {
-            Ok(line) => line
-                .expect("there")
-                .to_run_snapshot(&case.task())
-                .expect_err(from),
+            Ok(line) => line.expect("there").restored(&case.task()).expect_err(from),
             Err(error) => error.to_string(),
         };
         assert!(error.contains(why), "{error}");
@@ -370,7 +367,7 @@ fn snapshot_of_busy_run_contains_its_state() {
     for snapshot in snapshots {
         let stored = Stored::read(&format!("{HEADER}\n{snapshot}\n")).expect("whole");
         let line = stored.snapshot().expect("a snapshot").expect("there");
-        let stand = line.to_run_snapshot(&case.task()).expect("of this task");
+        let stand = line.restored(&case.task()).expect("of this task");
         let RunPhase::Adopting(it) = &stand.phase else {
             continue;
         };

@@ -275,7 +275,7 @@ impl RolloutExecutor {
         });
         self.is_result_unchanged = rehearsed.are_alternatives_skipped || running.is_empty();
         match rehearsed.choice {
-            RolloutChoice::FollowExecutor => self.to_run_steps(kept, moment.now),
+            RolloutChoice::FollowExecutor => self.adapt_commands(kept, moment.now),
             RolloutChoice::Replan => {
                 let about = Subject::SuccessProbabilities {
                     present: rehearsed.executor_value,
@@ -295,7 +295,7 @@ impl RolloutExecutor {
             RolloutChoice::HandOver(..)
                 if kept.decision == Decision::Replan && self.hand_overs >= MAX_HAND_OVERS =>
             {
-                self.to_run_steps(kept, moment.now)
+                self.adapt_commands(kept, moment.now)
             }
             RolloutChoice::HandOver(executor, mission) => {
                 if kept.decision == Decision::Replan {
@@ -303,7 +303,7 @@ impl RolloutExecutor {
                 }
                 match self.hand_over(moment, executor, &mission) {
                     Some(decided) => decided,
-                    None => self.to_run_steps(kept, moment.now),
+                    None => self.adapt_commands(kept, moment.now),
                 }
             }
         }
@@ -335,12 +335,12 @@ impl RolloutExecutor {
             ..*moment
         });
         self.takeover_executor = Some(executor);
-        Some(self.to_run_steps(decided, moment.now))
+        Some(self.adapt_commands(decided, moment.now))
     }
 
     /// Translates a decision of the present executor to the run's step numbers. A wait ends at the
     /// latest when the next rehearsal is due.
-    fn to_run_steps(&mut self, mut decided: Decided, now: &Rational) -> Decided {
+    fn adapt_commands(&mut self, mut decided: Decided, now: &Rational) -> Decided {
         match &mut decided.decision {
             Decision::Start(orders) => {
                 for order in orders {
@@ -460,7 +460,7 @@ impl Executor for RolloutExecutor {
             Some(before) if self.is_rollout_needed(moment, &kept) => {
                 self.decide_by_rollout(moment, &news, before, kept)
             }
-            _ => self.to_run_steps(kept, moment.now),
+            _ => self.adapt_commands(kept, moment.now),
         }
     }
 

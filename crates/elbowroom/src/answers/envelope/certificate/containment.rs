@@ -184,7 +184,7 @@ fn append_case(why: &ImpossibilityProof, cases: &mut Vec<FailureCase>) -> usize 
     match why {
         ImpossibilityProof::NoMoment(sum) => cases.push(FailureCase::Never(summands(sum))),
         ImpossibilityProof::Cases(ways) => {
-            cases.push(FailureCase::Ways(ways.iter().map(to_way).collect()))
+            cases.push(FailureCase::Ways(ways.iter().map(to_way).collect()));
         }
         ImpossibilityProof::Split(event, after, before) => {
             let event = event.index();
