@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use elbowroom_text::nearest;
 use jiff::civil::Date;
 
-use crate::zone::{Objection, day_number};
+use crate::zone::{TextError, day_number};
 
 /// Set of days, numbered from 1970-01-01.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -35,7 +35,7 @@ impl Days {
     ///
     /// # Errors
     /// The text names no days.
-    pub(crate) fn add(&mut self, text: &str, named: &NamedDays) -> Result<(), Objection> {
+    pub(crate) fn add(&mut self, text: &str, named: &NamedDays) -> Result<(), TextError> {
         let text = text.trim();
         if let Some(days) = named.get(text) {
             self.include(days);
@@ -123,7 +123,7 @@ fn date(text: &str) -> Option<i64> {
     Some(day_number(date))
 }
 
-fn unknown(text: &str, named: &NamedDays) -> Objection {
+fn unknown(text: &str, named: &NamedDays) -> TextError {
     let message = format!("`{text}` is not a day");
     let words = WEEKDAYS
         .iter()

@@ -6,7 +6,7 @@ use elbowroom_text::Span;
 use serde::Deserialize;
 use toml::{Spanned, Value};
 
-use crate::zone::Objection;
+use crate::zone::TextError;
 
 /// Calendar file.
 #[derive(Deserialize)]
@@ -54,7 +54,7 @@ pub(crate) fn text(value: &Value) -> Option<String> {
 ///
 /// # Errors
 /// The value is neither a text nor a list of texts, or the list is empty.
-pub(crate) fn texts(value: &Spanned<Value>) -> Result<(Span, Vec<String>), Objection> {
+pub(crate) fn texts(value: &Spanned<Value>) -> Result<(Span, Vec<String>), TextError> {
     let all: Option<Vec<String>> = match value.get_ref() {
         Value::Array(elements) => elements.iter().map(text).collect(),
         other => text(other).map(|text| vec![text]),

@@ -8,7 +8,7 @@ use toml::{Spanned, Value};
 
 use crate::days::NamedDays;
 use crate::file::text;
-use crate::zone::{Objection, Zone};
+use crate::zone::{TextError, Zone};
 
 /// Data shared by all sections of a calendar file.
 pub(crate) struct Frame {
@@ -28,7 +28,7 @@ impl Frame {
 
 /// Returns a value, or adds its error to the report.
 pub(crate) fn noted<T>(
-    outcome: Result<T, Objection>,
+    outcome: Result<T, TextError>,
     span: &Span,
     report: &mut Report,
 ) -> Option<T> {

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use crate::zone::{DAY, Objection, SECOND};
+use crate::zone::{DAY, SECOND, TextError};
 
 /// Reads hours as a range of milliseconds since the beginning of the day. The range ends on the
 /// next day if its end is not later than its start: `22 to 6`.
 ///
 /// # Errors
 /// The text has another form, or the hours are empty.
-pub(crate) fn read(text: &str) -> Result<Range<i64>, Objection> {
+pub(crate) fn read(text: &str) -> Result<Range<i64>, TextError> {
     let ends = text.split_once(" to ");
     let ends = ends.and_then(|(start, end)| Some((time(start)?, time(end)?)));
     let Some((start, end)) = ends.filter(|(start, _)| *start < DAY) else {

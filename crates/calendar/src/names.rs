@@ -4,7 +4,7 @@ use elbowroom_model::Problem;
 use elbowroom_model::problem::{ObjectId, Variable};
 use elbowroom_text::nearest;
 
-use crate::zone::Objection;
+use crate::zone::TextError;
 
 /// Kind of a pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub(crate) enum Kind {
 ///
 /// # Errors
 /// The problem has no such fact or fluent, or it is derived.
-pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<String>, Objection> {
+pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<String>, TextError> {
     let inner = text.trim();
     let inner = inner.strip_prefix('(').and_then(|it| it.strip_suffix(')'));
     let inner = inner.filter(|inner| !inner.contains(['(', ')']));
@@ -80,7 +80,7 @@ impl Kind {
         }
     }
 
-    fn parameters<'p>(self, name: &str, problem: &'p Problem) -> Result<&'p [Variable], Objection> {
+    fn parameters<'p>(self, name: &str, problem: &'p Problem) -> Result<&'p [Variable], TextError> {
         match self {
             Self::Fact => {
                 let Some(predicate) = problem.predicate(name) else {
@@ -111,7 +111,7 @@ impl Kind {
     }
 }
 
-fn unknown<'n>(what: &str, name: &str, known: impl Iterator<Item = &'n str> + Clone) -> Objection {
+fn unknown<'n>(what: &str, name: &str, known: impl Iterator<Item = &'n str> + Clone) -> TextError {
     let message = format!("the domain has no {what} `{name}`");
     let advice = match nearest(name, known.clone()) {
         Some(near) => format!("did you mean `{near}`?"),
@@ -125,7 +125,7 @@ fn objects(
     argument: &str,
     parameter: &Variable,
     problem: &Problem,
-) -> Result<Vec<ObjectId>, Objection> {
+) -> Result<Vec<ObjectId>, TextError> {
     if argument == "_" {
         return Ok(problem.objects_of(&parameter.types).collect());
     }

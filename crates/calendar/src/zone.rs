@@ -25,14 +25,14 @@ pub(crate) struct Zone {
 }
 
 /// Message about an invalid text, and advice.
-pub(crate) type Objection = (String, String);
+pub(crate) type TextError = (String, String);
 
 impl Zone {
     /// Returns the zone of that name, such as `Europe/Berlin` or `UTC`.
     ///
     /// # Errors
     /// There is no such zone. The advice lists the most similar names.
-    pub(crate) fn named(name: &str) -> Result<Self, Objection> {
+    pub(crate) fn named(name: &str) -> Result<Self, TextError> {
         let database = TimeZoneDatabase::bundled();
         if let Ok(rules) = database.get(name) {
             let name = rules.iana_name().unwrap_or(name).to_owned();
@@ -60,7 +60,7 @@ impl Zone {
     ///
     /// # Errors
     /// The text has another form, or the local time does not exist or exists twice.
-    pub(crate) fn instant(&self, text: &str) -> Result<i64, Objection> {
+    pub(crate) fn instant(&self, text: &str) -> Result<i64, TextError> {
         let text = text.trim();
         if let Ok(instant) = text.parse::<Timestamp>() {
             let instant = instant.as_millisecond();
@@ -104,7 +104,7 @@ impl Zone {
 
     /// Rejects an instant with an offset that the zone does not have within a year. The offset of
     /// UTC is always allowed.
-    fn with_known_offset(&self, text: &str, instant: i64) -> Result<(), Objection> {
+    fn with_known_offset(&self, text: &str, instant: i64) -> Result<(), TextError> {
         let written = text.parse::<DateTime>().ok();
         let written = written.and_then(|local| TimeZone::UTC.to_timestamp(local).ok());
         // `Z` is not an offset of a local time.

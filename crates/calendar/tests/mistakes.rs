@@ -135,7 +135,7 @@ fn begin_of_the_caller_replaces_that_of_the_file() {
 }
 
 #[test]
-fn one_mistake_is_one_message() {
+fn mistake_gives_exactly_one_message() {
     for rest in [
         "hours = \"8-17\"",
         "days = \"holidys\"",

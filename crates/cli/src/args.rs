@@ -33,7 +33,7 @@ pub(crate) use run::{FirstPlanChoice, RunArgs, RunningChoice};
 pub(crate) use serve::{CtlArgs, CtlCommand, ServeArgs};
 pub(crate) use world_check::WorldCheckArgs;
 
-use crate::look;
+use crate::terminal;
 
 /// Wider help is hard to read.
 const MAX_HELP_WIDTH: usize = 100;
@@ -91,10 +91,10 @@ impl From<Colour> for anstream::ColorChoice {
 /// Reads the command line. Where that cannot be done, or help is asked for, this ends the process.
 pub(crate) fn read(line: Vec<OsString>) -> CommandLine {
     let mut command = CommandLine::command();
-    if let Some(columns) = look::columns() {
+    if let Some(columns) = terminal::columns() {
         command = command.term_width(columns.min(MAX_HELP_WIDTH));
     }
-    let matches = command.try_get_matches_from_mut(spoken(line));
+    let matches = command.try_get_matches_from_mut(with_val_name(line));
     let matches = matches.unwrap_or_else(|error| error.exit());
     let read = CommandLine::from_arg_matches(&matches);
     read.unwrap_or_else(|error| error.format(&mut command).exit())
@@ -102,7 +102,7 @@ pub(crate) fn read(line: Vec<OsString>) -> CommandLine {
 
 /// The command line. A program that is called as VAL is has VAL's arguments, and its default
 /// tolerance, which a later `-t` overrides.
-fn spoken(mut line: Vec<OsString>) -> Vec<OsString> {
+fn with_val_name(mut line: Vec<OsString>) -> Vec<OsString> {
     let program = line.first().map(Path::new).and_then(Path::file_stem);
     if program.is_some_and(|name| name.eq_ignore_ascii_case("validate")) {
         line.splice(1..1, ["val", "-t", VAL_TOLERANCE].map(OsString::from));
@@ -361,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_exact_and_must_make_sense() {
+    fn numbers_are_exact_and_validated() {
         let parse = |precision| {
             let line = [
                 "elbowroom",

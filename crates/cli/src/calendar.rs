@@ -9,8 +9,8 @@ use elbowroom_calendar::{Calendar, Origin};
 use crate::args::CalendarArgs;
 use crate::exit::Failure;
 use crate::file;
-use crate::look::{HINT, styled};
 use crate::output::{self, Output};
+use crate::terminal::{HINT, styled};
 use elbowroom_executive::clock::{self, Clock};
 
 /// A problem with the timed initials of a calendar.
@@ -57,7 +57,7 @@ pub(crate) fn timed_problem(
 
 /// Returns the problem with the timed initials of its calendar, and the clock that runs from time 0 if
 /// the calendar begins now. `factor` is the speed of time, if it passes on a wall clock.
-pub(crate) fn dated(
+pub(crate) fn with_calendar(
     (arguments, factor): (&CalendarArgs, Option<Rational>),
     domain: &NamedText,
     problem: Source,
@@ -77,7 +77,7 @@ impl TimedProblem {
     /// units per second, if time is that of a wall clock.
     fn announce(&self, pace: Option<&Rational>) {
         let note = styled(HINT, "note");
-        output::tell(&format!("{note}: {}", self.calendar.origin()));
+        output::print_to_stderr(&format!("{note}: {}", self.calendar.origin()));
         let Some(pace) = pace.filter(|_| self.calendar.begins_now()) else {
             return;
         };
@@ -85,7 +85,7 @@ impl TimedProblem {
         if rate != Rational::ONE {
             let label = styled(HINT, "warning");
             let seconds = Rational::ONE / &self.calendar.unit_in_seconds();
-            output::tell(&format!(
+            output::print_to_stderr(&format!(
                 "{label}: the calendar begins now, but its time passes {rate} times as fast as the \
                  wall clock\n  {note}: choose `unit = \"seconds\"`, or --realtime {seconds} for a \
                  simulated world"

@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use elbowroom::text::{Diagnostics, Record};
 use serde::Serialize;
 
-use elbowroom_executive::messages::counted;
+use elbowroom_executive::messages::count_with_noun;
 
 /// The meaning of an exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,10 +54,10 @@ impl Failure {
     /// Creates a failure with advice.
     pub(crate) fn new(message: impl fmt::Display, advice: impl fmt::Display) -> Self {
         let (message, advice) = (message.to_string(), advice.to_string());
-        let label = crate::look::styled(crate::look::BAD, "error");
+        let label = crate::terminal::styled(crate::terminal::ERROR, "error");
         let mut text = format!("{label}: {message}");
         if !advice.is_empty() {
-            let label = crate::look::styled(crate::look::HINT, "help");
+            let label = crate::terminal::styled(crate::terminal::HINT, "help");
             let _ = write!(text, "\n  {label}: {advice}");
         }
         Self {
@@ -97,9 +97,9 @@ impl Failure {
     }
 
     /// Adds advice if the failure has none.
-    pub(crate) fn advised(mut self, advice: &str) -> Self {
+    pub(crate) fn with_default_advice(mut self, advice: &str) -> Self {
         if self.advice.is_none() {
-            let label = crate::look::styled(crate::look::HINT, "help");
+            let label = crate::terminal::styled(crate::terminal::HINT, "help");
             let _ = write!(self.text, "\n  {label}: {advice}");
             self.advice = Some(advice.to_owned());
         }
@@ -125,7 +125,7 @@ impl From<elbowroom_executive::Error> for Failure {
 /// Converts errors in a text to a failure.
 impl From<Diagnostics> for Failure {
     fn from(diagnostics: Diagnostics) -> Self {
-        let count = counted(diagnostics.errors().count(), "error");
+        let count = count_with_noun(diagnostics.errors().count(), "error");
         Self {
             message: count.clone(),
             advice: None,

@@ -8,7 +8,7 @@ use elbowroom::text::Source;
 
 use crate::exit::Failure;
 use crate::output;
-use elbowroom_executive::messages::plain;
+use elbowroom_executive::messages::io_error_message;
 
 /// Maximum size of a file, in bytes: larger than any plan or problem, smaller than memory.
 const LARGEST_FILE: u64 = 256 << 20;
@@ -17,7 +17,7 @@ const LARGEST_FILE: u64 = 256 << 20;
 pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
     if path.as_os_str() == "-" {
         if io::stdin().is_terminal() {
-            output::tell(&format!("reading the {what} from standard input"));
+            output::print_to_stderr(&format!("reading the {what} from standard input"));
         }
         let mut bytes = Vec::new();
         let read = io::stdin()
@@ -29,7 +29,7 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
             Err(error) => Err(Failure::new(
                 format!(
                     "cannot read the {what} from standard input: {}",
-                    plain(&error)
+                    io_error_message(&error)
                 ),
                 "",
             )),
@@ -40,7 +40,7 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
             format!(
                 "cannot read the {what} {}: {}",
                 path.display(),
-                plain(error)
+                io_error_message(error)
             ),
             advice(path, what, error),
         )

@@ -16,8 +16,8 @@ pub(crate) use elbowroom::AnyPlan;
 use crate::args::ProblemArgs;
 use crate::calendar::timed_problem;
 use crate::exit::Failure;
-use crate::look::{HINT, styled};
 use crate::output::{self, Output};
+use crate::terminal::{HINT, styled};
 use elbowroom_executive::journal::Journal;
 
 /// Reads domain and problem. Warnings go to standard error.
@@ -85,7 +85,8 @@ pub(crate) fn any_plan(
 }
 
 /// Advice if a plan with fixed times is needed and an STN plan is given.
-pub(crate) const FIXED_TIMES: &str = "give a plan with fixed times; its network is made from it";
+pub(crate) const FIXED_TIMES_ADVICE: &str =
+    "give a plan with fixed times; its network is made from it";
 
 /// Reads a plan with fixed times. `advice` is shown if the file is an STN plan.
 pub(crate) fn time_triggered(
@@ -108,8 +109,8 @@ pub(crate) fn time_triggered(
 }
 
 /// Prints advice on an invalid plan to standard error.
-pub(crate) fn tell_about_repairs() {
-    output::tell(&format!(
+pub(crate) fn advise_repair() {
+    output::print_to_stderr(&format!(
         "{}: `elbowroom envelope DOMAIN PROBLEM PLAN --repair` prints the cheapest repair",
         styled(HINT, "note"),
     ));
@@ -132,7 +133,7 @@ pub(crate) fn record(path: &Path, what: &str) -> Result<Source, Failure> {
 pub(crate) fn world(path: &Path, task: &Task) -> Result<WorldModel, Failure> {
     let text = source(path, "world")?;
     WorldModel::read(&text, task.problem()).map_err(|wrong| {
-        Failure::from(wrong).advised("docs/formats/world.md describes world files")
+        Failure::from(wrong).with_default_advice("docs/formats/world.md describes world files")
     })
 }
 

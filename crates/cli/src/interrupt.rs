@@ -11,10 +11,10 @@ use elbowroom_executive::clock::Clock;
 
 /// A second signal within this time counts as the same request: `timeout` sends two, to the program
 /// and to its group.
-const SAME_REQUEST: Duration = Duration::from_millis(300);
+const DEBOUNCE_TIME: Duration = Duration::from_millis(300);
 
 /// A second signal is ignored for this time, while actions are cancelled and the world is stopped.
-const IN_ORDER: Duration = Duration::from_secs(5);
+const SHUTDOWN_TIME: Duration = Duration::from_secs(5);
 
 /// `true` if the program must cancel actions and stop a world before it ends.
 static HAS_WORLD: AtomicBool = AtomicBool::new(false);
@@ -28,8 +28,8 @@ impl Interrupt {
     /// later one ends the program, see [`is_to_end`]. A process has only one handler, so all calls
     /// return the same flag. Computations of this thread also end early.
     pub(crate) fn listen() -> Self {
-        static LISTENED: OnceLock<Interrupt> = OnceLock::new();
-        let listened = LISTENED.get_or_init(|| {
+        static INSTALLED: OnceLock<Interrupt> = OnceLock::new();
+        let listened = INSTALLED.get_or_init(|| {
             let interrupt = Self::default();
             let flag = interrupt.clone();
             // If no handler can be installed, Ctrl-C ends the program as usual.
@@ -37,14 +37,14 @@ impl Interrupt {
             let _ = ctrlc::set_handler(move || {
                 count += 1;
                 let since = first.get_or_insert_with(Clock::start).elapsed();
-                if is_to_end(count, since, HAS_WORLD.load(Ordering::SeqCst)) {
+                if must_exit(count, since, HAS_WORLD.load(Ordering::SeqCst)) {
                     std::process::exit(Exit::Interrupted as i32);
                 }
                 flag.request();
             });
             interrupt
         });
-        listened.0.obey();
+        listened.0.install_for_thread();
         listened.clone()
     }
 
@@ -73,8 +73,12 @@ impl Interrupt {
 /// Returns `true` if a signal ends the program at once. `number` counts signals, `since_first` is
 /// the time since the first one. The third signal always ends it. The second one does unless it is
 /// the same request or a world is being stopped.
-fn is_to_end(number: u32, since_first: Duration, has_world: bool) -> bool {
-    let patience = if has_world { IN_ORDER } else { SAME_REQUEST };
+fn must_exit(number: u32, since_first: Duration, has_world: bool) -> bool {
+    let patience = if has_world {
+        SHUTDOWN_TIME
+    } else {
+        DEBOUNCE_TIME
+    };
     match number {
         0 | 1 => false,
         2 => since_first >= patience,
@@ -88,10 +92,10 @@ mod tests {
 
     use elbowroom::num::work::Stop;
 
-    use super::{Interrupt, is_to_end};
+    use super::{Interrupt, must_exit};
 
     #[test]
-    fn second_signal_waits_for_the_world_and_third_never_does() {
+    fn third_signal_does_not_wait_for_the_world() {
         let after = Duration::from_millis;
         for (milliseconds, has_world, expected) in [
             (1, false, false),
@@ -99,17 +103,17 @@ mod tests {
             (400, true, false),
             (5001, true, true),
         ] {
-            let told = is_to_end(2, after(milliseconds), has_world);
+            let told = must_exit(2, after(milliseconds), has_world);
             assert_eq!(told, expected, "{milliseconds}, {has_world}");
-            assert!(!is_to_end(1, after(milliseconds), has_world));
-            assert!(is_to_end(3, after(milliseconds), has_world));
+            assert!(!must_exit(1, after(milliseconds), has_world));
+            assert!(must_exit(3, after(milliseconds), has_world));
         }
     }
 
     #[test]
-    fn whoever_listens_again_hears_the_same() {
+    fn repeated_listen_returns_the_same_interrupt() {
         let (one, other) = (Interrupt::listen(), Interrupt::listen());
         assert_eq!(one.0, other.0);
-        assert_eq!(Stop::of_this_thread(), Some(one.0));
+        assert_eq!(Stop::current(), Some(one.0));
     }
 }

@@ -4,21 +4,21 @@
 //! does all input and output of the workspace; the library does the computations.
 
 mod args;
-mod bug;
 mod calendar;
 mod commands;
+mod deadline;
 mod exit;
 mod file;
-mod in_time;
 mod input;
 mod interrupt;
 mod limits;
-mod look;
 mod number;
 mod output;
+mod panic_hook;
 mod progress;
-mod stopwatch;
 mod table;
+mod terminal;
+mod time_limit;
 mod wrap;
 
 use std::ffi::OsString;
@@ -32,7 +32,7 @@ use output::Output;
 /// Intended for programs that do nothing else: a wrong command line, `--help`, a panic and a second
 /// Ctrl-C end the process, and the answer is printed.
 pub fn run(line: Vec<OsString>) -> u8 {
-    bug::install_hook();
+    panic_hook::install_hook();
     let CommandLine { color, command } = args::read(line);
     anstream::ColorChoice::from(color).write_global();
     let as_json = command.is_json();
@@ -51,8 +51,8 @@ pub fn run(line: Vec<OsString>) -> u8 {
         Command::Verify(arguments) => commands::verify::run(&arguments, &mut output),
         Command::Val(arguments) => commands::val::run(&arguments, &mut output),
         Command::Report(arguments) => commands::report::run(&arguments),
-        Command::Completions(arguments) => commands::shell::completions(&arguments),
-        Command::Man(arguments) => commands::shell::man(&arguments),
+        Command::Completions(arguments) => commands::completions::completions(&arguments),
+        Command::Man(arguments) => commands::completions::man(&arguments),
         Command::Serve(arguments) => commands::serve::run(&arguments, &mut output),
         Command::Ctl(arguments) => commands::ctl::run(&arguments, &mut output),
         Command::Run(arguments) => commands::run::run(&arguments, &mut output),

@@ -9,14 +9,14 @@
 use elbowroom::answers::envelope::LimitGroup;
 use unicode_width::UnicodeWidthStr;
 
-use crate::look::{FAINT, Look, STRONG, styled};
+use crate::terminal::{EMPHASIS, SECONDARY, TextLayout, styled};
 
 /// Renders the limits, one reason after the other; empty without limits.
-pub(crate) fn render(limits: &[LimitGroup], look: Look) -> String {
+pub(crate) fn render(limits: &[LimitGroup], look: TextLayout) -> String {
     if limits.is_empty() {
         return String::new();
     }
-    let mut text = format!("{}\n", styled(STRONG, "What limits the ends"));
+    let mut text = format!("{}\n", styled(EMPHASIS, "What limits the ends"));
     for limit in limits {
         push_wrapped(&mut text, &limit.reason, 2, look.width);
         for (names, label) in [
@@ -31,7 +31,7 @@ pub(crate) fn render(limits: &[LimitGroup], look: Look) -> String {
                     4,
                     look.width,
                 );
-                text.push_str(&styled(FAINT, line.trim_end()));
+                text.push_str(&styled(SECONDARY, line.trim_end()));
                 text.push('\n');
             }
         }
@@ -76,10 +76,10 @@ mod tests {
     use insta::assert_snapshot;
 
     use super::{LimitGroup, render};
-    use crate::look::Look;
+    use crate::terminal::TextLayout;
 
     #[test]
-    fn ends_with_the_same_reason_stand_together() {
+    fn ends_with_the_same_reason_are_grouped() {
         let limit = |reason: &str, lower: &[&str], upper: &[&str]| LimitGroup {
             reason: reason.to_owned(),
             lower: lower.iter().map(ToString::to_string).collect(),
@@ -91,7 +91,7 @@ mod tests {
             limit("a duration is at least 0", &["d0", "d1"], &[]),
             limit(deadline, &[], &["d0", "d1"]),
         ];
-        let text = anstream::adapter::strip_str(&render(&limits, Look::PLAIN)).to_string();
+        let text = anstream::adapter::strip_str(&render(&limits, TextLayout::PLAIN)).to_string();
         assert_snapshot!(text, @r"
         What limits the ends
           a duration is at least 0

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::exit::Failure;
 use elbowroom_executive::WarningSink;
-use elbowroom_executive::messages::plain;
+use elbowroom_executive::messages::io_error_message;
 
 /// Writes text to standard output. Escape sequences are removed if colours are not supported.
 ///
@@ -19,7 +19,7 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let written = stdout
         .write_all(text.as_bytes())
         .and_then(|()| stdout.flush());
-    survive(written, "standard output")
+    check_written(written, "standard output")
 }
 
 /// State of a command's output, for the document that `--json` requests.
@@ -61,7 +61,7 @@ impl Output {
     /// Writes a failure to standard error. With `as_json`, also writes it to standard output as a
     /// document, unless there is already one.
     pub(crate) fn fail(&mut self, failure: &Failure, as_json: bool) {
-        tell(&failure.to_string());
+        print_to_stderr(&failure.to_string());
         if as_json && !self.has_document {
             // If standard output cannot be written to, the exit code reports it.
             let _ = self.document(&failure.document());
@@ -76,22 +76,22 @@ impl Output {
     /// Writes warnings about texts to standard error.
     pub(crate) fn warn_about(&mut self, warnings: &[Diagnostic]) {
         for warning in warnings {
-            tell(&format!("{}\n", warning.render(true)));
+            print_to_stderr(&format!("{}\n", warning.render(true)));
             self.warnings.push(warning.record());
         }
     }
 }
 
 /// Writes text to standard error. A failure to write it is ignored, as there is no other channel.
-pub(crate) fn tell(text: &str) {
+pub(crate) fn print_to_stderr(text: &str) {
     let mut stderr = anstream::stderr().lock();
     let _ = writeln!(stderr, "{text}");
 }
 
 /// Writes a warning to standard error.
 pub(crate) fn warn(text: &str) {
-    let label = crate::look::styled(crate::look::WARNING, "warning");
-    tell(&format!("{label}: {text}"));
+    let label = crate::terminal::styled(crate::terminal::WARNING, "warning");
+    print_to_stderr(&format!("{label}: {text}"));
 }
 
 /// Writes a file; `-` is standard output.
@@ -107,20 +107,24 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     if path.as_os_str() == "-" {
         let mut stdout = io::stdout().lock();
         let written = stdout.write_all(bytes).and_then(|()| stdout.flush());
-        return survive(written, "standard output");
+        return check_written(written, "standard output");
     }
     std::fs::write(path, bytes).map_err(|error| {
         Failure::new(
-            format!("cannot write {}: {}", path.display(), plain(&error)),
+            format!(
+                "cannot write {}: {}",
+                path.display(),
+                io_error_message(&error)
+            ),
             "choose a file in a folder that exists and that you may write to",
         )
     })
 }
 
-fn survive(result: io::Result<()>, target: &str) -> Result<(), Failure> {
+fn check_written(result: io::Result<()>, target: &str) -> Result<(), Failure> {
     match result {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::new(
-            format!("cannot write to {target}: {}", plain(&error)),
+            format!("cannot write to {target}: {}", io_error_message(&error)),
             "",
         )),
         _ => Ok(()),

@@ -13,10 +13,10 @@ use crate::output;
 use elbowroom_executive::clock::Clock;
 
 /// Minimum duration of a search with a progress line.
-const PATIENCE: Duration = Duration::from_millis(200);
+const DISPLAY_DELAY: Duration = Duration::from_millis(200);
 
 /// Interval between frames of the spinner.
-const TURN: Duration = Duration::from_millis(250);
+const FRAME_INTERVAL: Duration = Duration::from_millis(250);
 
 /// Interval between lines if standard error is not a terminal.
 const INTERVAL: Duration = Duration::from_secs(5);
@@ -49,7 +49,7 @@ impl Progress {
 
     /// Shows a message if `elapsed` is long enough.
     pub(crate) fn show(&mut self, elapsed: Duration, message: impl FnOnce() -> String) {
-        if self.is_terminal && elapsed < PATIENCE {
+        if self.is_terminal && elapsed < DISPLAY_DELAY {
             return;
         }
         let is_terminal = self.is_terminal;
@@ -70,10 +70,10 @@ impl Progress {
     }
 
     /// Writes a permanent line above the progress line.
-    pub(crate) fn tell(&self, text: &str) {
+    pub(crate) fn print_above(&self, text: &str) {
         match &self.shown {
             Some(Shown::Overwritten(line)) => line.println(text),
-            Some(Shown::Appended(_)) | None => output::tell(text),
+            Some(Shown::Appended(_)) | None => output::print_to_stderr(text),
         }
     }
 }
@@ -91,7 +91,7 @@ fn spinner() -> ProgressBar {
         .expect("a template without mistakes");
     let line = ProgressBar::new_spinner().with_style(style);
     // The spinner turns even if no new message comes.
-    line.enable_steady_tick(TURN);
+    line.enable_steady_tick(FRAME_INTERVAL);
     line
 }
 
@@ -105,7 +105,7 @@ impl Appended {
         let _ = thread::Builder::new().spawn(move || {
             while ended.recv_timeout(INTERVAL) == Err(RecvTimeoutError::Timeout) {
                 let last = last.lock().unwrap_or_else(PoisonError::into_inner).clone();
-                output::tell(&format!("{} s: {last}", clock.elapsed().as_secs()));
+                output::print_to_stderr(&format!("{} s: {last}", clock.elapsed().as_secs()));
             }
         });
         Self {

@@ -16,8 +16,8 @@ use std::fmt::Write as _;
 use elbowroom::num::{End, Interval, Rational};
 use unicode_width::UnicodeWidthStr;
 
-use crate::look::{FAINT, Look, STRONG, WARNING, styled};
 use crate::number::{self, Rounding};
+use crate::terminal::{EMPHASIS, SECONDARY, TextLayout, WARNING, styled};
 
 /// A row of the table.
 #[derive(Clone, Debug)]
@@ -35,7 +35,7 @@ pub(crate) struct Row {
 impl Row {
     /// Returns the smaller one of the two tolerated deviations, relative to the nominal value
     /// unless that is 0.
-    pub(crate) fn room(&self) -> Rational {
+    pub(crate) fn smaller_deviation(&self) -> Rational {
         let (lower, upper) = (&self.interval.lower, &self.interval.upper);
         let distance = |end: &End| Some((end.value()? - &self.nominal).abs());
         let room = [distance(lower), distance(upper)];
@@ -47,7 +47,7 @@ impl Row {
 
     /// Returns `true` if the slack in one direction is below [`CRITICAL`] percent.
     pub(crate) fn is_critical(&self) -> bool {
-        let room = self.room();
+        let room = self.smaller_deviation();
         room.is_zero() || (!self.nominal.is_zero() && room < Rational::new(CRITICAL, 100))
     }
 
@@ -71,7 +71,7 @@ const SHORT_NAME: usize = 12;
 const GAP: usize = 2;
 
 /// Renders the rows as a table; empty without rows.
-pub(crate) fn render(rows: &[Row], look: Look) -> String {
+pub(crate) fn render(rows: &[Row], look: TextLayout) -> String {
     if rows.is_empty() {
         return String::new();
     }
@@ -108,7 +108,7 @@ pub(crate) fn render(rows: &[Row], look: Look) -> String {
         let span = format!("{sign}{scale}%");
         let _ = write!(heading, "  {span:^width$}", width = layout.bar);
     }
-    push_line(&mut table, &styled(FAINT, heading.trim_end()));
+    push_line(&mut table, &styled(SECONDARY, heading.trim_end()));
     for (row, cells) in rows.iter().zip(&cells) {
         layout.push_row(&mut table, row, cells, (&numbers, scale), look);
     }
@@ -134,10 +134,10 @@ impl Layout {
         row: &Row,
         cells: &Cells,
         (numbers, scale): (&Numbers, i64),
-        look: Look,
+        look: TextLayout,
     ) {
         let is_critical = row.is_critical();
-        let style = if is_critical { WARNING } else { STRONG };
+        let style = if is_critical { WARNING } else { EMPHASIS };
         let mark = if is_critical { '!' } else { ' ' };
         let name = pad_right(&format!("{mark}{}", row.name), self.names + 1);
         let name = styled(style, &name);
@@ -169,7 +169,7 @@ struct Cells {
 impl Cells {
     fn of(row: &Row) -> Self {
         let end = |end: &End, rounding| match end.value() {
-            Some(value) => number::between(value, &row.nominal, rounding),
+            Some(value) => number::rounded_inwards(value, &row.nominal, rounding),
             None if rounding == Rounding::Up => "-inf".to_owned(),
             None => "inf".to_owned(),
         };

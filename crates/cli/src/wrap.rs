@@ -4,7 +4,7 @@ use unicode_width::UnicodeWidthStr;
 
 /// Breaks the text into lines of at most `width` columns, if the words allow it. The first line is
 /// indented by `indent`, the others by two more.
-pub(crate) fn wrapped(text: &str, width: usize, indent: usize) -> String {
+pub(crate) fn wrap(text: &str, width: usize, indent: usize) -> String {
     let mut lines = Vec::new();
     let mut line = " ".repeat(indent);
     let mut is_empty = true;
@@ -25,13 +25,13 @@ pub(crate) fn wrapped(text: &str, width: usize, indent: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::wrapped;
+    use super::wrap;
 
     #[test]
-    fn lines_break_between_words_and_hang() {
-        let text = wrapped("one two three four", 11, 2);
+    fn lines_break_between_words_with_hanging_indent() {
+        let text = wrap("one two three four", 11, 2);
         assert_eq!(text, "  one two\n    three\n    four");
-        assert_eq!(wrapped("indivisible word", 4, 0), "indivisible\n  word");
-        assert_eq!(wrapped("", 4, 1), " ");
+        assert_eq!(wrap("indivisible word", 4, 0), "indivisible\n  word");
+        assert_eq!(wrap("", 4, 1), " ");
     }
 }

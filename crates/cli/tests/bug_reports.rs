@@ -190,7 +190,7 @@ fn each_folder_has_an_expectation() {
 }
 
 #[test]
-fn inputs_of_bug_reports_get_the_right_answers() {
+fn inputs_of_bug_reports_are_answered_correctly() {
     let Some(folder) = folder() else {
         return;
     };

@@ -50,12 +50,12 @@ fn parts_add_up(experiment: &str, whole: &[&str]) {
 }
 
 #[test]
-fn parts_made_by_other_processes_add_up_to_the_whole() {
+fn parts_of_separate_processes_merge_to_the_whole() {
     parts_add_up("crates/cli/tests/files/late-drives.toml", &[]);
 }
 
 #[test]
-fn so_do_those_of_experiments_in_perturbed_worlds() {
+fn perturbed_parts_of_separate_processes_merge_to_the_whole() {
     parts_add_up("experiments/olisipo_sf3.toml", &["--trials", "15"]);
 }
 
@@ -109,7 +109,7 @@ fn each_trial(experiment: &str, arguments: &[&str], name: &str) -> (Vec<String>,
 }
 
 #[test]
-fn each_trial_has_a_row_of_its_own_whatever_the_number_of_threads() {
+fn trials_have_distinct_rows_for_any_number_of_threads() {
     let experiment = "crates/cli/tests/files/late-drives.toml";
     let (one, names) = each_trial(experiment, &["--trials", "3", "--jobs", "1"], "each-1");
     let (two, _) = each_trial(experiment, &["--trials", "3", "--jobs", "2"], "each-2");
@@ -145,7 +145,7 @@ fn each_trial_has_a_row_of_its_own_whatever_the_number_of_threads() {
 }
 
 #[test]
-fn the_first_trial_of_each_kind_of_failure_can_be_played_again_and_looked_at() {
+fn first_trial_of_each_failure_kind_can_be_replayed() {
     let folder = temporary("failures");
     let path = folder.display().to_string();
     let output = ["--each-trial", "--trials", "12", "--output", &path];
@@ -228,7 +228,7 @@ fn the_first_trial_of_each_kind_of_failure_can_be_played_again_and_looked_at() {
 }
 
 #[test]
-fn so_has_each_trial_without_time() {
+fn untimed_trials_have_distinct_rows() {
     let experiment = "experiments/olisipo_sf3.toml";
     let (lines, _) = each_trial(experiment, &["--trials", "2"], "each-3");
     // Ten cases, two worlds, four executors, two trials.
@@ -262,7 +262,7 @@ fn with_believed(world: &str) -> PathBuf {
 }
 
 #[test]
-fn what_is_believed_leaves_results_and_no_traces_of_a_world_that_was_not() {
+fn believed_world_gives_results_without_traces() {
     let folder = temporary("believed");
     let (output, path) = (
         folder.display().to_string(),

@@ -182,7 +182,7 @@ fn what_is_late_is_waited_for_as_long_as_the_plan_can_bear_and_then_given_up() {
     };
     let warnings = Warnings::default();
     let settings = RunSettings {
-        watches_room: true,
+        monitors_slack: true,
         ..RunSettings::default()
     };
     let execution = Execution::of(&task).with_settings(settings);
@@ -314,7 +314,7 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
     };
     let report = Execution::of(&task)
         .with_settings(settings)
-        .lasting(true)
+        .persistent(true)
         .run_in(&mut world);
     for done in &report.executed {
         let start = &done.step.start;
@@ -354,7 +354,7 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
     for (time_limit, fault) in ends {
         let settings = RunSettings {
             time_limit,
-            most_replans: 0,
+            max_replans: 0,
             ..RunSettings::default()
         };
         let mut world = Toy {
@@ -648,7 +648,7 @@ fn two_robots_do_two_things_at_once_and_goals_come_while_they_do() {
     };
     let report = Execution::of(&task)
         .with_settings(settings)
-        .lasting(true)
+        .persistent(true)
         .run_in(&mut world);
     let spans = report.executed.iter().map(|it| {
         let end = &it.step.start + it.step.duration.clone().unwrap_or_default();

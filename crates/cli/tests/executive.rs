@@ -68,7 +68,7 @@ fn exact(number: &Value) -> f64 {
 }
 
 #[test]
-fn an_executive_reaches_its_goal_takes_another_and_ends_when_it_is_told_to() {
+fn executive_pursues_goals_until_it_is_stopped() {
     let mut own = simulated("nominal");
     own.await_state(|state| state["why"] == "reached: problem");
     let (status, taken) = own.post("/v1/facts", &json!({"fact": "(done a3)", "becomes": false}));
@@ -96,7 +96,7 @@ fn an_executive_reaches_its_goal_takes_another_and_ends_when_it_is_told_to() {
 }
 
 #[test]
-fn the_socket_and_http_answer_alike_and_ctl_asks_either() {
+fn socket_and_http_give_the_same_answers() {
     let own = simulated("alike");
     own.await_state(|state| state["activity"] == "resting");
     for path in [
@@ -129,7 +129,7 @@ fn the_socket_and_http_answer_alike_and_ctl_asks_either() {
 }
 
 #[test]
-fn what_is_changed_while_it_runs_is_followed() {
+fn changes_during_the_run_are_respected() {
     let own = Executive::start(&folder("changed"), &[DOMAIN, PROBLEM, "--realtime", "2"]);
     let two = |state: &Value| state["running"].as_array().is_some_and(|it| it.len() == 2);
     own.await_state(two);
@@ -150,7 +150,7 @@ fn what_is_changed_while_it_runs_is_followed() {
 
 /// An accepted request is visible in every later answer.
 #[test]
-fn what_was_taken_in_counts_for_the_next_request() {
+fn accepted_request_affects_the_next_one() {
     let own = simulated("at-once");
     own.await_state(|state| state["activity"] != "beginning");
     // Paused, so that no goal is reached in the meantime.
@@ -164,7 +164,7 @@ fn what_was_taken_in_counts_for_the_next_request() {
 }
 
 #[test]
-fn in_a_pause_nothing_is_started() {
+fn paused_executive_starts_nothing() {
     let own = Executive::start(&folder("pause"), &[DOMAIN, PROBLEM, "--realtime", "10"]);
     // An action commanded before the pause starts during it.
     own.await_state(|state| state["running"].as_array().is_some_and(|it| it.len() == 2));
@@ -180,7 +180,7 @@ fn in_a_pause_nothing_is_started() {
 }
 
 #[test]
-fn where_no_plan_is_left_it_says_why_and_waits() {
+fn executive_without_plan_reports_reason_and_waits() {
     let own = simulated("stuck");
     own.await_state(|state| state["activity"] == "resting");
     own.post("/v1/facts", &json!({"fact": "(done a3)", "becomes": false}));
@@ -200,7 +200,7 @@ fn where_no_plan_is_left_it_says_why_and_waits() {
 }
 
 #[test]
-fn without_a_problem_it_waits_for_one_and_takes_others_afterwards() {
+fn executive_without_problem_waits_for_one() {
     let own = Executive::start(&folder("problem"), &[DOMAIN, "--realtime", "10"]);
     let (status, state) = own.get("/v1/state");
     assert_eq!(
@@ -269,7 +269,7 @@ type Refused<'a> = (&'a str, &'a str, Option<&'a str>, String, u16, &'a str);
 
 #[test]
 #[expect(clippy::too_many_lines, reason = "a table of refusals")]
-fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
+fn unauthorized_or_invalid_requests_get_a_clear_error() {
     let own = simulated("refused");
     own.await_state(|state| state["activity"] == "resting");
     let goal = json!({"goal": "(done a1)"});
@@ -462,7 +462,7 @@ fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
 }
 
 #[test]
-fn an_executive_without_a_token_can_be_looked_at_only() {
+fn executive_without_token_is_read_only() {
     let own = Executive::without_token(&folder("open"), &[DOMAIN, PROBLEM, "--realtime", "10"]);
     assert_eq!(own.get("/v1/state").0, 200);
     let (status, refusal) = own.post("/v1/pause", &Value::Null);
@@ -473,7 +473,7 @@ fn an_executive_without_a_token_can_be_looked_at_only() {
 
 /// Clients that hang, send garbage or do not read do not delay starts.
 #[test]
-fn bad_clients_delay_nothing() {
+fn bad_clients_cause_no_delay() {
     let own = Executive::start(&folder("bad"), &[DOMAIN, PROBLEM, "--realtime", "1"]);
     let mut held = Vec::new();
     for number in 0..100 {
@@ -539,7 +539,7 @@ fn with_robot(folder: &Path, journal: &str) -> Vec<String> {
 /// The executive, alone or with the world, is killed after a goal was submitted and one was
 /// cancelled. Goals and pause are kept, and nothing is started twice.
 #[test]
-fn what_was_asked_survives_kill_9() {
+fn accepted_requests_survive_kill_9() {
     if !python_is_there() {
         return;
     }
@@ -587,7 +587,7 @@ fn what_was_asked_survives_kill_9() {
 }
 
 #[test]
-fn what_is_wrong_with_the_command_line_is_told_before_anything_is_done() {
+fn wrong_command_line_is_rejected_before_any_effect() {
     let nowhere = PathBuf::from("/nowhere/at/all").display().to_string();
     let tests: [(&[&str], &str); 6] = [
         (&[DOMAIN, PROBLEM, "--http", "99999"], "write a port"),

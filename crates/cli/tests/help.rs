@@ -46,7 +46,7 @@ fn after_the_options(help: &str) -> Vec<&str> {
 }
 
 #[test]
-fn every_line_of_the_help_fits_into_80_columns() {
+fn help_lines_fit_into_80_columns() {
     let all = subcommands();
     let names = all.iter().map(|name| Some(name.as_str()));
     for name in names.chain([None]).filter(|name| *name != Some("help")) {

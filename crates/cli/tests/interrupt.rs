@@ -52,7 +52,7 @@ impl Long {
 }
 
 /// Waits until a process catches the signal with this number.
-fn wait_until_it_listens(child: &Child, signal: u32) {
+fn wait_for_signal_handler(child: &Child, signal: u32) {
     let status = format!("/proc/{}/status", child.id());
     loop {
         let text = std::fs::read_to_string(&status).expect("the process is alive");
@@ -82,7 +82,7 @@ fn ctrl_c_ends_the_search_with_the_best_box_so_far() {
 
 /// Service managers and batch systems send SIGTERM.
 #[test]
-fn a_request_to_terminate_does_so_too() {
+fn sigterm_ends_the_search_with_the_best_box_so_far() {
     ends_the_search_with_the_best_box_so_far("terminate", 15);
 }
 
@@ -94,7 +94,7 @@ fn ends_the_search_with_the_best_box_so_far(name: &str, signal: u32) {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the command");
-    wait_until_it_listens(&child, signal);
+    wait_for_signal_handler(&child, signal);
     // Time for a box. Both possible answers are accepted, however much time this is.
     sleep(Duration::from_secs(1));
     send(&child, signal);
@@ -115,7 +115,7 @@ fn ends_the_search_with_the_best_box_so_far(name: &str, signal: u32) {
 
 /// Twenty robots that work concurrently: too many states for a table of moves.
 #[test]
-fn ctrl_c_ends_the_table_of_policy() {
+fn ctrl_c_ends_computation_of_policy_table() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("table");
     std::fs::create_dir_all(&folder).expect("a folder");
     let robots = |text: &str| -> String {
@@ -162,7 +162,7 @@ fn ctrl_c_ends_the_table_of_policy() {
         .stderr(Stdio::null())
         .spawn()
         .expect("the command");
-    wait_until_it_listens(&child, 2);
+    wait_for_signal_handler(&child, 2);
     sleep(Duration::from_secs(1));
     send(&child, 2);
     let output = child.wait_with_output().expect("its output");
@@ -177,7 +177,7 @@ const ROBOTS: &str = "(define (domain robots) (:requirements :durative-actions)
 
 /// Uses a terminal made by `script` of util-linux; skipped if that is not installed.
 #[test]
-fn a_terminal_shows_how_the_search_is_getting_on() {
+fn terminal_shows_search_progress() {
     let version = Command::new("script").arg("--version").output();
     if !version.is_ok_and(|output| output.stdout.starts_with(b"script from util-linux")) {
         skipped("there is no `script` of util-linux here");

@@ -33,7 +33,7 @@ const FEATURES: [(&str, &str, &str); 3] = [
 ];
 
 /// Commands with `D`, `P`, `PLAN`, `NETWORK`, `ODDS`, `WORLD` and `EXPERIMENT` for files.
-const REFUSING: [&str; 19] = [
+const REJECTING: [&str; 19] = [
     "plan D P",
     "plan D P --time-limit 1",
     "plan D P --objective slack",
@@ -56,7 +56,7 @@ const REFUSING: [&str; 19] = [
 ];
 
 /// Commands that support processes and events, or that do not accept a network at all.
-const HEEDING_NATURE: [&str; 4] = [
+const SUPPORTING_AUTONOMOUS: [&str; 4] = [
     "envelope D P PLAN",
     "envelope D P NETWORK",
     "check D P NETWORK",
@@ -103,7 +103,7 @@ fn folder(number: usize, (content, step, _): (&str, &str, &str)) -> PathBuf {
 }
 
 #[test]
-fn what_only_the_judge_heeds_is_judged_and_refused_by_name_by_all_others() {
+fn validator_only_features_are_rejected_by_name_elsewhere() {
     for (number, feature) in FEATURES.into_iter().enumerate() {
         let folder = folder(number, feature);
         let run = |command: &str| {
@@ -121,8 +121,8 @@ fn what_only_the_judge_heeds_is_judged_and_refused_by_name_by_all_others() {
         let judged = run("check D P PLAN");
         assert_eq!(judged.status.code(), Some(0), "{judged:?}");
         let heeds_nature = feature.2.starts_with("processes");
-        for command in REFUSING {
-            if heeds_nature && HEEDING_NATURE.contains(&command) {
+        for command in REJECTING {
+            if heeds_nature && SUPPORTING_AUTONOMOUS.contains(&command) {
                 continue;
             }
             let output = run(command);
@@ -151,7 +151,7 @@ fn what_only_the_judge_heeds_is_judged_and_refused_by_name_by_all_others() {
 }
 
 #[test]
-fn compare_refuses_before_anything_else_what_executors_do_not_heed() {
+fn compare_rejects_unsupported_features_first() {
     let folder = folder(FEATURES.len(), FEATURES[0]);
     let experiment = folder.join("EXPERIMENT").display().to_string();
     let output = elbowroom(&["compare", &experiment]);

@@ -84,9 +84,9 @@ fn started(line: &[String]) -> Child {
 }
 
 /// Pseudo-random numbers: the upper bits of a linear congruential generator.
-struct Dice(u64);
+struct Rng(u64);
 
-impl Dice {
+impl Rng {
     fn below(&mut self, limit: u64) -> u64 {
         self.0 = self
             .0
@@ -136,7 +136,7 @@ enum Victim {
 }
 
 impl Victim {
-    fn drawn(dice: &mut Dice, has_planner: bool) -> Self {
+    fn drawn(dice: &mut Rng, has_planner: bool) -> Self {
         if has_planner && dice.below(3) == 0 {
             return Self::Planner;
         }
@@ -148,7 +148,7 @@ impl Victim {
     }
 
     /// Kills the process, unless it is the executive, which the caller kills.
-    fn kill(self, folder: &Path, dice: &mut Dice) {
+    fn kill(self, folder: &Path, dice: &mut Rng) {
         match self {
             Self::Executive => {}
             Self::ExecutiveAndWorld | Self::World => {
@@ -175,17 +175,17 @@ fn lines(folder: &Path, file: &str) -> Vec<String> {
 }
 
 /// Checks that nothing was started twice, and that everything reported as done was done.
-fn judge(folder: &Path, output: &Output, what: &str) {
+fn check_outcome(folder: &Path, output: &Output, what: &str) {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(0), "{what}: {text}{errors}");
     assert!(text.contains("goal reached"), "{what}: {text}");
-    judge_what_was_done(folder, what, &text);
+    check_robot_records(folder, what, &text);
 }
 
 /// Checks the robot's own records: each errand was done.
-fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
-    judge_what_was_begun(folder, what);
+fn check_robot_records(folder: &Path, what: &str, text: &str) {
+    check_starts(folder, what);
     let done = lines(folder, "done").join("\n");
     for errand in ["a1)", "a2)", "a3)", "b1)", "b2)", "b3)"] {
         assert!(
@@ -197,7 +197,7 @@ fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
 
 /// Checks that nothing was started twice: no ticket was started twice, and no finished errand was
 /// done again under another ticket.
-fn judge_what_was_begun(folder: &Path, what: &str) {
+fn check_starts(folder: &Path, what: &str) {
     let mut done = BTreeMap::new();
     for line in lines(folder, "done") {
         let (ticket, errand) = line.split_once(' ').expect("a ticket and an errand");
@@ -219,7 +219,7 @@ fn judge_what_was_begun(folder: &Path, what: &str) {
 /// Kills a run up to three times and resumes it each time. Every third run has a planner, which may
 /// also be killed.
 fn killed(number: u64) -> u64 {
-    let (folder, mut dice) = (folder(&format!("kill-{number}")), Dice(number));
+    let (folder, mut dice) = (folder(&format!("kill-{number}")), Rng(number));
     dice.below(2);
     let has_planner = number % 3 == 2;
     let journal = folder.join("journal").display().to_string();
@@ -267,7 +267,7 @@ fn killed(number: u64) -> u64 {
         );
     };
     let what = format!("run {number} after {kills} kills");
-    judge_the_end(&folder, &output, &what);
+    check_end(&folder, &output, &what);
     let replayed = elbowroom(&["run", "--replay", &journal]);
     assert!(replayed.status.success(), "run {number}: {replayed:?}");
     fs::remove_dir_all(&folder).expect("the folder is there");
@@ -275,11 +275,11 @@ fn killed(number: u64) -> u64 {
 }
 
 /// Checks that a run ended with its goal.
-fn judge_the_end(folder: &Path, output: &Output, what: &str) {
+fn check_end(folder: &Path, output: &Output, what: &str) {
     if String::from_utf8_lossy(&output.stdout).contains("has reached its goal before") {
-        judge_what_was_done(folder, what, "it was over when it was killed");
+        check_robot_records(folder, what, "it was over when it was killed");
     } else {
-        judge(folder, output, what);
+        check_outcome(folder, output, what);
     }
 }
 
@@ -287,7 +287,7 @@ fn judge_the_end(folder: &Path, output: &Output, what: &str) {
 /// reason, and can be resumed when there is a planner.
 #[cfg(unix)]
 #[test]
-fn a_run_whose_planner_dies_again_and_again_ends_and_goes_on_when_there_is_one() {
+fn run_with_crashing_planner_ends_and_can_be_resumed() {
     if !python_is_there() {
         return;
     }
@@ -314,7 +314,7 @@ fn a_run_whose_planner_dies_again_and_again_ends_and_goes_on_when_there_is_one()
     assert!(lines(&folder, "begun").is_empty());
     fs::write(folder.join("healthy"), "").expect("written");
     let last = awaited(started(&resume), "the rest");
-    judge(&folder, &last, "the rest");
+    check_outcome(&folder, &last, "the rest");
     for what in [["run", "--replay", &journal], ["run", "--resume", &journal]] {
         let output = elbowroom(&what);
         assert!(output.status.success(), "{output:?}");
@@ -323,7 +323,7 @@ fn a_run_whose_planner_dies_again_and_again_ends_and_goes_on_when_there_is_one()
 }
 
 #[test]
-fn whenever_a_run_is_killed_it_goes_on_and_nothing_is_started_twice() {
+fn killed_run_resumes_without_starting_actions_twice() {
     if !python_is_there() {
         return;
     }
@@ -348,7 +348,7 @@ fn whenever_a_run_is_killed_it_goes_on_and_nothing_is_started_twice() {
 /// Two programs with one journal would start everything twice.
 #[cfg(unix)]
 #[test]
-fn a_run_that_is_under_way_is_not_gone_on_with_beside_it() {
+fn running_run_cannot_be_resumed_concurrently() {
     if !python_is_there() {
         return;
     }
@@ -370,19 +370,19 @@ fn a_run_that_is_under_way_is_not_gone_on_with_beside_it() {
         assert_eq!(second.status.code(), Some(2), "{text}");
         assert!(text.contains("is under way"), "{text}");
     }
-    judge(&folder, &awaited(first, "the first"), "the first");
+    check_outcome(&folder, &awaited(first, "the first"), "the first");
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
 #[test]
-fn a_journal_is_neither_overwritten_nor_gone_on_with_after_its_end() {
+fn finished_journal_is_neither_overwritten_nor_resumed() {
     if !python_is_there() {
         return;
     }
     let folder = folder("over");
     let journal = folder.join("journal").display().to_string();
     let line = beginning(&folder, &journal, false);
-    judge(&folder, &awaited(started(&line), "the run"), "the run");
+    check_outcome(&folder, &awaited(started(&line), "the run"), "the run");
     let again = awaited(started(&line), "the same again");
     let text = String::from_utf8_lossy(&again.stderr).into_owned();
     assert_eq!(again.status.code(), Some(2), "{text}");

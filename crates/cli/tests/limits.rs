@@ -46,7 +46,7 @@ fn limited(arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn a_domain_that_never_comes_to_its_end_does_not_outlast_the_time_limit() {
+fn endless_input_respects_the_time_limit() {
     let folder = Folder::new("endless");
     let domain = folder.file("domain.pddl");
     // A reader of the named pipe blocks until another process writes to it.
@@ -73,7 +73,7 @@ fn a_domain_that_never_comes_to_its_end_does_not_outlast_the_time_limit() {
 
 /// No search is needed, but there are 2 · 30³ ground actions.
 #[test]
-fn what_grounding_takes_counts_for_the_memory_limit() {
+fn grounding_counts_towards_the_memory_limit() {
     let folder = Folder::new("many");
     let objects: Vec<String> = (0..30).map(|number| format!("o{number}")).collect();
     let domain = folder.write(

@@ -29,7 +29,7 @@ fn without_time(answer: &str) -> String {
 }
 
 #[test]
-fn the_answers_shown_are_those_of_the_command() {
+fn readme_answers_match_the_command() {
     let output = elbowroom(&[
         "envelope",
         "cases/delivery/domain.pddl",

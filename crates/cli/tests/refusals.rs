@@ -29,7 +29,7 @@ const RUN: [&str; 3] = [
 ];
 
 #[test]
-fn options_of_run_that_could_do_nothing_are_refused() {
+fn ineffective_options_of_run_are_rejected() {
     for (options, words) in [
         (&["--planner-time", "5"][..], "--planning-budget"),
         (
@@ -84,7 +84,7 @@ fn options_of_run_that_could_do_nothing_are_refused() {
 }
 
 #[test]
-fn threads_are_the_embedded_planners_and_change_no_plan() {
+fn threads_apply_to_embedded_planner_and_do_not_change_plans() {
     fn plan<'a>(options: &[&'a str]) -> Vec<&'a str> {
         [&["plan", RUN[1], RUN[2]], options].concat()
     }
@@ -120,7 +120,7 @@ fn threads_are_the_embedded_planners_and_change_no_plan() {
 }
 
 #[test]
-fn the_trace_of_a_run_is_the_same_whatever_the_number_of_threads() {
+fn trace_does_not_depend_on_number_of_threads() {
     let folder = folder("jobs");
     let trace = folder.join("trace.jsonl").display().to_string();
     let world = ["--world", "cases/delivery/world.toml", "--seed", "3"];
@@ -137,7 +137,7 @@ fn the_trace_of_a_run_is_the_same_whatever_the_number_of_threads() {
 }
 
 #[test]
-fn what_only_the_largest_box_has_asks_for_it_or_is_refused() {
+fn options_of_largest_box_select_it_or_are_rejected() {
     let plan = [
         "envelope",
         "cases/delivery/domain.pddl",
@@ -162,7 +162,7 @@ fn what_only_the_largest_box_has_asks_for_it_or_is_refused() {
 }
 
 #[test]
-fn what_nothing_in_the_problem_is_called_cannot_be_left_open() {
+fn unknown_quantity_cannot_be_left_open() {
     for (spec, words) in [
         ("duration drve", "did you mean `drive`?"),
         ("deadline (at rover moon)", "--vary"),
@@ -206,7 +206,7 @@ fn tables_are_no_wider_than_eighty_columns() {
 }
 
 #[test]
-fn a_trace_is_played_back_as_it_is() {
+fn replay_rejects_other_options() {
     for option in [
         ["--executor", "stn"],
         ["--trace", "x.jsonl"],
@@ -245,7 +245,7 @@ fn experiment(folder: &Path, changes: &[(&str, &str)]) -> String {
 }
 
 #[test]
-fn experiments_that_would_make_an_empty_or_wrong_table_are_refused() {
+fn experiments_without_meaningful_table_are_rejected() {
     let folder = folder("empty-experiments");
     let cases = [
         ("trials = 6", "trials = 0", "make at least one trial"),
@@ -349,7 +349,7 @@ fn only_results_of_the_experiment_are_merged_and_missing_parts_are_named() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_told_before_the_trials() {
+fn unwritable_folder_is_reported_before_the_trials() {
     let folder = folder("no-folder");
     let file = experiment(&folder, &[("trials = 6", "trials = 1000000000")]);
     let bad = folder.join("experiment.toml/results").display().to_string();
@@ -380,7 +380,7 @@ fn numbers_below_zero_are_refused_as_numbers() {
 }
 
 #[test]
-fn nothing_is_to_be_installed_that_has_the_name_of_a_typo() {
+fn misspelt_planner_is_not_suggested_for_installation() {
     let output = elbowroom(&[&RUN[..], &["--planner", "up:nosuch"]].concat());
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     let said = String::from_utf8_lossy(&output.stderr);
@@ -389,19 +389,19 @@ fn nothing_is_to_be_installed_that_has_the_name_of_a_typo() {
 }
 
 #[test]
-fn a_file_that_is_no_trace_is_told_so() {
+fn file_that_is_no_trace_is_reported() {
     let said = refusal(&["run", "--replay", "cases/delivery/plan.plan"]);
     assert!(said.contains("no trace of a run"), "{said}");
 }
 
 #[test]
-fn a_plan_that_is_not_there_is_not_taken_for_a_wrong_order() {
+fn missing_plan_file_is_not_reported_as_wrong_order() {
     let said = refusal(&[&RUN[..], &["--plan", "nope.plan"]].concat());
     assert!(!said.contains("DOMAIN PROBLEM PLAN"), "{said}");
 }
 
 #[test]
-fn what_cannot_be_left_open_says_what_can() {
+fn unsupported_quantity_lists_supported_ones() {
     for (spec, words) in [
         ("deadlin (counter-open office)", "did you mean `deadline`?"),
         ("initial battery rover", "`initial (battery rover)`"),
@@ -419,7 +419,7 @@ fn what_cannot_be_left_open_says_what_can() {
 }
 
 #[test]
-fn a_misspelt_key_of_a_world_is_shown_with_the_one_that_was_meant() {
+fn misspelt_key_of_world_file_gets_suggestion() {
     let folder = folder("misspelt-key");
     let world = folder.join("world.toml");
     let text = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\nactoin = \"drive\"\n";
@@ -433,7 +433,7 @@ fn a_misspelt_key_of_a_world_is_shown_with_the_one_that_was_meant() {
 
 /// With `--json`, the failure document contains the message shown to users.
 #[test]
-fn a_failure_is_a_document_where_one_is_asked_for() {
+fn failure_is_a_document_with_json() {
     let output = elbowroom(&[
         "check",
         "crates/cli/tests/files/misspelt.pddl",

@@ -88,7 +88,7 @@ const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/probl
 
 /// Two orders. The nearer one has almost no slack, so `live:5` abandons it.
 #[test]
-fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
+fn run_with_switch_to_likelier_plan_is_replayed() {
     let text = fs::read_to_string(root().join("experiments/table1/problem.pddl")).expect("read");
     let text = text.replace("{early}", "425").replace("{late}", "800");
     let problem = Temporary::new("problem.pddl", &text);
@@ -141,7 +141,7 @@ fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
 /// The deadline is met more often with another order of the actions. `policy` makes that plan
 /// itself, so the planner does not make the first plan in the trace.
 #[test]
-fn run_in_which_policy_has_the_likelier_plan_and_the_planner_makes_the_next_one() {
+fn run_with_policy_plan_and_planner_plan_is_replayed() {
     let domain = Temporary::new(
         "shift-domain.pddl",
         "(define (domain shift)
@@ -198,7 +198,7 @@ fn run_in_which_policy_has_the_likelier_plan_and_the_planner_makes_the_next_one(
 }
 
 #[test]
-fn runs_by_likelihoods_in_which_starts_fail_and_the_door_locks() {
+fn runs_by_likelihoods_with_failures_are_replayed() {
     for executor in ["adaptable", "lookahead", "esterel"] {
         let (mut replans, mut failed) = (0, 0);
         for seed in ["1", "2", "3", "4"] {
@@ -257,7 +257,7 @@ fn likelihoods_are_kept_in_the_trace() {
 }
 
 #[test]
-fn trace_of_a_run_whose_plan_was_refused_says_that_it_cannot_be_replayed() {
+fn trace_with_rejected_plan_cannot_be_replayed() {
     let trace = Temporary::new("refused.jsonl", "");
     let case = ["domain.pddl", "problem.pddl", "plan.plan"].map(|file| {
         root()
@@ -324,7 +324,7 @@ const RECORDED: [(&str, &str); 8] = [
 ];
 
 #[test]
-fn recorded_runs_are_the_same_to_the_byte_and_play_back() {
+fn recorded_runs_are_reproduced_and_replayed() {
     for (name, line) in RECORDED {
         let stored = format!("crates/cli/tests/files/golden/{name}.jsonl");
         let words: Vec<&str> = line.split_whitespace().collect();

@@ -55,9 +55,9 @@ done
 "#;
 
 /// Files of one test.
-struct Place(PathBuf);
+struct TestFiles(PathBuf);
 
-impl Place {
+impl TestFiles {
     fn new(name: &str) -> Self {
         let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("ends-{name}"));
         let _ = fs::remove_dir_all(&folder);
@@ -74,7 +74,7 @@ impl Place {
     }
 
     /// Returns the messages sent to the world.
-    fn told(&self) -> Vec<Value> {
+    fn messages_to_world(&self) -> Vec<Value> {
         let text = self.read("log");
         let lines = text.lines().map(serde_json::from_str);
         lines.map(|line| line.expect("JSON")).collect()
@@ -100,7 +100,7 @@ impl Place {
             .expect("the command can be started")
     }
 
-    fn wait_until_told(&self, message: &str, times: usize) {
+    fn wait_for_message(&self, message: &str, times: usize) {
         let begun = Instant::now();
         while self.read("log").matches(message).count() < times {
             assert!(
@@ -128,22 +128,22 @@ fn count(told: &[Value], kind: &str) -> usize {
         .count()
 }
 
-fn last_entry(place: &Place) -> Value {
+fn last_entry(place: &TestFiles) -> Value {
     let trace = place.read("trace.jsonl");
     serde_json::from_str(trace.lines().last().expect("a line")).expect("JSON")
 }
 
 #[test]
-fn ctrl_c_and_requests_to_terminate_end_a_run_in_order() {
+fn signals_shut_down_a_run() {
     for (name, signal) in [("interrupt", 2), ("terminate", 15), ("hang-up", 1)] {
-        let place = Place::new(name);
+        let place = TestFiles::new(name);
         let child = place.run(
             ROBOT,
             "",
             &["--executor", "esterel", "--planner-states", "400"],
         );
         // The run has begun and waits for the end of an action.
-        place.wait_until_told("\"wait\"", 4);
+        place.wait_for_message("\"wait\"", 4);
         send(&child, signal);
         let output = child.wait_with_output().expect("it ends");
         assert_eq!(output.status.code(), Some(130), "{name}: {output:?}");
@@ -155,7 +155,7 @@ fn ctrl_c_and_requests_to_terminate_end_a_run_in_order() {
         assert!(text.contains("cancelled"), "{name}: {text}");
         assert!(!text.contains("still running"), "{name}: {text}");
 
-        let told = place.told();
+        let told = place.messages_to_world();
         assert!(count(&told, "start") > 0, "{name}: {told:?}");
         assert_eq!(
             count(&told, "cancel"),
@@ -173,10 +173,10 @@ fn ctrl_c_and_requests_to_terminate_end_a_run_in_order() {
 }
 
 #[test]
-fn with_json_an_interrupted_run_is_a_document_too() {
-    let place = Place::new("document");
+fn interrupted_run_prints_json_document() {
+    let place = TestFiles::new("document");
     let child = place.run(ROBOT, "", &["--executor", "esterel", "--json"]);
-    place.wait_until_told("\"wait\"", 4);
+    place.wait_for_message("\"wait\"", 4);
     send(&child, 2);
     let output = child.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(130), "{output:?}");
@@ -185,10 +185,10 @@ fn with_json_an_interrupted_run_is_a_document_too() {
 }
 
 #[test]
-fn a_world_that_does_not_obey_is_not_waited_for_for_long() {
-    let place = Place::new("stubborn");
+fn unresponsive_world_does_not_delay_shutdown() {
+    let place = TestFiles::new("stubborn");
     let child = place.run(STUBBORN, "", &["--executor", "esterel"]);
-    place.wait_until_told("\"wait\"", 2);
+    place.wait_for_message("\"wait\"", 2);
     let begun = Instant::now();
     send(&child, 2);
     let output = child.wait_with_output().expect("it ends");
@@ -202,9 +202,9 @@ fn a_world_that_does_not_obey_is_not_waited_for_for_long() {
 /// The world has time to stop, unless the user insists.
 #[test]
 fn third_ctrl_c_ends_the_run_at_once_and_the_second_does_not() {
-    let place = Place::new("thrice");
+    let place = TestFiles::new("thrice");
     let mut child = place.run(STUBBORN, "", &["--executor", "esterel"]);
-    place.wait_until_told("\"wait\"", 2);
+    place.wait_for_message("\"wait\"", 2);
     for _ in 0..2 {
         send(&child, 2);
         sleep(Duration::from_millis(500));
@@ -220,7 +220,7 @@ fn third_ctrl_c_ends_the_run_at_once_and_the_second_does_not() {
 
 /// One action fails while another one runs, and the planner finds no plan or fails.
 #[test]
-fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop() {
+fn planner_failure_cancels_actions_and_stops_the_world() {
     let planners = [
         ("none", 1, "no plan to go on with", "no-plan"),
         (
@@ -231,7 +231,7 @@ fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop()
         ),
     ];
     for (number, (planner, code, words, verdict)) in planners.into_iter().enumerate() {
-        let place = Place::new(&format!("planner-{number}"));
+        let place = TestFiles::new(&format!("planner-{number}"));
         let plan = root()
             .join("cases/delivery/plan.plan")
             .display()
@@ -250,7 +250,7 @@ fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop()
         let text = String::from_utf8_lossy(&output.stdout);
         assert!(text.contains(words), "{planner}: {text}");
         assert!(!text.contains("still running"), "{planner}: {text}");
-        let told = place.told();
+        let told = place.messages_to_world();
         // The failed action has ended by itself.
         assert_eq!(count(&told, "start"), 2, "{planner}: {told:?}");
         assert_eq!(count(&told, "cancel"), 1, "{planner}: {told:?}");
@@ -261,8 +261,8 @@ fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop()
 
 /// A run in a simulated world on a wall clock ends at the present time.
 #[test]
-fn a_run_on_a_wall_clock_ends_when_it_is_asked_to() {
-    let place = Place::new("clock");
+fn wall_clock_run_ends_on_request() {
+    let place = TestFiles::new("clock");
     let trace = place.file("trace.jsonl");
     let child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .current_dir(root())
@@ -303,12 +303,12 @@ fn a_full_disk_does_not_hide_the_verdict() {
 
 /// Finished trials are kept, and the results are marked as incomplete.
 #[test]
-fn a_comparison_that_is_interrupted_keeps_what_is_finished() {
+fn interrupted_comparison_keeps_finished_trials() {
     for (name, experiment) in [
         ("mixed", "crates/cli/tests/files/late-drives.toml"),
         ("perturbed", "experiments/olisipo_sf3.toml"),
     ] {
-        let place = Place::new(name);
+        let place = TestFiles::new(name);
         let child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
             .current_dir(root())
             .args([

@@ -46,7 +46,7 @@ fn another_program_makes_the_first_plan() {
 /// A new plan is needed in mid-execution, but the planner returns one for the initial state. The
 /// validator rejects it, and nothing of it is executed.
 #[test]
-fn a_plan_that_does_not_fit_the_situation_is_refused() {
+fn plan_that_does_not_match_the_situation_is_rejected() {
     let (script, line) = one_plan("refused.sh");
     let world = temporary(
         "failing.toml",
@@ -65,7 +65,7 @@ fn a_plan_that_does_not_fit_the_situation_is_refused() {
 }
 
 #[test]
-fn what_is_wrong_with_a_planner_is_said() {
+fn planner_errors_are_reported() {
     let run = |rest: &[&str]| {
         let output = elbowroom(&[&["run", DELIVERY[0], DELIVERY[1]], rest].concat());
         assert!(!output.status.success(), "{output:?}");

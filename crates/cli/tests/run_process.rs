@@ -131,7 +131,7 @@ fn answering(lines: &str) -> String {
 }
 
 #[test]
-fn every_way_to_be_no_world_ends_the_run_and_is_named() {
+fn invalid_world_programs_end_the_run_and_are_reported() {
     let fact = r#"{"type":"fact","fact":"(at rover depot)","becomes":true,"time":0}"#;
     let zero = r#"{"type":"time","now":0}"#;
     let cases = [
@@ -199,7 +199,11 @@ fn every_way_to_be_no_world_ends_the_run_and_is_named() {
 
 /// Runs with a world like `examples/world.py` that sends the line `first` at the start of its first
 /// answer.
-fn example_that_says(name: &str, first: &str, options: &[&str]) -> Option<(Output, String)> {
+fn example_world_with_first_line(
+    name: &str,
+    first: &str,
+    options: &[&str],
+) -> Option<(Output, String)> {
     if Command::new("python3").arg("--version").output().is_err() {
         return None;
     }
@@ -229,7 +233,9 @@ fn every_fact_of_the_problem_may_be_reported() {
         ("now-true", "(LIES parcel depot)", "true"),
     ] {
         let first = format!(r#"{{"type":"fact","fact":"{fact}","becomes":{truth},"time":0}}"#);
-        let Some((output, trace)) = example_that_says(name, &first, &["--strict-world"]) else {
+        let Some((output, trace)) =
+            example_world_with_first_line(name, &first, &["--strict-world"])
+        else {
             skipped("there is no python3");
             return;
         };
@@ -247,7 +253,7 @@ fn every_fact_of_the_problem_may_be_reported() {
 
 /// By default, an invalid message of the robot does not end the run.
 #[test]
-fn what_cannot_be_understood_is_a_remark_in_the_trace() {
+fn unparsable_message_is_a_remark_in_the_trace() {
     let fact = |fact: &str| format!(r#"{{"type":"fact","fact":"{fact}","becomes":true,"time":0}}"#);
     for first in [
         fact("(lies parcel moon)"),
@@ -259,7 +265,7 @@ fn what_cannot_be_understood_is_a_remark_in_the_trace() {
         r#"{"type":"value","fluent":"(height rover)","value":3,"time":0}"#.to_owned(),
         r#"{"type":"dance","time":0}"#.to_owned(),
     ] {
-        let Some((output, trace)) = example_that_says("slip", &first, &[]) else {
+        let Some((output, trace)) = example_world_with_first_line("slip", &first, &[]) else {
             skipped("there is no python3");
             return;
         };
@@ -274,7 +280,7 @@ fn what_cannot_be_understood_is_a_remark_in_the_trace() {
         assert!(replayed.status.success(), "{replayed:?}");
         fs::remove_file(trace).expect("the trace is there");
 
-        let strict = example_that_says("strict-slip", &first, &["--strict-world"]);
+        let strict = example_world_with_first_line("strict-slip", &first, &["--strict-world"]);
         let (output, trace) = strict.expect("python3 is there");
         assert_eq!(output.status.code(), Some(2), "{first}: {output:?}");
         fs::remove_file(trace).expect("the trace is there");
@@ -284,11 +290,11 @@ fn what_cannot_be_understood_is_a_remark_in_the_trace() {
 /// Control characters in messages of other programs are escaped, and lines are wrapped at 80
 /// columns.
 #[test]
-fn what_a_world_says_is_shown_tame_and_wrapped() {
+fn output_of_world_is_escaped_and_wrapped() {
     let why = format!(r"line\n\u001b[2J {}", "word ".repeat(60));
     let first =
         format!(r#"{{"type":"ended","ticket":0,"outcome":"failed","why":"{why}","time":0}}"#);
-    let Some((output, trace)) = example_that_says("rude", &first, &[]) else {
+    let Some((output, trace)) = example_world_with_first_line("rude", &first, &[]) else {
         skipped("there is no python3");
         return;
     };
@@ -383,7 +389,7 @@ fn a_world_that_cannot_be_started_ends_the_run_with_a_message() {
 }
 
 #[test]
-fn a_world_that_does_not_answer_is_not_waited_for_for_ever() {
+fn unresponsive_world_times_out() {
     let run = [
         "run",
         DELIVERY[0],
@@ -438,7 +444,7 @@ fn a_run_that_is_killed_leaves_its_trace() {
 }
 
 /// Runs with a walking time of `seconds`. The plan assumes at most 15 s.
-fn walking(seconds: &str) -> (String, Option<i32>) {
+fn run_with_walking_time(seconds: &str) -> (String, Option<i32>) {
     let world = format!("python3 crates/cli/tests/files/late/world.py {seconds}");
     let files = ["domain.pddl", "problem.pddl", "plan.plan"];
     let files = files.map(|file| format!("crates/cli/tests/files/late/{file}"));
@@ -452,12 +458,12 @@ fn walking(seconds: &str) -> (String, Option<i32>) {
 
 /// With the estimate of a walk that takes 25 % longer, there was no plan at 15 s.
 #[test]
-fn what_is_late_and_may_still_end_in_time_is_waited_for() {
+fn late_action_is_awaited_while_plan_is_feasible() {
     if Command::new("python3").arg("--version").output().is_err() {
         skipped("there is no python3");
         return;
     }
-    let (text, code) = walking("15.5");
+    let (text, code) = run_with_walking_time("15.5");
     assert_eq!(code, Some(0), "{text}");
     assert!(text.contains("(walk) [15.5]"), "{text}");
     assert!(text.contains("(climb) [10]"), "{text}");
@@ -467,12 +473,12 @@ fn what_is_late_and_may_still_end_in_time_is_waited_for() {
 /// After more than 16 s there is no plan, but climbing may still take less time than planned. After
 /// 21 s it would have to take less than half, and walking is cancelled.
 #[test]
-fn overdue_action_is_cancelled_if_the_rest_would_have_to_take_less_than_half() {
+fn overdue_action_is_cancelled_if_remaining_plan_is_too_short() {
     if Command::new("python3").arg("--version").output().is_err() {
         skipped("there is no python3");
         return;
     }
-    let (text, code) = walking("1000");
+    let (text, code) = run_with_walking_time("1000");
     assert_eq!(code, Some(0), "{text}");
     let walked = text
         .lines()

@@ -35,7 +35,7 @@ fn problem(name: &str, goal: &str) -> String {
 }
 
 /// Returns the exit code and all output.
-fn said(arguments: &[&str]) -> (Option<i32>, String) {
+fn code_and_output(arguments: &[&str]) -> (Option<i32>, String) {
     let output = elbowroom(arguments);
     let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
     (output.status.code(), text.concat())
@@ -46,12 +46,12 @@ fn plan_that_needs_self_overlap_is_made_only_with_the_option() {
     let domain = file("needs.d.pddl", DOMAIN);
     let problem = problem("needs.p.pddl", "(lifted)");
     for command in ["plan", "run"] {
-        let (code, text) = said(&[command, &domain, &problem]);
+        let (code, text) = code_and_output(&[command, &domain, &problem]);
         assert_eq!(code, Some(3), "{command}: {text}");
         let expected = "no plan without self-overlap (`--self-overlap`)";
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(text.contains(expected), "{command}: {text}");
-        let (code, text) = said(&[command, &domain, &problem, "--self-overlap"]);
+        let (code, text) = code_and_output(&[command, &domain, &problem, "--self-overlap"]);
         assert_eq!(code, Some(0), "{command}: {text}");
     }
 }
@@ -62,13 +62,13 @@ fn given_plan_that_overlaps_itself_is_executed_with_the_warning_of_check() {
     let problem = problem("given.p.pddl", "(lifted)");
     let plan = file("given.plan", "0: (hold) [2]\n0.5: (hold) [2]\n1: (lift)\n");
     for command in ["check", "run"] {
-        let (code, text) = said(&[command, &domain, &problem, &plan]);
+        let (code, text) = code_and_output(&[command, &domain, &problem, &plan]);
         assert_eq!(code, Some(0), "{command}: {text}");
         let expected = "(hold) overlaps itself: it starts at 0.5";
         assert!(text.contains(expected), "{command}: {text}");
     }
     let apart = file("apart.plan", "0: (hold) [2]\n2: (hold) [2]\n");
-    let (_, text) = said(&["check", &domain, &problem, &apart]);
+    let (_, text) = code_and_output(&["check", &domain, &problem, &apart]);
     assert!(!text.contains("overlaps itself"), "{text}");
 }
 
@@ -90,7 +90,7 @@ fn executed_plan_keeps_instances_apart_when_the_first_one_takes_longer() {
         "policy",
     ] {
         let trace = file(&format!("{executor}.jsonl"), "");
-        let (code, text) = said(&[
+        let (code, text) = code_and_output(&[
             "run",
             &domain,
             &problem,

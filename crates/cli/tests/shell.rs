@@ -6,7 +6,7 @@ use std::fs;
 
 use command::elbowroom;
 
-fn said(arguments: &[&str]) -> (String, String) {
+fn stdout_and_stderr(arguments: &[&str]) -> (String, String) {
     let output = elbowroom(arguments);
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {output:?}");
     let text = |bytes| String::from_utf8(bytes).expect("text");
@@ -16,7 +16,7 @@ fn said(arguments: &[&str]) -> (String, String) {
 #[test]
 fn each_shell_gets_its_completions() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
-        let (script, _) = said(&["completions", shell]);
+        let (script, _) = stdout_and_stderr(&["completions", shell]);
         for word in ["envelope", "--precision", "--world-process"] {
             let word = word.trim_start_matches('-');
             assert!(script.contains(word), "{shell}: {word}");
@@ -25,12 +25,12 @@ fn each_shell_gets_its_completions() {
 }
 
 #[test]
-fn there_is_a_page_for_each_command() {
-    let (page, _) = said(&["man"]);
+fn every_command_has_a_man_page() {
+    let (page, _) = stdout_and_stderr(&["man"]);
     assert!(page.contains(".TH elbowroom 1"), "{page}");
     let folder = std::env::temp_dir().join(format!("elbowroom-man-{}", std::process::id()));
     fs::create_dir_all(&folder).expect("a temporary folder");
-    said(&["man", &folder.display().to_string()]);
+    stdout_and_stderr(&["man", &folder.display().to_string()]);
     for command in [
         "check", "plan", "stn", "envelope", "run", "compare", "network",
     ] {
@@ -41,7 +41,7 @@ fn there_is_a_page_for_each_command() {
 }
 
 #[test]
-fn colours_can_be_had_in_a_pipe_and_refused() {
+fn colours_can_be_forced_and_disabled() {
     let check = [
         "check",
         "cases/delivery/domain.pddl",
@@ -49,14 +49,14 @@ fn colours_can_be_had_in_a_pipe_and_refused() {
         "cases/delivery/plan.plan",
     ];
     for (when, expected) in [("always", true), ("never", false), ("auto", false)] {
-        let (text, _) = said(&[&check[..], &["--color", when]].concat());
+        let (text, _) = stdout_and_stderr(&[&check[..], &["--color", when]].concat());
         assert_eq!(text.contains('\u{1b}'), expected, "{when}: {text}");
     }
 }
 
 /// The answer of `check` contains the plan's metric.
 #[test]
-fn the_metric_is_told() {
+fn metric_is_reported() {
     let folder = std::env::temp_dir().join(format!("elbowroom-metric-{}", std::process::id()));
     fs::create_dir_all(&folder).expect("a temporary folder");
     let file = |name: &str, text: &str| {
@@ -77,14 +77,14 @@ fn the_metric_is_told() {
           (:metric minimize (+ (* 2 (cost)) (total-time))))",
     );
     let plan = file("a.plan", "1: (work) [4]\n");
-    let (text, _) = said(&["check", &domain, &problem, &plan]);
+    let (text, _) = stdout_and_stderr(&["check", &domain, &problem, &plan]);
     assert!(text.contains("metric: 11"), "{text}");
-    let (json, _) = said(&["check", &domain, &problem, &plan, "--json"]);
+    let (json, _) = stdout_and_stderr(&["check", &domain, &problem, &plan, "--json"]);
     let document: serde_json::Value = serde_json::from_str(&json).expect("JSON");
     assert_eq!(document["metric"]["exact"], "11", "{document}");
     // The document also contains warnings.
     let lenient = file("lenient.plan", "1: (work) [4 min]\n");
-    let (json, said) = said(&["check", &domain, &problem, &lenient, "--json"]);
+    let (json, said) = stdout_and_stderr(&["check", &domain, &problem, &lenient, "--json"]);
     let document: serde_json::Value = serde_json::from_str(&json).expect("JSON");
     assert!(said.contains("`min` is ignored"), "{said}");
     assert_eq!(

@@ -10,7 +10,7 @@ use command::{elbowroom, root};
 const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
 
 #[test]
-fn a_run_for_other_viewers_is_the_same_as_a_report_of_its_trace() {
+fn viewer_files_of_run_match_report_of_its_trace() {
     let folder = root().join("target/tmp/shown");
     fs::create_dir_all(&folder).expect("a folder");
     let file = |name: &str| folder.join(name).display().to_string();
@@ -30,7 +30,7 @@ fn a_run_for_other_viewers_is_the_same_as_a_report_of_its_trace() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_told_before_anything_is_done() {
+fn unwritable_viewer_file_is_reported_before_the_run() {
     let nowhere = "/nowhere/at/all";
     let tests: [(&[&str], &str); 5] = [
         (&["--perfetto", nowhere], "cannot write /nowhere/at/all"),

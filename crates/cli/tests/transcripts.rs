@@ -3,7 +3,7 @@
 use std::path::Path;
 
 #[test]
-fn the_transcripts_are_true() {
+fn transcripts_match_the_command() {
     // File names in transcripts are relative to the root of the repository.
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     std::env::set_current_dir(root).expect("the repository");

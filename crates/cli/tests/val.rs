@@ -23,7 +23,7 @@ fn benchmarks() -> Option<PathBuf> {
 
 /// Uses the tolerance at which the validator and VAL agree on all plans (`docs/val-agreement.md`).
 #[test]
-fn scripts_that_look_for_vals_words_come_to_vals_recorded_verdicts() {
+fn output_has_the_phrases_of_val() {
     let Some(root) = benchmarks() else {
         skipped("no benchmark set; set ELBOWROOM_SHARED to where it is");
         return;
@@ -96,7 +96,7 @@ fn valid_plans_of_all_cases_are_accepted_by_default() {
 }
 
 #[test]
-fn times_that_the_tolerance_makes_equal_are_named() {
+fn times_equal_within_tolerance_are_named() {
     let case =
         ["domain.pddl", "problem.pddl", "plan.plan"].map(|it| format!("cases/delivery/{it}"));
     let said = |tolerance: &str| {
@@ -114,7 +114,7 @@ fn times_that_the_tolerance_makes_equal_are_named() {
 
 #[cfg(unix)]
 #[test]
-fn under_vals_name_the_command_takes_vals_arguments() {
+fn command_named_validate_accepts_arguments_of_val() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("val");
     std::fs::create_dir_all(&folder).expect("a folder");
     for name in ["Validate", "validate"] {

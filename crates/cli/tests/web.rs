@@ -38,7 +38,7 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
 }
 
 /// Returns the output and exit code of the command with `--json`.
-fn said(arguments: &[&str]) -> (String, i32) {
+fn command_output(arguments: &[&str]) -> (String, i32) {
     let output = Command::new(COMMAND)
         .args(arguments)
         .arg("--json")
@@ -52,7 +52,7 @@ fn said(arguments: &[&str]) -> (String, i32) {
     )
 }
 
-fn asked(question: &Value) -> Reply {
+fn reply_to(question: &Value) -> Reply {
     reply(&question.to_string(), &mut || Duration::ZERO)
 }
 
@@ -73,8 +73,8 @@ fn timeless(document: &str) -> String {
 }
 
 fn assert_same(arguments: &[&str], question: &Value) -> Reply {
-    let (printed, exit) = said(arguments);
-    let reply = asked(question);
+    let (printed, exit) = command_output(arguments);
+    let reply = reply_to(question);
     assert_eq!(
         timeless(&reply.document),
         timeless(&printed),
@@ -85,7 +85,7 @@ fn assert_same(arguments: &[&str], question: &Value) -> Reply {
 }
 
 #[test]
-fn every_case_has_the_answers_of_the_command() {
+fn web_answers_match_the_command() {
     for (folder, plans) in cases() {
         let (domain, problem) = (
             format!("{folder}/domain.pddl"),
@@ -125,7 +125,7 @@ fn every_case_has_the_answers_of_the_command() {
 }
 
 #[test]
-fn a_run_with_a_seed_is_the_same_run() {
+fn run_with_seed_is_reproducible() {
     let name = |file: &str| format!("cases/delivery/{file}");
     let (domain, problem, plan) = (name("domain.pddl"), name("problem.pddl"), name("plan.plan"));
     let world = name("world.toml");
@@ -154,7 +154,8 @@ fn a_run_with_a_seed_is_the_same_run() {
         std::fs::remove_file(&trace).unwrap();
         let trace = reply.trace.expect("a run has a trace");
         assert_eq!(trace, written);
-        let page = asked(&json!({ "ask": "page", "of": { "name": "run.jsonl", "text": trace } }));
+        let page =
+            reply_to(&json!({ "ask": "page", "of": { "name": "run.jsonl", "text": trace } }));
         assert!(
             page.page
                 .expect("a trace has a page")
@@ -164,7 +165,7 @@ fn a_run_with_a_seed_is_the_same_run() {
 }
 
 #[test]
-fn what_is_wrong_in_a_text_is_said_in_the_same_words() {
+fn errors_in_texts_have_the_same_messages() {
     let domain = "crates/cli/tests/files/misspelt.pddl";
     let problem = "cases/delivery/problem.pddl";
     let question = json!({ "ask": "check", "domain": file(domain), "problem": file(problem) });
@@ -173,7 +174,7 @@ fn what_is_wrong_in_a_text_is_said_in_the_same_words() {
 }
 
 #[test]
-fn questions_that_make_no_sense_are_replied_to() {
+fn meaningless_requests_get_a_reply() {
     let domain = json!({ "name": "d", "text": "(define (domain d))" });
     let problem =
         json!({ "name": "p", "text": "(define (problem p) (:domain d) (:init) (:goal (and)))" });
@@ -202,7 +203,7 @@ fn questions_that_make_no_sense_are_replied_to() {
         json!({ "ask": "page", "of": { "name": "x", "text": "\u{202e}<script>" } }),
     ];
     for question in questions {
-        let reply = asked(&question);
+        let reply = reply_to(&question);
         assert_eq!(reply.exit, 2, "{question}: {}", reply.document);
         let document: Value = serde_json::from_str(&reply.document).unwrap();
         assert_eq!(document["format"], "elbowroom-failure", "{question}");

@@ -61,7 +61,7 @@ fn world(fault: &str) -> (String, String) {
 }
 
 #[test]
-fn each_fault_of_a_world_is_named() {
+fn faults_of_worlds_are_reported() {
     if !python_is_there() {
         return;
     }
@@ -114,7 +114,7 @@ fn each_fault_of_a_world_is_named() {
 }
 
 #[test]
-fn nothing_is_wrong_with_a_world_that_keeps_to_the_protocol() {
+fn conforming_world_passes_all_checks() {
     if !python_is_there() {
         return;
     }
@@ -183,7 +183,7 @@ world.run()
 }
 
 #[test]
-fn a_world_that_cannot_be_started_is_no_answer() {
+fn world_that_cannot_be_started_is_an_error() {
     let output = elbowroom(&["world-check", "no-such-program"]);
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -193,7 +193,7 @@ fn a_world_that_cannot_be_started_is_no_answer() {
 /// The clock of a robot's arm is ahead and runs twice as fast. Reported events have the time of
 /// that clock, converted to the world's time, and not the time of their arrival.
 #[test]
-fn what_another_clock_has_seen_has_happened_when_it_says() {
+fn times_of_another_clock_are_respected() {
     if !python_is_there() {
         return;
     }
@@ -307,7 +307,7 @@ fn the_library_for_python_and_the_bridges_pass_their_own_tests() {
 /// The initial state is sent completely, and then each change once. At the end the program has the
 /// same state as the validator.
 #[test]
-fn a_program_that_wants_to_hear_what_is_believed_is_told_all_of_it_once() {
+fn belief_subscriber_receives_all_beliefs_once() {
     if !python_is_there() {
         return;
     }

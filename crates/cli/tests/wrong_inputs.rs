@@ -48,7 +48,7 @@ impl Drop for Temporary {
 }
 
 /// Runs the command, checks its exit code, and returns standard error.
-fn said(code: i32, arguments: &[&str]) -> String {
+fn message(code: i32, arguments: &[&str]) -> String {
     let output = elbowroom(arguments);
     assert_eq!(
         output.status.code(),
@@ -63,7 +63,7 @@ fn envelope<'a>(problem: &[&'a str; 3], options: &[&'a str]) -> Vec<&'a str> {
 }
 
 #[test]
-fn a_parameter_that_does_not_exist_is_told_with_those_that_do() {
+fn unknown_parameter_is_reported_with_known_ones() {
     for (contains, words) in [
         ("d0=[5,12]", "the parameters are `dur_0`, `dur_1`"),
         (
@@ -71,7 +71,7 @@ fn a_parameter_that_does_not_exist_is_told_with_those_that_do() {
             "did you mean `(drive rover depot shelf)`?",
         ),
     ] {
-        let said = said(2, &envelope(&DELIVERY, &["--contains", contains]));
+        let said = message(2, &envelope(&DELIVERY, &["--contains", contains]));
         assert!(said.contains(words), "{contains}: {said}");
     }
 }
@@ -94,15 +94,15 @@ fn the_shortfall_of_a_box_is_the_same_everywhere() {
 }
 
 #[test]
-fn a_rate_of_continuous_change_is_varied_through_the_fluent_that_says_it() {
-    let said = said(2, &envelope(&TANK, &["--vary", "constant drain level"]));
+fn rate_is_varied_through_its_fluent() {
+    let said = message(2, &envelope(&TANK, &["--vary", "constant drain level"]));
     assert!(said.contains("`initial (outflow barrel)`"), "{said}");
 }
 
 #[test]
-fn an_initial_value_that_a_duration_follows_is_varied_as_that_duration() {
+fn initial_value_of_duration_is_varied_as_duration() {
     let vary = ["--vary", "initial (survey-time crater)"];
-    let said = said(2, &envelope(&BATTERY, &vary));
+    let said = message(2, &envelope(&BATTERY, &vary));
     assert!(
         said.contains("vary `duration (survey rover crater)`"),
         "{said}"
@@ -110,7 +110,7 @@ fn an_initial_value_that_a_duration_follows_is_varied_as_that_duration() {
 }
 
 #[test]
-fn a_bound_that_nothing_satisfies_is_shown_where_it_stands() {
+fn unsatisfiable_bound_is_shown_with_its_position() {
     let network = Temporary::new(
         "empty-bound.stn",
         "durative-action instance n0 : (fill barrel);\n\
@@ -118,14 +118,14 @@ fn a_bound_that_nothing_satisfies_is_shown_where_it_stands() {
          c: n0.start - .zero in [0, inf];\n",
     );
     let problem = [TANK[0], TANK[1], network.name()];
-    let said = said(2, &envelope(&problem, &[]));
+    let said = message(2, &envelope(&problem, &[]));
     assert!(said.contains("nothing lies between 9 and 8"), "{said}");
     assert!(said.contains(":2:26"), "{said}");
 }
 
 #[test]
-fn algorithms_that_are_offered_work() {
-    let refused = said(2, &envelope(&DELIVERY, &["--method", "greedy"]));
+fn offered_algorithms_work() {
+    let refused = message(2, &envelope(&DELIVERY, &["--method", "greedy"]));
     let offered = refused.split("possible values: ").nth(1).expect("a list");
     let offered = offered.split(']').next().expect("an end of the list");
     let offered: Vec<&str> = offered.split(", ").collect();
@@ -139,9 +139,9 @@ fn algorithms_that_are_offered_work() {
 #[test]
 fn files_in_the_wrong_order_are_recognised() {
     let [domain, problem, plan] = DELIVERY;
-    let plan_first = said(2, &["check", domain, plan, problem]);
+    let plan_first = message(2, &["check", domain, plan, problem]);
     assert!(plan_first.contains("it looks like a plan"), "{plan_first}");
-    let problem_first = said(2, &["check", problem, domain]);
+    let problem_first = message(2, &["check", problem, domain]);
     assert!(
         problem_first.contains("in the wrong order?"),
         "{problem_first}"
@@ -149,7 +149,7 @@ fn files_in_the_wrong_order_are_recognised() {
 }
 
 #[test]
-fn what_is_read_leniently_in_a_plan_is_a_warning() {
+fn tolerated_plan_syntax_is_a_warning() {
     for (name, plan, words) in [
         (
             "unit",
@@ -176,7 +176,7 @@ fn what_is_read_leniently_in_a_plan_is_a_warning() {
 }
 
 #[test]
-fn numbers_below_zero_are_taken_for_values_and_not_for_options() {
+fn negative_numbers_are_values_and_not_options() {
     let world = "cases/delivery/world.toml";
     let experiment = "crates/cli/tests/files/late-drives.toml";
     let run = |option| vec!["run", DELIVERY[0], DELIVERY[1], option, "-1"];
@@ -192,7 +192,7 @@ fn numbers_below_zero_are_taken_for_values_and_not_for_options() {
         vec!["compare", experiment, "--trials", "-1"],
         vec!["plan", DELIVERY[0], DELIVERY[1], "--memory", "-1"],
     ] {
-        let said = said(2, &arguments);
+        let said = message(2, &arguments);
         assert!(
             !said.contains("unexpected argument"),
             "{arguments:?}: {said}"
@@ -202,20 +202,20 @@ fn numbers_below_zero_are_taken_for_values_and_not_for_options() {
 }
 
 #[test]
-fn a_text_where_a_number_belongs_is_told_in_words() {
+fn text_instead_of_number_is_explained() {
     let text = fs::read_to_string(command::root().join("experiments/olisipo_sf3.toml"));
     let text = text.expect("the experiment");
     let wrong = text.replacen("seed = 1", "seed = \"one\"", 1);
     assert_ne!(text, wrong);
     let file = Temporary::new("seed.toml", &wrong);
-    let said = said(2, &["compare", file.name()]);
+    let said = message(2, &["compare", file.name()]);
     assert!(said.contains("a whole number"), "{said}");
     assert!(!said.contains("u64"), "{said}");
 }
 
 /// The sliding-tile puzzle with two tiles exchanged has no plan. The proof needs more than 1 MB.
 #[test]
-fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
+fn memory_limit_is_reported_in_megabytes_and_proves_nothing() {
     let domain = Temporary::new(
         "tiles-domain.pddl",
         "(define (domain tiles)
@@ -264,7 +264,7 @@ fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
 
 /// A world that answers with an unknown ticket without advancing its time is reported.
 #[test]
-fn a_ticket_that_was_never_given_is_named() {
+fn unknown_ticket_is_named() {
     let world = Temporary::new(
         "ticket.sh",
         "while read -r line; do case \"$line\" in *'\"wait\"'*|*'\"look\"'*)\n\
@@ -282,13 +282,13 @@ fn a_ticket_that_was_never_given_is_named() {
     let report = String::from_utf8(output.stdout).expect("text");
     assert!(report.contains("the world failed at 0"), "{report}");
     assert!(!report.contains("stands still"), "{report}");
-    let strict = said(2, &[&run[..], &["--strict-world"]].concat());
+    let strict = message(2, &[&run[..], &["--strict-world"]].concat());
     assert!(strict.contains("ticket 77 was never given"), "{strict}");
 }
 
 /// Column names are unique, and each cell contains one number, for use by programs.
 #[test]
-fn the_table_of_an_experiment_is_one_for_programs() {
+fn table_of_experiment_is_machine_readable() {
     let folder = std::env::temp_dir().join(format!("elbowroom-{}-tidy", std::process::id()));
     let path = folder.display().to_string();
     let experiment = "crates/cli/tests/files/late-drives.toml";

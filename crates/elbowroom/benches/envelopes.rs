@@ -19,8 +19,8 @@ use std::sync::Arc;
 
 use divan::Bencher;
 use elbowroom::answers::envelope::envelope;
-use elbowroom::answers::{EnvelopeRequest, Unwatched};
-use elbowroom::{AnyPlan, flow};
+use elbowroom::answers::{EnvelopeRequest, NoObserver};
+use elbowroom::{AnyPlan, pipeline};
 use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_plan, read_problem};
@@ -98,8 +98,8 @@ fn delivery(parameters: usize) -> (Arc<Task>, Arc<ParametrizedPlan>) {
         read_problem(&domain, &Source::new("problem", problem)).expect("a readable problem");
     let task = Task::new(problem);
     let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a readable plan");
-    let freed = flow::free(&task, &plan).expect("a valid plan");
-    let plan = flow::open(&task, freed, &[]).expect("durations to leave open");
+    let freed = pipeline::free(&task, &plan).expect("a valid plan");
+    let plan = pipeline::open(&task, freed, &[]).expect("durations to leave open");
     assert_eq!(plan.parameters.len(), parameters);
     (Arc::new(task), Arc::new(plan))
 }
@@ -135,7 +135,7 @@ fn many(bencher: Bencher<'_, '_>, (robots, ways, needs): (usize, usize, Needs)) 
     let task = Task::new(problem);
     let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a readable plan");
     let request = EnvelopeRequest::new(&Arc::new(task), AnyPlan::TimeTriggered(plan));
-    bencher.bench_local(|| envelope(&request, &mut Unwatched).expect("within exact reasoning"));
+    bencher.bench_local(|| envelope(&request, &mut NoObserver).expect("within exact reasoning"));
 }
 
 #[divan::bench_group]

@@ -23,6 +23,7 @@ pub mod check;
 pub mod envelope;
 mod format;
 pub mod learn;
+mod observer;
 pub mod odds;
 pub mod plan;
 pub mod region;
@@ -30,13 +31,15 @@ pub mod repair;
 pub mod run;
 pub mod stn;
 mod violation;
-mod watch;
 
 pub use check::{CheckAnswer, CheckRequest};
 pub use elbowroom_report::exact::{self, Exact};
 pub use envelope::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
 pub use format::Version;
 pub use learn::{LearnAnswer, LearnRequest};
+pub use observer::{
+    EnvelopeProgress, Event, NoObserver, Observer, PlanProgress, StopRequest, TrialsProgress,
+};
 pub use odds::{OddsAnswer, OddsRequest};
 pub use plan::{PlanAnswer, PlanOutcome, PlanRequest};
 pub use region::{RegionAnswer, RegionOutcome};
@@ -44,11 +47,10 @@ pub use repair::{RepairAnswer, RepairOutcome, RepairRequest};
 pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;
-pub use watch::{EnvelopeProgress, Event, Halt, PlanProgress, TrialsProgress, Unwatched, Watcher};
 
 use crate::box_text::BoxTextError;
-use crate::chances::ChanceError;
-use crate::flow::FlowError;
+use crate::duration_distributions::DistributionError;
+use crate::pipeline::PipelineError;
 
 /// A reason for a missing answer: the request cannot be understood, or exceeds the analysis.
 #[derive(Debug, thiserror::Error)]
@@ -57,7 +59,7 @@ pub enum RequestError {
     /// The plan has no order, the requested quantities cannot be left open, or the plan is beyond
     /// exact analysis.
     #[error(transparent)]
-    Flow(#[from] FlowError),
+    Pipeline(#[from] PipelineError),
     /// The given box is not one of this plan.
     #[error(transparent)]
     Box(#[from] BoxTextError),
@@ -66,7 +68,7 @@ pub enum RequestError {
     Undecided(String),
     /// The probability that the durations of the plan stay inside a box is unknown.
     #[error(transparent)]
-    Chance(#[from] ChanceError),
+    Distribution(#[from] DistributionError),
     /// The time-outs name an action that the problem does not have.
     #[error("{0}")]
     Timeout(String),

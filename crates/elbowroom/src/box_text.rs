@@ -46,7 +46,7 @@ pub enum BoxTextError {
     },
     /// A parameter is mentioned twice.
     #[error("`{name}` is given two intervals: give it one")]
-    Twice {
+    Duplicate {
         /// Its name.
         name: String,
     },
@@ -79,7 +79,7 @@ pub fn parse_box(text: &str, plan: &ParametrizedPlan) -> Result<DecoupledEnvelop
         let id = match find(&name, plan) {
             Err(BoxTextError::Unknown { .. }) if name.eq_ignore_ascii_case(ALL) => {
                 if of_all.replace(value).is_some() {
-                    return Err(BoxTextError::Twice { name });
+                    return Err(BoxTextError::Duplicate { name });
                 }
                 continue;
             }
@@ -90,7 +90,7 @@ pub fn parse_box(text: &str, plan: &ParametrizedPlan) -> Result<DecoupledEnvelop
             return Err(BoxTextError::Empty { name });
         }
         if given[id.index()].replace(interval).is_some() {
-            return Err(BoxTextError::Twice { name });
+            return Err(BoxTextError::Duplicate { name });
         }
     }
     let mut envelope = DecoupledEnvelope::point(&plan.nominal());
@@ -251,7 +251,7 @@ pub(crate) fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, B
             let actions = durations.iter().map(|(_, action, _)| *action);
             Err(BoxTextError::Unknown {
                 name: name.to_owned(),
-                known: known(plan),
+                known: known_names(plan),
                 nearest: nearest(name, names.chain(actions)).map(str::to_owned),
             })
         }
@@ -265,7 +265,7 @@ pub(crate) fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, B
     }
 }
 
-fn known(plan: &ParametrizedPlan) -> String {
+fn known_names(plan: &ParametrizedPlan) -> String {
     if plan.parameters.is_empty() {
         return "none".to_owned();
     }
@@ -299,13 +299,13 @@ mod tests {
             plan: StnPlan::default(),
             parameters: vec![parameter("d0"), parameter("d1")],
             initial: BTreeMap::new(),
-            told: BTreeMap::new(),
+            commanded_durations: BTreeMap::new(),
             goal: Condition::TRUE,
         }
     }
 
     #[test]
-    fn a_box_is_read_as_it_is_written() {
+    fn box_text_round_trips() {
         let plan = plan();
         for text in ["d0=[7/4,3829/4] d1=[0,inf]", "d0=[5,5] d1=[-inf,9]"] {
             let envelope = parse_box(text, &plan).unwrap();
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_and_a_deviation_are_intervals() {
+    fn value_and_deviation_are_parsed_as_intervals() {
         let plan = plan();
         for (text, expected) in [
             ("d0=7", "d0=[7,7] d1=[5,5]"),
@@ -332,21 +332,24 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_box_is_said() {
+    fn errors_in_box_text_are_reported() {
         let error = |text: &str| parse_box(text, &plan()).unwrap_err();
         assert!(matches!(error("d0"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0="), BoxTextError::Syntax { .. }));
         assert!(matches!(error("=[1,2]"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=±-1"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=[1,2"), BoxTextError::Syntax { .. }));
-        assert!(matches!(error("all=±1 all=±2"), BoxTextError::Twice { .. }));
+        assert!(matches!(
+            error("all=±1 all=±2"),
+            BoxTextError::Duplicate { .. }
+        ));
         assert!(matches!(error("d0=[7]"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=[1,x]"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=[inf,1]"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=[2,1]"), BoxTextError::Empty { .. }));
         assert!(matches!(
             error("d0=[1,2] d0=[1,2]"),
-            BoxTextError::Twice { .. }
+            BoxTextError::Duplicate { .. }
         ));
         assert_eq!(
             error("xyz=[1,2]").to_string(),

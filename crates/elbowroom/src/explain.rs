@@ -1,11 +1,11 @@
 //! Descriptions of results about a plan in words.
 
+mod adversary;
 mod conflict;
 mod control;
-mod spoiler;
 mod timed;
 
-pub(crate) use conflict::Seen;
+pub(crate) use conflict::KnownConflicts;
 
 use elbowroom_envelope::obligations::Requirement;
 use elbowroom_envelope::soundness::{Broken, Counterexample};
@@ -47,7 +47,7 @@ pub struct Explanation {
     /// If there is a schedule for all values, but no executor can find it in time: strategies of
     /// the world against an executor that starts everything as early as possible, and against one
     /// that starts everything as late as possible.
-    pub plays: Vec<String>,
+    pub strategies: Vec<String>,
 }
 
 impl Explanation {
@@ -65,7 +65,7 @@ pub enum Shortfall {
     /// A happening can be late by this time.
     Time(Rational),
     /// A happening can be late by any time.
-    Boundless,
+    Unbounded,
     /// A comparison fails by this amount.
     Amount(Rational),
 }
@@ -75,7 +75,7 @@ impl Shortfall {
     pub fn value(&self) -> Option<&Rational> {
         match self {
             Self::Time(value) | Self::Amount(value) => Some(value),
-            Self::Boundless => None,
+            Self::Unbounded => None,
         }
     }
 }
@@ -100,10 +100,10 @@ impl<'a> Explainer<'a> {
                     .worst_case(refused, broken)
                     .filter(|worst| self.verdict(worst).is_some())
                     .or_else(|| oracle.counterexample(refused, broken));
-                self.broken(broken, example)
+                self.violation(broken, example)
             }
             Objection::Uncontrollable(conflict) => Explanation {
-                plays: self.spoiled(refused),
+                strategies: self.adversary_strategies(refused),
                 ..self.without_example(self.uncontrollable_in(conflict, refused))
             },
             other => self.without_example(other.to_string()),
@@ -122,22 +122,22 @@ impl<'a> Explainer<'a> {
             valuation: valuation.clone(),
             schedule: None,
             verdict: None,
-            plays: Vec::new(),
+            strategies: Vec::new(),
         }
     }
 
     /// Returns the reason why an end of a parameter's interval cannot move further; `None` if there
     /// is none.
     pub fn limit(&self, id: ParameterId, side: Side, limit: &Limit) -> Option<String> {
-        self.limit_beside((id, side), limit, &mut Seen::default())
+        self.limit_with_known_conflicts((id, side), limit, &mut KnownConflicts::default())
     }
 
     /// Does the same, reusing the conflicts in `seen` that were computed for other ends.
-    pub(crate) fn limit_beside(
+    pub(crate) fn limit_with_known_conflicts(
         &self,
         (id, side): (ParameterId, Side),
         limit: &Limit,
-        seen: &mut Seen,
+        seen: &mut KnownConflicts,
     ) -> Option<String> {
         match limit {
             Limit::Unbounded => None,
@@ -153,7 +153,7 @@ impl<'a> Explainer<'a> {
         }
     }
 
-    fn broken(&self, broken: &Broken, example: Option<Counterexample>) -> Explanation {
+    fn violation(&self, broken: &Broken, example: Option<Counterexample>) -> Explanation {
         let reason = self.requirement(&broken.requirement);
         let Some(mut example) = example else {
             return self.without_example(reason);
@@ -161,7 +161,7 @@ impl<'a> Explainer<'a> {
         let shortfall = match &broken.requirement {
             Requirement::Separation { first, second } => {
                 let mut late = example.clone();
-                let shortfall = self.make_late(&mut late, *first, *second);
+                let shortfall = self.delay_first(&mut late, *first, *second);
                 // The reverse order may be harmless; a distance below ε never is.
                 if self.verdict(&late).is_some() || self.verdict(&example).is_none() {
                     example = late;
@@ -176,7 +176,7 @@ impl<'a> Explainer<'a> {
             verdict: self.verdict(&example),
             valuation: example.valuation,
             schedule: Some(example.schedule),
-            plays: Vec::new(),
+            strategies: Vec::new(),
         }
     }
 
@@ -187,13 +187,13 @@ impl<'a> Explainer<'a> {
             valuation: self.plan.nominal(),
             schedule: None,
             verdict: None,
-            plays: Vec::new(),
+            strategies: Vec::new(),
         }
     }
 
     /// Gives the example a schedule where `first` comes as late as possible relative to `second`,
     /// or 1 later if there is no limit.
-    fn make_late(
+    fn delay_first(
         &self,
         example: &mut Counterexample,
         first: NodeId,
@@ -209,7 +209,7 @@ impl<'a> Explainer<'a> {
             .ok()?;
         let schedule = network.earliest_schedule(network_node(NodeId::ZERO));
         example.schedule = schedule.into();
-        Some(most.map_or(Shortfall::Boundless, |most| {
+        Some(most.map_or(Shortfall::Unbounded, |most| {
             Shortfall::Time(&most + self.task.epsilon())
         }))
     }
@@ -257,18 +257,18 @@ impl<'a> Explainer<'a> {
         let epsilon = self.task.epsilon().to_decimal(6);
         let kind = |node: &NodeId| plan.nodes[node.index()];
         match (kind(first), kind(second)) {
-            (Node::Start(start), Node::End(end)) if start == end => self.own_separation(),
+            (Node::Start(start), Node::End(end)) if start == end => self.describe_own_separation(),
             (_, Node::Timed(index)) => self.deadline(*first, index),
             (Node::Timed(index), _) => format!(
                 "{} must come {epsilon} after {}{}",
-                plan.node_words(self.task, *second),
+                plan.describe_node(self.task, *second),
                 self.timed_change(*second, index),
                 self.at_time(index),
             ),
             _ => format!(
                 "{} must come {epsilon} before {}",
-                plan.node_words(self.task, *first),
-                plan.node_words(self.task, *second),
+                plan.describe_node(self.task, *first),
+                plan.describe_node(self.task, *second),
             ),
         }
     }
@@ -311,7 +311,7 @@ impl<'a> Explainer<'a> {
     }
 
     /// Explains why the duration of an action is at least ε.
-    fn own_separation(&self) -> String {
+    fn describe_own_separation(&self) -> String {
         let epsilon = self.task.epsilon().to_decimal(6);
         format!("an action whose start and end interfere takes at least {epsilon}")
     }

@@ -58,11 +58,11 @@ use elbowroom_plan::{
 
 use crate::answers::envelope::{self, EnvelopeFinding, Range};
 use crate::answers::{EnvelopeAnswer, EnvelopeRequest};
-use crate::flow::FlowError;
 use crate::linear_form::LinearForm;
+use crate::pipeline::PipelineError;
 
 /// Largest number of positions that are distinguished for a moment inside an action.
-const MOST_PLACES: usize = 4_096;
+const MOST_POSITIONS: usize = 4_096;
 
 /// Reasons why a document cannot be exported.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -105,8 +105,8 @@ pub enum ExportError {
 ///
 /// # Errors
 /// When the validator rejects the plan, or the request names things that the plan does not have.
-pub fn opened(request: &EnvelopeRequest) -> Result<ParametrizedPlan, FlowError> {
-    Ok(envelope::opened(request)?.0)
+pub fn parametrized_plan(request: &EnvelopeRequest) -> Result<ParametrizedPlan, PipelineError> {
+    Ok(envelope::parametrized_plan(request)?.0)
 }
 
 /// Returns the box of an answer: the envelope that was found, or the box that was checked.
@@ -190,7 +190,7 @@ pub fn box_check(
     guarantee: Guarantee,
 ) -> Result<String, ExportError> {
     let around = envelope.nearest(&plan.nominal());
-    let form = LinearForm::new(task, plan, envelope, &around, MOST_PLACES).map_err(refused)?;
+    let form = LinearForm::new(task, plan, envelope, &around, MOST_POSITIONS).map_err(refused)?;
     let text = smt::Text::new(task, plan, &form);
     let mut written = text.box_heading(envelope, guarantee);
     text.conditions(envelope, &mut written);
@@ -214,7 +214,7 @@ pub fn box_check(
 /// When the plan has no schedule at its nominal values, or is beyond exact analysis.
 pub fn region(task: &Task, plan: &ParametrizedPlan) -> Result<String, ExportError> {
     let ranges = DecoupledEnvelope::ranges(plan);
-    let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MOST_PLACES);
+    let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MOST_POSITIONS);
     let form = form.map_err(refused)?;
     Ok(smt::Text::new(task, plan, &form).region(&ranges))
 }

@@ -161,26 +161,28 @@
 
 pub mod answers;
 mod box_text;
-mod chances;
+pub mod dot;
+mod duration_distributions;
 pub mod execute;
 pub mod executive;
 mod explain;
 pub mod export;
-pub mod flow;
 mod given_plan;
-pub mod graph;
 mod linear_form;
 mod makespan;
 pub mod network;
 pub mod no_plan;
+mod pinning;
+pub mod pipeline;
 mod plan_file;
 mod plan_text;
-mod room;
 mod rounding;
 pub mod timed;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
-pub use chances::{ChanceError, chance, chances};
+pub use duration_distributions::{
+    DistributionError, duration_distribution, duration_distributions,
+};
 pub use elbowroom_envelope as envelope;
 pub use elbowroom_execution as execution;
 pub use elbowroom_external as external;

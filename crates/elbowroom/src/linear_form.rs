@@ -69,7 +69,7 @@ impl LinearForm {
                     instance: over_all.instance,
                     condition: over_all.condition.clone(),
                 },
-                bad_cases: unfolded(task, plan, over_all, &order, most_places)?,
+                bad_cases: expand_positions(task, plan, over_all, &order, most_places)?,
             });
         }
         Ok(Self {
@@ -134,7 +134,7 @@ fn bound(constraint: &Constraint, side: Side) -> Option<Linear> {
 
 /// Returns the violations of an over-all condition, for each possible position of its moment among
 /// the events that it depends on.
-fn unfolded(
+fn expand_positions(
     task: &Task,
     plan: &ParametrizedPlan,
     over_all: &OverAll,

@@ -9,7 +9,7 @@ use elbowroom_stn::{ConsistentNetwork, Constraint, Network, NodeId};
 /// parameters; `None` if the plan has no schedule. Durations that the executor chooses are as
 /// planned, if possible.
 pub fn earliest_end(plan: &ParametrizedPlan, valuation: &Valuation) -> Option<Rational> {
-    let network = as_told(plan, plan.plan.network(valuation))?;
+    let network = with_fixed_choices(plan, plan.plan.network(valuation))?;
     let schedule = network.earliest_schedule(NodeId(0));
     plan.plan
         .nodes()
@@ -19,7 +19,7 @@ pub fn earliest_end(plan: &ParametrizedPlan, valuation: &Valuation) -> Option<Ra
 }
 
 /// Returns the end time of the last action.
-pub(crate) fn end(plan: &TimeTriggeredPlan) -> Rational {
+pub(crate) fn last_end(plan: &TimeTriggeredPlan) -> Rational {
     let ends = plan.steps.iter().map(|step| {
         let duration = step.duration.clone().unwrap_or_default();
         &step.start + &duration
@@ -32,10 +32,13 @@ pub(crate) fn end(plan: &TimeTriggeredPlan) -> Rational {
 /// schedules; `None` if there are none at all.
 ///
 /// A plan that works only for other durations has at most the weak guarantee.
-pub(crate) fn as_told(plan: &ParametrizedPlan, network: Network) -> Option<ConsistentNetwork> {
+pub(crate) fn with_fixed_choices(
+    plan: &ParametrizedPlan,
+    network: Network,
+) -> Option<ConsistentNetwork> {
     let mut told = network.clone();
     for constraint in &plan.plan.constraints {
-        if let Some(duration) = plan.told_by(constraint) {
+        if let Some(duration) = plan.commanded_duration(constraint) {
             let (from, to) = (network_node(constraint.from), network_node(constraint.to));
             told.add(Constraint::at_least(from, to, duration.clone()));
             told.add(Constraint::at_most(from, to, duration.clone()));

@@ -28,7 +28,8 @@ use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::Dispatchable;
 
 pub use answer::{
-    Answer, Broken, LinkDuration, Number, Promise, Reason, Simulated, Step, Time, Verdict,
+    Answer, ControllabilityCheck, LinkDuration, Number, Reason, Simulated, Step, Time, Verdict,
+    ViolatedRequirement,
 };
 pub use elbowroom_network::*;
 pub use simulate::{Durations, Simulation, SimulationError};
@@ -58,17 +59,17 @@ impl Default for Request {
 ///
 /// # Errors
 /// When the network cannot be simulated as requested.
-pub fn examine(file: &NetworkFile, request: &Request) -> Result<Answer, SimulationError> {
+pub fn analyze(file: &NetworkFile, request: &Request) -> Result<Answer, SimulationError> {
     let consistent = reasons::consistent(file);
     let form = file.network.dispatchable();
     let (mut weak, mut dynamic, mut strong) = (None, None, None);
     if !file.is_certain() {
         weak = Some(match &form {
-            Ok(_) => Promise::yes(),
+            Ok(_) => ControllabilityCheck::yes(),
             Err(_) => reasons::weak(file, request.most_branches),
         });
         dynamic = Some(match &form {
-            Ok(_) => Promise::yes(),
+            Ok(_) => ControllabilityCheck::yes(),
             Err(conflict) => reasons::dynamic(file, conflict),
         });
         strong = Some(reasons::strong(file));

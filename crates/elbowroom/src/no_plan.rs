@@ -4,7 +4,7 @@
 //! as a fact only if [`no_plan_certificate_from`] returns a certificate, which [`verify_no_plan_from`] has
 //! accepted. This module is the only source of the answer that no plan exists.
 
-mod closed;
+mod closed_set;
 mod conflict;
 mod pairs;
 mod without_value;
@@ -17,7 +17,7 @@ use elbowroom_num::{Interval, Rational};
 use elbowroom_verify::Exact;
 use elbowroom_verify::no_plan::pairs::Structure;
 use elbowroom_verify::no_plan::{
-    Instances, NoPlan, Reached, no_plan_certificate, verify_earliest, verify_no_plan_from,
+    Instances, NoPlan, ReachedFacts, no_plan_certificate, verify_earliest, verify_no_plan_from,
 };
 
 pub use conflict::conflict;
@@ -27,35 +27,35 @@ pub use without_value::fluents_without_value;
 const MOST_STEPS: u64 = 1_000_000;
 
 /// Limit on the evaluated effects of instances, for all rounds together (some seconds).
-const MOST_LOOKS: usize = 3_000_000;
+const MOST_EVALUATIONS: usize = 3_000_000;
 
 /// Work for the evaluation of the effects of one instance.
-const WORK_OF_A_LOOK: u64 = 10;
+const EVALUATION_WORK: u64 = 10;
 
 /// Limit on the work for a certificate, and a callback that interrupts it.
 ///
 /// A unit of work is one object tried for a parameter, about 0.1 µs in an optimized build.
 pub struct Effort<'a> {
-    left: u64,
-    goes_on: &'a mut dyn FnMut() -> bool,
+    remaining: u64,
+    may_continue: &'a mut dyn FnMut() -> bool,
 }
 
 /// The effort is spent.
-struct Spent;
+struct EffortExhausted;
 
 impl<'a> Effort<'a> {
     /// Creates an effort of `work` units, which ends early when `goes_on` returns `false`.
     pub fn of(work: u64, goes_on: &'a mut dyn FnMut() -> bool) -> Self {
         Self {
-            left: work,
-            goes_on,
+            remaining: work,
+            may_continue: goes_on,
         }
     }
 
-    fn spend(&mut self, work: u64) -> Result<(), Spent> {
-        self.left = self.left.saturating_sub(work);
-        if self.left == 0 || !(self.goes_on)() {
-            return Err(Spent);
+    fn spend(&mut self, work: u64) -> Result<(), EffortExhausted> {
+        self.remaining = self.remaining.saturating_sub(work);
+        if self.remaining == 0 || !(self.may_continue)() {
+            return Err(EffortExhausted);
         }
         Ok(())
     }
@@ -86,7 +86,7 @@ pub fn no_plan_certificate_within(
     situation: &Situation,
     effort: &mut Effort<'_>,
 ) -> Result<NoPlan, String> {
-    let certificate = proposed(task, situation, effort)?;
+    let certificate = propose_certificate(task, situation, effort)?;
     match verify_no_plan_from(task, situation, &certificate) {
         Ok(()) => Ok(certificate),
         Err(flaw) => Err(format!("the verifier refuses the certificate: {flaw}")),
@@ -106,7 +106,7 @@ pub fn earliest_times(
 ) -> Result<Vec<Option<Rational>>, String> {
     let instances = Instances::from(task, situation);
     let mut instances = instances.map_err(|flaw| flaw.to_string())?;
-    let certificate = no_plan_certificate(task, &reached(&mut instances, effort)?);
+    let certificate = no_plan_certificate(task, &add_reachable(&mut instances, effort)?);
     let times = conditions
         .iter()
         .map(|condition| verify_earliest(task, situation, &certificate, condition));
@@ -146,10 +146,14 @@ pub fn with_any_ends(situation: &Situation) -> Situation {
 }
 
 /// Proposes a certificate, which the verifier has not checked yet.
-fn proposed(task: &Task, situation: &Situation, effort: &mut Effort<'_>) -> Result<NoPlan, String> {
+fn propose_certificate(
+    task: &Task,
+    situation: &Situation,
+    effort: &mut Effort<'_>,
+) -> Result<NoPlan, String> {
     let instances = Instances::from(task, situation);
     let mut instances = instances.map_err(|flaw| flaw.to_string())?;
-    let reached = reached(&mut instances, effort)?;
+    let reached = add_reachable(&mut instances, effort)?;
     let mut certificate = no_plan_certificate(task, &reached);
     if !instances.is_goal_in_reach(&reached) {
         return Ok(certificate);
@@ -157,26 +161,26 @@ fn proposed(task: &Task, situation: &Situation, effort: &mut Effort<'_>) -> Resu
     let structure = Structure::of(&instances, &reached);
     match pairs::claims(&structure, effort) {
         Ok(claims) => {
-            certificate.apart = structure.written(&claims);
+            certificate.apart = structure.to_groups(&claims);
             certificate.epsilon = Some(Exact(task.epsilon().clone()));
             let proves = certificate.kind().proves();
             proves.clone_into(&mut certificate.proves);
             return Ok(certificate);
         }
         Err(pairs::Failure::Stopped) => return Err(EFFORT_IS_SPENT.to_owned()),
-        Err(pairs::Failure::TooMany | pairs::Failure::InReach) => {}
+        Err(pairs::Failure::TooMany | pairs::Failure::Reachable) => {}
     }
-    match closed::closed(task, &instances, &reached, effort) {
+    match closed_set::closed_set(task, &instances, &reached, effort) {
         Ok(closed) => {
             certificate.closed = Some(closed);
             let proves = certificate.kind().proves();
             proves.clone_into(&mut certificate.proves);
             Ok(certificate)
         }
-        Err(closed::Failure::Stopped) => Err(EFFORT_IS_SPENT.to_owned()),
-        Err(closed::Failure::TooMany) => Err("there are too many states to list".to_owned()),
-        Err(closed::Failure::Unknown(why)) => Err(why),
-        Err(closed::Failure::InReach) => Err(
+        Err(closed_set::Failure::Stopped) => Err(EFFORT_IS_SPENT.to_owned()),
+        Err(closed_set::Failure::TooMany) => Err("there are too many states to list".to_owned()),
+        Err(closed_set::Failure::Unknown(why)) => Err(why),
+        Err(closed_set::Failure::Reachable) => Err(
             "the verifier's rules leave the goal in reach: they do not count the least separation of \
              happenings, nor numbers and alternatives that have to hold throughout actions"
                 .to_owned(),
@@ -185,21 +189,24 @@ fn proposed(task: &Task, situation: &Situation, effort: &mut Effort<'_>) -> Resu
 }
 
 /// Adds the reachable instances of actions, and returns the facts that they reach.
-fn reached(instances: &mut Instances, effort: &mut Effort<'_>) -> Result<Reached, String> {
+fn add_reachable(
+    instances: &mut Instances,
+    effort: &mut Effort<'_>,
+) -> Result<ReachedFacts, String> {
     let too_many =
         || "there are too many instances of actions to list the facts they reach".to_owned();
-    let mut reached = Reached::new();
+    let mut reached = ReachedFacts::new();
     let mut looks = 0;
     loop {
         let steps = instances.extend(&reached, MOST_STEPS);
         let steps = steps.map_err(|_| too_many())?;
         looks += instances.len();
-        if looks > MOST_LOOKS {
+        if looks > MOST_EVALUATIONS {
             return Err(too_many());
         }
-        let work = steps + WORK_OF_A_LOOK * instances.len() as u64;
+        let work = steps + EVALUATION_WORK * instances.len() as u64;
         let spent = effort.spend(work);
-        spent.map_err(|Spent| EFFORT_IS_SPENT.to_owned())?;
+        spent.map_err(|EffortExhausted| EFFORT_IS_SPENT.to_owned())?;
         let breaches = instances.breaches(&reached);
         if breaches.is_empty() {
             return Ok(reached);

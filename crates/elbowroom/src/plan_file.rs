@@ -58,7 +58,7 @@ mod tests {
     use super::PlanKind;
 
     #[test]
-    fn a_plan_is_known_by_its_content() {
+    fn plan_kind_is_detected_from_content() {
         let kind = PlanKind::of_text;
         assert_eq!(kind("0.0: (go a) [1]\n"), PlanKind::TimeTriggered);
         assert_eq!(kind(""), PlanKind::TimeTriggered);

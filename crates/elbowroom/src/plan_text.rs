@@ -37,7 +37,7 @@ pub fn plan_text(task: &Task, plan: &TimeTriggeredPlan) -> String {
     let mut first = None;
     for digits in FEWEST_DIGITS..=MOST_DIGITS {
         let text = write_rounded_plan(task, plan, digits);
-        let Some(printed) = read_again(task, &text) else {
+        let Some(printed) = reparse(task, &text) else {
             break;
         };
         if !RoundingRule::default().is_valid(task, &printed) {
@@ -51,7 +51,7 @@ pub fn plan_text(task: &Task, plan: &TimeTriggeredPlan) -> String {
     first.unwrap_or_else(|| write_plan(task, plan))
 }
 
-fn read_again(task: &Task, text: &str) -> Option<PrintedPlan> {
+fn reparse(task: &Task, text: &str) -> Option<PrintedPlan> {
     let read = read_printed_plan(&Source::new("plan", text), task);
     read.ok().map(|(printed, _)| printed)
 }

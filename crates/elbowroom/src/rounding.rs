@@ -11,18 +11,20 @@
 
 use elbowroom_envelope::{RepairLimits, RepairRun, repair};
 use elbowroom_model::problem::Comparison;
-use elbowroom_model::validate::{self, Mistake, Reason as Because, Settings, Verdict, Violation};
+use elbowroom_model::validate::{
+    self, Reason as Because, Settings, Verdict, Violation, ViolationKind,
+};
 use elbowroom_model::{Step, Task, TimeTriggeredPlan};
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_pddl::{
     Diagnostic, Diagnostics, PrintedPlan, PrintedStep, Source, read_printed_plan,
 };
-use elbowroom_plan::deorder::{allowed_durations, deorder_the_plan_alone, unordered};
+use elbowroom_plan::deorder::{allowed_durations, deorder_ignoring_processes, unordered};
 use elbowroom_plan::{
     Bound, Constraint, InstanceId, NodeId, ParametrizedPlan, Reason, Schedule, StnPlan, Valuation,
     network_node,
 };
-use elbowroom_stn::{ConsistentNetwork, MovingWindows, Window};
+use elbowroom_stn::{ConsistentNetwork, IncrementalWindows, Window};
 use elbowroom_text::Severity;
 
 /// The largest difference that counts as rounding if the user gives no tolerance.
@@ -179,7 +181,7 @@ impl RoundingRule {
         windows: &[StepWindow],
     ) -> Option<TimeTriggeredPlan> {
         // No plan results if interfering happenings have no order.
-        let refitted = refitted(task, order, plan, windows)?;
+        let refitted = fit_times_to_windows(task, order, plan, windows)?;
         match self.verdict(task, &refitted) {
             Verdict::Valid(_) => Some(refitted),
             Verdict::Invalid(violation) if is_about_numbers(&violation) => {
@@ -221,13 +223,13 @@ impl RoundingRule {
         plan: &TimeTriggeredPlan,
         windows: &[StepWindow],
     ) -> Option<TimeTriggeredPlan> {
-        if task.left_to_the_judge().is_some() || plan.steps.len() > MOST_STEPS {
+        if task.unsupported_by_analysis().is_some() || plan.steps.len() > MOST_STEPS {
             return None;
         }
         let mut free = unordered(task, plan);
         bound_times(&mut free.plan, &free.instances, windows);
         let closed = ParametrizedPlan::closed(task, free.plan);
-        let at = |schedule: &Schedule| at_times(plan, &closed.plan, &free.instances, schedule);
+        let at = |schedule: &Schedule| with_times(plan, &closed.plan, &free.instances, schedule);
         let limits = RepairLimits {
             cases: MOST_PROGRAMS,
             ..RepairLimits::default()
@@ -288,12 +290,12 @@ fn with_allowed_durations(
 /// Returns the step of a violated duration bound, and the duration that satisfies the bound.
 fn demanded_duration(violation: &Violation) -> Option<(usize, &Rational)> {
     let step = violation.action.as_ref()?.step;
-    match &violation.mistake {
-        Mistake::Duration {
+    match &violation.kind {
+        ViolationKind::Duration {
             comparison: Comparison::Less | Comparison::Greater,
             ..
         } => None,
-        Mistake::Duration { value, .. } => Some((step, value)),
+        ViolationKind::Duration { value, .. } => Some((step, value)),
         _ => None,
     }
 }
@@ -301,11 +303,13 @@ fn demanded_duration(violation: &Violation) -> Option<(usize, &Rational)> {
 /// Returns `true` if the violation is about a number, so that other times in the same order may resolve
 /// it.
 fn is_about_numbers(violation: &Violation) -> bool {
-    match &violation.mistake {
-        Mistake::Duration { .. } => true,
-        Mistake::Condition { reasons, .. } | Mistake::Constraint { reasons, .. } => reasons
-            .iter()
-            .any(|reason| matches!(reason, Because::Comparison { .. })),
+    match &violation.kind {
+        ViolationKind::Duration { .. } => true,
+        ViolationKind::Condition { reasons, .. } | ViolationKind::Constraint { reasons, .. } => {
+            reasons
+                .iter()
+                .any(|reason| matches!(reason, Because::Comparison { .. }))
+        }
         _ => false,
     }
 }
@@ -337,18 +341,18 @@ fn with_ends_at_starts(plan: &TimeTriggeredPlan, windows: &[StepWindow]) -> Time
 /// Returns the plan with times within the windows, each as near as possible to its own time.
 /// Interfering happenings have the order of `order` and are separated. `None` if there are no such
 /// times.
-fn refitted(
+fn fit_times_to_windows(
     task: &Task,
     order: &TimeTriggeredPlan,
     plan: &TimeTriggeredPlan,
     windows: &[StepWindow],
 ) -> Option<TimeTriggeredPlan> {
-    let deordered = deorder_the_plan_alone(task, order).ok()?;
+    let deordered = deorder_ignoring_processes(task, order).ok()?;
     let (mut network, instances) = (deordered.plan, deordered.instances);
     bound_times(&mut network, &instances, windows);
     let zero = network_node(NodeId::ZERO);
     let consistent = ConsistentNetwork::try_from(network.network(&Valuation::default())).ok()?;
-    let mut moving = MovingWindows::new(consistent, zero);
+    let mut moving = IncrementalWindows::new(consistent, zero);
     let mut times = vec![Rational::ZERO; network.nodes.len()];
     let mut fix = |node: NodeId, wish: &Rational| {
         let Window { earliest, latest } = moving.window(network_node(node));
@@ -367,7 +371,7 @@ fn refitted(
         }
     }
     let schedule = Schedule::from(elbowroom_stn::Schedule::new(times));
-    Some(at_times(plan, &network, &instances, &schedule))
+    Some(with_times(plan, &network, &instances, &schedule))
 }
 
 /// Adds the windows of the steps to their network.
@@ -397,7 +401,7 @@ fn within(from: NodeId, to: NodeId, window: &Interval) -> Constraint {
 }
 
 /// Returns the plan with the times of a schedule of its network.
-fn at_times(
+fn with_times(
     plan: &TimeTriggeredPlan,
     network: &StnPlan,
     instances: &[InstanceId],

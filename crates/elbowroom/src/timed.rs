@@ -47,22 +47,22 @@
 //! every agent succeeds in it at least as often. Probabilities are floating-point numbers; the
 //! bounds are widened by 1e-9, which is far more than the rounding errors.
 
-mod above;
-mod act;
-mod available;
-mod below;
-mod chances;
+mod action_model;
+mod action_subsets;
+mod applicable;
+mod cell_probabilities;
 mod compile;
+mod discrete_events;
 mod failures;
 mod graph;
-mod kinder;
-mod moments;
-mod numbers;
+mod lower_bound;
 mod policy;
 mod projection;
-mod sets;
+mod relaxed_world;
+mod restricted_policy;
 mod state;
-mod within;
+mod upper_bound;
+mod value_intervals;
 mod world;
 
 use elbowroom_model::Task;
@@ -70,11 +70,11 @@ use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use act::{Act, Event, Needs};
-pub(crate) use chances::{Chances, Ends};
+pub(crate) use action_model::{ActionModel, Event, Needs};
+pub use action_subsets::supported;
+pub(crate) use cell_probabilities::{CellProbabilities, EndProbabilities};
 pub use policy::Policy;
-pub use sets::supported;
-pub use within::Within;
+pub use restricted_policy::RestrictedPolicy;
 pub(crate) use world::{Facts, TimedWorld};
 
 /// Limits of the computation.
@@ -140,7 +140,7 @@ pub struct TimedOptimum {
     /// The set of actions behind the lower bound; `None` if the lower bound is that of the finest
     /// grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub within: Option<Within>,
+    pub within: Option<RestrictedPolicy>,
 }
 
 /// The bounds of one grid.
@@ -194,8 +194,13 @@ pub fn optimum(
 ) -> Result<TimedOptimum, NotTabulated> {
     let world = TimedWorld::new(task, model, settings);
     let horizon = world.as_ref().ok().map(|world| world.horizon);
-    let mut search = within::Search::new(task, model, settings, horizon);
-    search.refine(1.0, settings.most_states / QUICK_SHARE, settings, goes_on);
+    let mut search = restricted_policy::Search::new(task, model, settings, horizon);
+    search.refine(
+        1.0,
+        settings.most_states / FIRST_STATES_DIVISOR,
+        settings,
+        goes_on,
+    );
     if search.best.is_some() && 1.0 - search.lower() <= settings.gap {
         return Ok(TimedOptimum {
             lower: search.lower(),
@@ -208,7 +213,9 @@ pub fn optimum(
         lower: search.lower(),
         ..TimedOptimum::unknown()
     };
-    if let Some(found) = moments::bounds(&world, settings, moments::Effort::WHOLE, goes_on)? {
+    if let Some(found) =
+        discrete_events::bounds(&world, settings, discrete_events::Effort::WHOLE, goes_on)?
+    {
         let grid = found.grid;
         known.lower = known.lower.max(grid.lower);
         known.upper = grid.upper;
@@ -223,12 +230,12 @@ pub fn optimum(
             return Ok(known);
         }
     }
-    let mut found = refined(&world, known, settings, &|_| true, goes_on)?;
+    let mut found = refine_bounds(&world, known, settings, &|_| true, goes_on)?;
     if found.stop == Stop::TooManyStates
-        && let Some(kinder) = world.without_chances_of_harm()
+        && let Some(kinder) = world.without_uncertain_harm()
     {
         let cells = settings.first_cells.max(1) << found.grids.len();
-        let upper = kinder::bound_from(&kinder, cells, found.lower, settings, goes_on)?;
+        let upper = relaxed_world::bound_from(&kinder, cells, found.lower, settings, goes_on)?;
         found.upper = found.upper.min(upper);
     }
     if found.upper - found.lower > settings.gap && found.stop == Stop::TooManyStates {
@@ -245,19 +252,19 @@ pub fn optimum(
 
 /// Returns `true` if the process supports all features of the task and of the world, and happenings
 /// take place only at known times.
-pub fn happens_at_known_times(task: &Task, model: &WorldModel) -> bool {
+pub fn has_known_times(task: &Task, model: &WorldModel) -> bool {
     let world = TimedWorld::new(task, model, &Settings::default());
-    world.is_ok_and(|world| moments::cells(&world).is_some())
+    world.is_ok_and(|world| discrete_events::cells(&world).is_some())
 }
 
 /// Returns `true` if the process supports all features of the task and of the world.
-pub fn knows(task: &Task, model: &WorldModel, settings: &Settings) -> bool {
+pub fn is_supported(task: &Task, model: &WorldModel, settings: &Settings) -> bool {
     TimedWorld::new(task, model, settings).is_ok()
 }
 
 /// The lower bounds from sets of actions first get the maximum number of states divided by this,
 /// before the whole process is examined.
-const QUICK_SHARE: usize = 16;
+const FIRST_STATES_DIVISOR: usize = 16;
 
 impl TimedOptimum {
     /// Returns the trivial bounds.
@@ -274,7 +281,7 @@ impl TimedOptimum {
 
 /// Improves the bounds `known` on finer and finer grids. `is_promising` is called after each grid
 /// to decide whether the refinement continues.
-fn refined(
+fn refine_bounds(
     world: &TimedWorld,
     known: TimedOptimum,
     settings: &Settings,
@@ -307,7 +314,7 @@ fn refined(
 }
 
 /// Widening of the bounds, far above rounding errors.
-const SLACK: f64 = 1e-9;
+const ROUNDING_MARGIN: f64 = 1e-9;
 
 /// Returns the length of a cell, in seconds.
 fn step(world: &TimedWorld, cells: usize) -> f64 {
@@ -318,14 +325,14 @@ fn step(world: &TimedWorld, cells: usize) -> f64 {
 
 /// Returns the probabilities of happenings in each of `cells` cells, for a bound; `cells` is below
 /// 65,534.
-pub(crate) fn chances(
+pub(crate) fn cell_probabilities_of(
     world: &TimedWorld,
     cells: usize,
     side: Side,
-) -> Result<Chances, NotTabulated> {
+) -> Result<CellProbabilities, NotTabulated> {
     // In the upper bound, a happening at the horizon belongs to a further cell.
     let all = cells + usize::from(side == Side::Above);
-    Chances::new(world, step(world, cells), all, side)
+    CellProbabilities::new(world, step(world, cells), all, side)
 }
 
 fn grid(
@@ -362,17 +369,22 @@ fn bound(
     left: &mut usize,
     goes_on: &dyn Fn() -> bool,
 ) -> Result<Result<f64, Stop>, NotTabulated> {
-    let chances = chances(world, cells, side)?;
-    let world = &world.seen_from(side);
+    let chances = cell_probabilities_of(world, cells, side)?;
+    let world = &world.for_bound(side);
     Ok(match side {
         Side::Above => {
-            let value = graph::value(&above::Above::new(world, &chances), left, goes_on);
-            value.map(|value| (value + SLACK).min(1.0))
+            let value = graph::value(
+                &upper_bound::UpperBound::new(world, &chances),
+                left,
+                goes_on,
+            );
+            value.map(|value| (value + ROUNDING_MARGIN).min(1.0))
         }
         Side::Below => {
-            let below = below::Below::new(world, &chances, below::Manner::Always);
+            let below =
+                lower_bound::LowerBound::new(world, &chances, lower_bound::DecisionEpochs::Always);
             let value = graph::value(&below, left, goes_on);
-            value.map(|value| (value - SLACK).max(0.0))
+            value.map(|value| (value - ROUNDING_MARGIN).max(0.0))
         }
     })
 }

@@ -6,15 +6,15 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, check};
-use elbowroom::answers::envelope::{EnvelopeFinding, Failing, Search, Stop, envelope};
+use elbowroom::answers::envelope::{EnvelopeFinding, NominalFailure, Search, Stop, envelope};
 use elbowroom::answers::plan as planning;
 use elbowroom::answers::plan::{PlanFinding, PlanOutcome, PlanRequest, PlanStop};
 use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
 use elbowroom::answers::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest, Exact};
-use elbowroom::answers::{Event, Halt, Unwatched, Watcher};
-use elbowroom::execute::Analyst;
+use elbowroom::answers::{Event, NoObserver, Observer, StopRequest};
+use elbowroom::execute::PlanPreparer;
 use elbowroom::execution::run::TimeoutRule;
-use elbowroom::execution::{Need, Preparer};
+use elbowroom::execution::{PlanForm, Preparer};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::{Interval, Rational};
@@ -24,7 +24,7 @@ use elbowroom::stn::{ConsistentNetwork, NodeId};
 use elbowroom::verify::no_plan::{
     Kind as NoPlanKind, NoPlanAnswerError, certificate_of, verify_no_plan,
 };
-use elbowroom::{AnyPlan, flow, plan};
+use elbowroom::{AnyPlan, pipeline, plan};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -48,8 +48,8 @@ fn read_with(case: &str, plan: &str) -> (Arc<Task>, TimeTriggeredPlan) {
     (Arc::new(task), plan)
 }
 
-fn asked(request: &EnvelopeRequest) -> EnvelopeOutcome {
-    envelope(request, &mut Unwatched).expect("within exact reasoning")
+fn envelope_of(request: &EnvelopeRequest) -> EnvelopeOutcome {
+    envelope(request, &mut NoObserver).expect("within exact reasoning")
 }
 
 /// Checks that an answer is deserialized and serialized again to the same bytes.
@@ -62,13 +62,13 @@ fn assert_stored<T: Serialize + DeserializeOwned>(answer: &T) -> String {
 }
 
 #[test]
-fn answers_can_be_stored_and_read_again() {
+fn answers_round_trip_through_json() {
     for case in CASES {
         let (task, plan) = read(case);
         let mut request = EnvelopeRequest::new(&task, plan.clone());
         // In some cases the domain leaves all durations to the executor.
         request.vary = vec!["durations".parse().expect("a specification")];
-        let found = asked(&request);
+        let found = envelope_of(&request);
         assert_stored(&found.answer);
         let opened = found.plan.expect("a valid plan");
         let boxed = elbowroom::write_box(&found.envelope.expect("room"), &opened);
@@ -78,7 +78,7 @@ fn answers_can_be_stored_and_read_again() {
             timeout: TimeoutRule::Off,
             ..request.clone()
         };
-        let inside = asked(&inside);
+        let inside = envelope_of(&inside);
         assert!(matches!(
             inside.answer.finding,
             EnvelopeFinding::Inside { .. }
@@ -92,7 +92,7 @@ fn answers_can_be_stored_and_read_again() {
             contains: Some(everything.collect::<Vec<_>>().join(" ")),
             ..request.clone()
         };
-        let outside = asked(&outside);
+        let outside = envelope_of(&outside);
         assert!(matches!(
             outside.answer.finding,
             EnvelopeFinding::Outside { .. }
@@ -122,11 +122,12 @@ fn answers_can_be_stored_and_read_again() {
 }
 
 #[test]
-fn a_plan_that_the_judge_rejects_is_answered_with_its_violation() {
+fn invalid_plan_is_answered_with_its_violation() {
     let (task, plan) = read_with("delivery", "0: (drive rover depot shelf) [10]");
-    let outcome = asked(&EnvelopeRequest::new(&task, plan.clone()));
+    let outcome = envelope_of(&EnvelopeRequest::new(&task, plan.clone()));
     assert!(outcome.plan.is_none() && outcome.envelope.is_none());
-    let EnvelopeFinding::Fails(Failing::Invalid { violation }) = &outcome.answer.finding else {
+    let EnvelopeFinding::Fails(NominalFailure::Invalid { violation }) = &outcome.answer.finding
+    else {
         panic!("{:?}", outcome.answer)
     };
     let judged = check(&CheckRequest {
@@ -155,7 +156,7 @@ fn a_plan_that_the_judge_rejects_is_answered_with_its_violation() {
     assert_stored(&network.answer);
 }
 
-fn planned(task: &Task, watcher: &mut dyn Watcher) -> PlanOutcome {
+fn planned(task: &Task, watcher: &mut dyn Observer) -> PlanOutcome {
     let mut request = PlanRequest {
         task,
         first_plan_only: true,
@@ -167,10 +168,10 @@ fn planned(task: &Task, watcher: &mut dyn Watcher) -> PlanOutcome {
 }
 
 #[test]
-fn a_plan_is_an_answer_and_so_is_that_there_is_none() {
+fn plan_and_absence_of_a_plan_are_answers() {
     let (task, _) = read("delivery");
     let task = Task::clone(&task);
-    let found = planned(&task, &mut Unwatched);
+    let found = planned(&task, &mut NoObserver);
     assert_eq!(
         (found.answer.stop, found.answer.plans),
         (PlanStop::FirstPlan, 1)
@@ -199,14 +200,14 @@ fn a_plan_is_an_answer_and_so_is_that_there_is_none() {
         &Source::new("problem", problem),
     );
     let task = Task::new(read.expect("a problem without mistakes").0);
-    let none = planned(&task, &mut Unwatched);
+    let none = planned(&task, &mut NoObserver);
     assert!(none.plan.is_none() && none.answer.stop == PlanStop::Proved);
     assert!(matches!(none.answer.finding, PlanFinding::NoPlan { .. }));
     assert_stored(&none.answer);
 }
 
 #[test]
-fn an_answer_without_a_plan_carries_a_proof_or_says_why_not() {
+fn answer_without_plan_has_proof_or_reason() {
     let fuses = |goal: &str| {
         let domain = "(define (domain d) (:requirements :durative-actions)
             (:predicates (whole) (light) (free) (mended) (wet) (painted))
@@ -233,7 +234,7 @@ fn an_answer_without_a_plan_carries_a_proof_or_says_why_not() {
     };
     let asked = |goal: &str| {
         let task = fuses(goal);
-        let mut found = planned(&task, &mut Unwatched).answer;
+        let mut found = planned(&task, &mut NoObserver).answer;
         found.name_files(["d", "p"]);
         let written = assert_stored(&found);
         (task, certificate_of(&written))
@@ -256,7 +257,7 @@ fn an_answer_without_a_plan_carries_a_proof_or_says_why_not() {
 #[test]
 fn documents_of_another_format_or_version_are_not_read() {
     let (task, plan) = read("match");
-    let written = assert_stored(&asked(&EnvelopeRequest::new(&task, plan)).answer);
+    let written = assert_stored(&envelope_of(&EnvelopeRequest::new(&task, plan)).answer);
     let refuses = |text: &str| serde_json::from_str::<EnvelopeAnswer>(text).is_err();
     assert!(!refuses(&written));
     assert!(refuses(
@@ -268,11 +269,11 @@ fn documents_of_another_format_or_version_are_not_read() {
 }
 
 #[test]
-fn ends_that_share_a_reason_stand_together_in_the_answer() {
+fn ends_with_the_same_reason_are_grouped() {
     let (task, plan) = read("delivery");
     let mut request = EnvelopeRequest::new(&task, plan);
     request.search.sharpen = true;
-    let answer = asked(&request).answer;
+    let answer = envelope_of(&request).answer;
     let EnvelopeFinding::Envelope {
         parameters,
         makespans,
@@ -297,19 +298,19 @@ fn ends_that_share_a_reason_stand_together_in_the_answer() {
 }
 
 #[test]
-fn an_envelope_computed_in_mid_execution_can_be_cut_short() {
+fn envelope_computed_in_mid_execution_can_be_interrupted() {
     let (task, plan) = read("delivery");
-    let prepared = |mut analyst: Analyst| {
-        let prepared = analyst.prepare(&task, &plan, Need::Envelope);
+    let prepared = |mut analyst: PlanPreparer| {
+        let prepared = analyst.prepare(&task, &plan, PlanForm::Envelope);
         let envelope = prepared.expect("a valid plan").envelope;
         envelope.expect("it was asked for")
     };
-    let analyst = Analyst::new(flow::Settings {
+    let analyst = PlanPreparer::new(pipeline::Settings {
         search: Search::irr(),
-        ..flow::Settings::default()
+        ..pipeline::Settings::default()
     });
     let whole = prepared(analyst.clone());
-    let cut = analyst.until(|| ControlFlow::Break(()));
+    let cut = analyst.with_limit(|| ControlFlow::Break(()));
     let cut = prepared(cut);
     assert!(whole.includes(&cut) && whole != cut, "{cut:?}");
 }
@@ -317,12 +318,12 @@ fn an_envelope_computed_in_mid_execution_can_be_cut_short() {
 /// Watcher that halts after some boxes, and stores the last one.
 struct Impatient {
     patience: usize,
-    halt: Halt,
+    halt: StopRequest,
     last: Option<plan::DecoupledEnvelope>,
 }
 
-impl Watcher for Impatient {
-    fn flow(&mut self) -> ControlFlow<Halt> {
+impl Observer for Impatient {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         if self.patience == 0 {
             return ControlFlow::Break(self.halt);
         }
@@ -338,12 +339,12 @@ impl Watcher for Impatient {
 }
 
 #[test]
-fn a_watcher_sees_the_box_grow_and_can_end_the_search_at_any_moment() {
+fn observer_follows_the_search_and_can_stop_it() {
     let (task, plan) = read("delivery");
     let request = EnvelopeRequest::new(&task, plan);
     for (patience, halt, stop) in [
-        (1, Halt::Cancelled, Stop::Cancelled),
-        (7, Halt::TimeLimit, Stop::TimeLimit),
+        (1, StopRequest::Cancelled, Stop::Cancelled),
+        (7, StopRequest::TimeLimit, Stop::TimeLimit),
     ] {
         let mut watcher = Impatient {
             patience,
@@ -360,7 +361,7 @@ fn a_watcher_sees_the_box_grow_and_can_end_the_search_at_any_moment() {
             &watcher.last.expect("seen"),
             &outcome.plan.expect("a valid plan"),
         );
-        let inside = asked(&EnvelopeRequest {
+        let inside = envelope_of(&EnvelopeRequest {
             contains: Some(contains),
             ..request.clone()
         });
@@ -369,7 +370,7 @@ fn a_watcher_sees_the_box_grow_and_can_end_the_search_at_any_moment() {
     }
     let mut watcher = Impatient {
         patience: 0,
-        halt: Halt::Cancelled,
+        halt: StopRequest::Cancelled,
         last: None,
     };
     let outcome = envelope(&request, &mut watcher).expect("within exact reasoning");
@@ -383,9 +384,9 @@ fn a_watcher_sees_the_box_grow_and_can_end_the_search_at_any_moment() {
 /// The windows of a timeline are compared with those of the network at every corner of the box. For
 /// a plan with this one deadline, the extremes are at the corners.
 #[test]
-fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
+fn timeline_windows_match_corners_of_the_box() {
     let (task, plan) = read("delivery");
-    let outcome = asked(&EnvelopeRequest::new(&task, plan));
+    let outcome = envelope_of(&EnvelopeRequest::new(&task, plan));
     let EnvelopeFinding::Envelope { timeline, .. } = &outcome.answer.finding else {
         panic!("an envelope");
     };
@@ -434,9 +435,9 @@ fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
 /// The plan fills for 15 and drains for 10, after a separation of 0.001. The domain leaves both
 /// durations to the executor.
 #[test]
-fn a_timeline_shows_durations_that_the_executor_chooses_as_it_tells_them() {
+fn timeline_shows_chosen_durations_as_reported() {
     let (task, plan) = read("tank");
-    let outcome = asked(&EnvelopeRequest::new(&task, plan));
+    let outcome = envelope_of(&EnvelopeRequest::new(&task, plan));
     let EnvelopeFinding::Envelope {
         timeline,
         makespans,
@@ -457,7 +458,7 @@ fn a_timeline_shows_durations_that_the_executor_chooses_as_it_tells_them() {
 }
 
 #[test]
-fn parts_of_the_goal_come_in_the_order_in_which_the_plan_reaches_them() {
+fn goal_parts_are_ordered_by_time_of_achievement() {
     let domain = "(define (domain d) (:requirements :durative-actions :numeric-fluents :timed-initial-literals)
         (:types thing) (:constants a b - thing)
         (:predicates (done ?x - thing) (whole) (open)) (:functions (n))

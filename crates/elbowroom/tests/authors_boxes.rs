@@ -89,7 +89,7 @@ fn is_freed_by_us(instance: &str, parameter: &str) -> bool {
 }
 
 #[test]
-fn every_recorded_box_is_inside_and_cannot_grow_by_what_its_run_left_open() {
+fn recorded_boxes_are_inside_and_maximal_up_to_their_precision() {
     let Some(data) = shared::data() else { return };
     let boxes = recorded_boxes(&data);
     let (mut inside, mut outside) = (0, 0);
@@ -142,7 +142,7 @@ fn left_open(nominal: &Rational) -> Rational {
 }
 
 #[test]
-fn the_same_search_finds_the_same_fractions() {
+fn same_search_finds_same_fractions() {
     let Some(data) = shared::data() else { return };
     let boxes = recorded_boxes(&data);
     let (mut in_file_order, mut in_other_order, mut unfinished) = (0, 0, 0);

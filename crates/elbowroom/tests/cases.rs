@@ -14,7 +14,7 @@ use elbowroom::num::{Interval, Rational};
 use elbowroom::pddl::{self, Source};
 use elbowroom::plan::parametrize::VarySpec;
 use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
-use elbowroom::{flow, plan};
+use elbowroom::{pipeline, plan};
 
 fn folder(case: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -52,8 +52,8 @@ fn opened(task: &Task, plan: &TimeTriggeredPlan, vary: &[&str]) -> ParametrizedP
         .iter()
         .map(|text| text.parse().expect("a specification"))
         .collect();
-    let freed = flow::free(task, plan).expect("a valid plan");
-    flow::open(task, freed, &specs).expect("quantities of this plan")
+    let freed = pipeline::free(task, plan).expect("a valid plan");
+    pipeline::open(task, freed, &specs).expect("quantities of this plan")
 }
 
 fn number(text: &str) -> Rational {
@@ -124,7 +124,7 @@ fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) 
 }
 
 #[test]
-fn the_delivery_is_as_worked_by_hand() {
+fn delivery_matches_hand_computation() {
     let thousandth = epsilon();
     // In the plan's order: first drive, unlocking, pick, second drive, drop.
     agrees(
@@ -150,7 +150,7 @@ fn the_delivery_is_as_worked_by_hand() {
 }
 
 #[test]
-fn the_way_round_is_as_worked_by_hand() {
+fn detour_matches_hand_computation() {
     agrees("crossing", &["[0, 8999/500]", "[0, 3999/500]"], |point| {
         let [round, hand_over] = point else {
             panic!("two durations")
@@ -160,7 +160,7 @@ fn the_way_round_is_as_worked_by_hand() {
 }
 
 #[test]
-fn the_battery_is_as_worked_by_hand() {
+fn battery_matches_hand_computation() {
     let thousandth = epsilon();
     agrees(
         "battery",
@@ -179,7 +179,7 @@ fn the_battery_is_as_worked_by_hand() {
 }
 
 #[test]
-fn the_flare_is_as_worked_by_hand() {
+fn flare_matches_hand_computation() {
     let thousandth = epsilon();
     agrees(
         "match",
@@ -198,7 +198,7 @@ fn the_flare_is_as_worked_by_hand() {
 }
 
 #[test]
-fn the_tank_is_as_worked_by_hand() {
+fn tank_matches_hand_computation() {
     let thousandth = epsilon();
     agrees("tank", &["[25/2, 20]", "[5, 35/3]"], |point| {
         let [f, d] = point else {
@@ -213,7 +213,7 @@ fn the_tank_is_as_worked_by_hand() {
 }
 
 #[test]
-fn the_hatchery_and_the_lamp_are_as_worked_by_hand() {
+fn hatchery_and_lamp_match_hand_computation() {
     for case in ["hatchery", "lamp"] {
         agrees(case, &["[0, inf)", "[1/500, inf)"], |point| {
             let [first, second] = point else {
@@ -225,7 +225,7 @@ fn the_hatchery_and_the_lamp_are_as_worked_by_hand() {
 }
 
 #[test]
-fn in_the_hatchery_and_under_the_lamp_only_so_much_may_be_left_open() {
+fn hatchery_and_lamp_reject_further_open_quantities() {
     for case in ["hatchery", "lamp"] {
         let (task, plan) = read(case);
         let (task, plan) = (Arc::new(task.clone()), opened(&task, &plan, &[]));
@@ -252,7 +252,7 @@ fn in_the_hatchery_and_under_the_lamp_only_so_much_may_be_left_open() {
 }
 
 #[test]
-fn the_paintshop_is_as_worked_by_hand() {
+fn paintshop_matches_hand_computation() {
     let (task, plan) = read("paintshop");
     let task = Arc::new(task);
     for instance in 0..3 {
@@ -268,7 +268,7 @@ fn the_paintshop_is_as_worked_by_hand() {
 }
 
 #[test]
-fn the_stn_file_of_the_delivery_means_the_same_as_its_plan() {
+fn stn_file_of_delivery_is_equivalent_to_its_plan() {
     let (task, plan) = read("delivery");
     let text = fs::read(folder("delivery").join("plan.stn")).unwrap();
     let by_hand = plan::format::read(&text, &task).expect("an STN plan file without mistakes");

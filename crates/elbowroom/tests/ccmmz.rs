@@ -29,7 +29,7 @@ fn example(envelopes: &Path, folder: &str, plan: &str) -> Case {
 }
 
 #[test]
-fn plans_that_it_finds_valid_are_guaranteed() {
+fn plans_accepted_by_ccmmz_are_guaranteed() {
     let Some(data) = shared::data() else { return };
     for (folder, plan) in [
         ("paper", "plan.stn"),
@@ -43,7 +43,7 @@ fn plans_that_it_finds_valid_are_guaranteed() {
 }
 
 #[test]
-fn plans_that_it_finds_invalid_break_what_it_says() {
+fn plans_rejected_by_ccmmz_violate_the_reported_requirement() {
     let Some(data) = shared::data() else { return };
     let broken = |plan: &str| {
         let case = example(&data.join("envelopes"), "generator_linear", plan);
@@ -116,7 +116,7 @@ fn recorded_boxes(data: &Path) -> BTreeSet<(String, String)> {
 }
 
 #[test]
-fn every_box_it_found_is_inside_and_cannot_grow() {
+fn boxes_of_ccmmz_are_inside_and_maximal() {
     let Some(data) = shared::data() else { return };
     let recorded = recorded_boxes(&data);
     let (mut inside, mut away, mut borders, mut same) = (0, 0, 0, 0);

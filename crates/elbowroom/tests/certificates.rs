@@ -12,14 +12,14 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Relax, Search, envelope};
-use elbowroom::answers::{EnvelopeOutcome, Halt, Unwatched, Watcher};
+use elbowroom::answers::{EnvelopeOutcome, NoObserver, Observer, StopRequest};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::read_plan;
 use elbowroom::plan::ParametrizedPlan;
-use elbowroom::verify::sound::{Control, Failing, Schedules, Sound, Way};
-use elbowroom::verify::{AnswerError, Certificate, Flaw, Verified, added_up, verify_answer};
+use elbowroom::verify::sound::{Control, FailureCase, Schedules, Sound, Violation};
+use elbowroom::verify::{AnswerError, Certificate, Flaw, Verified, verify_answer, with_sums};
 use elbowroom::{AnyPlan, pddl};
 use judge::{certificate_in, is_about_the_box};
 use serde_json::Value;
@@ -46,7 +46,7 @@ fn largest(
         symmetric,
         ..BestSettings::default()
     };
-    envelope(&request, &mut Unwatched).expect("within exact reasoning")
+    envelope(&request, &mut NoObserver).expect("within exact reasoning")
 }
 
 fn written(outcome: &EnvelopeOutcome) -> String {
@@ -141,7 +141,7 @@ const CHANGED: [(&str, Guarantee, Objective); 13] = [
 /// A modified certificate that is accepted must still be a proof of the answer's claim: if a bound
 /// of the network or of a failure has slack, another number is equally valid.
 #[test]
-fn each_number_that_is_changed_in_turn_makes_a_certificate_refused_or_leaves_it_a_proof() {
+fn changed_number_invalidates_certificate_or_leaves_it_valid() {
     let (mut count, mut still) = (0, 0);
     let mut wrong = Vec::new();
     for (name, guarantee, objective) in CHANGED {
@@ -203,7 +203,7 @@ fn a_box_with_an_end_beyond_the_envelope_is_refused() {
                 let mut larger = right.clone();
                 larger.slacks[variable].0 += Rational::new(1, 1000);
                 let is_inside = judge::is_inside(&larger);
-                let sound = added_up(larger).ok().and_then(|told| told.sound);
+                let sound = with_sums(larger).ok().and_then(|told| told.sound);
                 let is_proved = sound.is_some_and(|sound| {
                     let mut conditions = sound.conditions.iter().flatten();
                     sound.control != Control::Assumed && conditions.all(|own| !own.cases.is_empty())
@@ -219,7 +219,7 @@ fn a_box_with_an_end_beyond_the_envelope_is_refused() {
 }
 
 #[test]
-fn durations_that_follow_each_other_in_a_circle_or_end_together_are_refused() {
+fn circular_or_simultaneous_durations_are_rejected() {
     let (task, plan) = case("hatchery");
     let (guarantee, objective) = (Guarantee::Dynamic, Objective::Widths);
     let outcome = largest(&task, &plan, guarantee, objective, false);
@@ -255,7 +255,7 @@ fn durations_that_follow_each_other_in_a_circle_or_end_together_are_refused() {
 }
 
 #[test]
-fn a_claim_that_says_more_than_is_proved_is_refused() {
+fn claim_beyond_the_proof_is_rejected() {
     let (task, plan) = case("battery");
     let (guarantee, objective) = (Guarantee::Dynamic, Objective::Widths);
     let outcome = largest(&task, &plan, guarantee, objective, false);
@@ -318,7 +318,7 @@ fn wrong_decimal_or_version_anywhere_in_the_answer_is_refused() {
 }
 
 #[test]
-fn a_bound_is_worth_what_is_gained_when_it_is_relaxed() {
+fn shadow_price_equals_gain_of_relaxation() {
     let relaxed = |closing: &str, objective| {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/delivery");
         let text = |file: &str| std::fs::read_to_string(folder.join(file)).expect("a file");
@@ -346,7 +346,7 @@ fn a_bound_is_worth_what_is_gained_when_it_is_relaxed() {
 }
 
 /// Returns the answer and the certificate for a plan given as text, with some parameters.
-fn told_box(
+fn answer_and_certificate(
     [domain, problem, plan]: [&str; 3],
     vary: &[&str],
     guarantee: Guarantee,
@@ -364,7 +364,7 @@ fn told_box(
         .collect();
     request.guarantee = guarantee;
     request.search = Search::best(Objective::Widths);
-    let outcome = envelope(&request, &mut Unwatched).expect("within exact reasoning");
+    let outcome = envelope(&request, &mut NoObserver).expect("within exact reasoning");
     let text = written(&outcome);
     let verified = verify_answer(&text).expect("a certificate");
     let inside = verified.inside.expect("the plan is small");
@@ -386,8 +386,8 @@ const PASSAGE: [&str; 3] = [
 ];
 
 #[test]
-fn durations_that_may_be_neither_short_nor_long_take_schedules_for_both_ends() {
-    let (_, certificate) = told_box(PASSAGE, &[], Guarantee::Weak);
+fn duration_limited_on_both_sides_needs_schedules_for_both_ends() {
+    let (_, certificate) = answer_and_certificate(PASSAGE, &[], Guarantee::Weak);
     assert!(judge::is_inside(&certificate));
     let sound = certificate.sound.clone().expect("why it is inside");
     let Control::Schedules(cases) = &sound.control else {
@@ -406,7 +406,7 @@ fn durations_that_may_be_neither_short_nor_long_take_schedules_for_both_ends() {
             control: Control::Schedules(fewer),
             ..sound.clone()
         });
-        let told = added_up(broken).expect("sums").sound.expect("some of it");
+        let told = with_sums(broken).expect("sums").sound.expect("some of it");
         assert_eq!(told.control, Control::Assumed, "{place}");
     }
 }
@@ -425,18 +425,18 @@ const TANK: [&str; 3] = [
 ];
 
 #[test]
-fn rates_that_are_multiplied_by_times_are_looked_at_at_both_ends() {
+fn products_of_rates_and_times_are_checked_at_both_ends() {
     for guarantee in GUARANTEES {
         let vary = ["constant fill level in [1, 4]", "duration fill"];
-        let (_, certificate) = told_box(TANK, &vary[..], guarantee);
+        let (_, certificate) = answer_and_certificate(TANK, &vary[..], guarantee);
         assert!(judge::is_inside(&certificate));
         let sound = certificate.sound.as_ref().expect("why it is inside");
         let cases = sound.conditions.iter().flatten().flat_map(|own| &own.cases);
         let ways = cases.flat_map(|case| match case {
-            Failing::Ways(ways) => &ways[..],
+            FailureCase::Ways(ways) => &ways[..],
             _ => &[],
         });
-        let multiplied: Vec<&Way> = ways.filter(|way| !way.corners.is_empty()).collect();
+        let multiplied: Vec<&Violation> = ways.filter(|way| !way.corners.is_empty()).collect();
         assert!(!multiplied.is_empty(), "{guarantee:?}");
         assert!(
             multiplied
@@ -454,27 +454,27 @@ fn rates_that_are_multiplied_by_times_are_looked_at_at_both_ends() {
             .flatten()
             .flat_map(|own| &mut own.cases)
         {
-            if let Failing::Ways(ways) = case {
+            if let FailureCase::Ways(ways) = case {
                 for way in ways.iter_mut().filter(|way| way.sums.len() > 1) {
                     way.sums.truncate(1);
                     way.corners.clear();
                 }
             }
         }
-        let told = added_up(broken).expect("sums").sound.expect("some of it");
+        let told = with_sums(broken).expect("sums").sound.expect("some of it");
         let mut conditions = told.conditions.iter().flatten();
         assert!(conditions.any(|own| own.cases.is_empty()), "{guarantee:?}");
     }
 }
 
 /// Watcher that ends a search after some steps.
-struct Patience(usize);
+struct StepLimit(usize);
 
-impl Watcher for Patience {
-    fn flow(&mut self) -> ControlFlow<Halt> {
+impl Observer for StepLimit {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         self.0 = self.0.saturating_sub(1);
         if self.0 == 0 {
-            return ControlFlow::Break(Halt::TimeLimit);
+            return ControlFlow::Break(StopRequest::TimeLimit);
         }
         ControlFlow::Continue(())
     }
@@ -497,7 +497,7 @@ fn of_published(
     request.guarantee = guarantee;
     request.search.method = Some(Method::Best);
     request.search.best.objective = objective;
-    let outcome = envelope(&request, &mut Patience(2_000)).expect("within exact reasoning");
+    let outcome = envelope(&request, &mut StepLimit(2_000)).expect("within exact reasoning");
     let text = written(&outcome);
     let begun = Instant::now();
     let verdict = verify_answer(&text);

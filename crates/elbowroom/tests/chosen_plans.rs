@@ -9,21 +9,21 @@ use std::time::Duration;
 
 use elbowroom::answers::odds::{OddsFinding, OddsRequest, OddsSettings, odds};
 use elbowroom::answers::plan::{
-    BestPlanRequest, PlanAim, PlanChoice, PlanFinding, PlanOutcome, PlanStop, PlanWorth, best_plan,
+    BestPlanRequest, PlanAim, PlanChoice, PlanFinding, PlanOutcome, PlanStop, PlanValue, best_plan,
 };
 use elbowroom::answers::run::{RunRequest, simulate};
-use elbowroom::answers::{Halt, Unwatched, Watcher};
+use elbowroom::answers::{NoObserver, Observer, StopRequest};
 use elbowroom::execute::{
-    Candidates, Choice, Chooser, Embedded, Execution, FirstPlan, Known, Limits, NamedText,
-    Replanning, Rollouts, RunSpec, Value,
+    Candidates, Choice, Embedded, Execution, FirstPlan, Limits, NamedText, PlanSelector,
+    Replanning, Rollouts, RunSpec, Value, WorldKnowledge,
 };
 use elbowroom::execution::run::{PlanningTime, RunSettings, Verdict};
 use elbowroom::execution::{Entry, Planner, Recorder};
-use elbowroom::flow;
 use elbowroom::model::validate::{Settings, validate};
 use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
+use elbowroom::pipeline;
 use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::sim::WorldModel;
 
@@ -69,21 +69,21 @@ fn chosen_within(
     let world = world(&folder, &task);
     let mut planner = Embedded::default();
     planner.settings.threads = threads;
-    let chooser = Chooser {
+    let chooser = PlanSelector {
         work,
         settings: planner.settings.clone(),
         most_states: planner.most_states,
         improve_states: planner.improve_states,
-        known: Known::World(Rollouts {
+        knowledge: WorldKnowledge::World(Rollouts {
             world: Arc::new(world.clone()),
             executor: executor.parse().unwrap(),
             settings: settings(),
-            flow: flow::Settings::default(),
+            flow: pipeline::Settings::default(),
             likelihoods: Arc::new(Likelihoods::certain()),
             replanning: Some(Replanning::within(&planner)),
             is_ready: true,
         }),
-        goes_on: &|| true,
+        may_continue: &|| true,
     };
     let choice = chooser.choose(&task, &Situation::initial(&task)).unwrap();
     (task, world, choice)
@@ -109,7 +109,7 @@ fn starts(plan: &TimeTriggeredPlan) -> Vec<String> {
 }
 
 #[test]
-fn choice_within_a_small_budget_is_the_shortest_plan() {
+fn small_budget_selects_shortest_plan() {
     let (_, _, unlimited) = chosen("detour", "guarded");
     let (_, _, limited) = chosen_within(1, 1, "detour", "guarded");
     assert!(unlimited.plans > 1, "{unlimited}");
@@ -149,7 +149,10 @@ fn search_ends_with_its_budget_and_names_the_option() {
         };
         planner.settings.threads = threads;
         let answer = planner.plan(&task, &Situation::initial(&task)).answer;
-        answer.why_not().expect("there is no plan").to_owned()
+        answer
+            .failure_reason()
+            .expect("there is no plan")
+            .to_owned()
     };
     let little = why(1_000_000, 1);
     assert!(little.contains("--planning-budget"), "{little}");
@@ -159,7 +162,7 @@ fn search_ends_with_its_budget_and_names_the_option() {
 }
 
 #[test]
-fn candidates_are_valid_differ_from_each_other_and_are_the_same_each_time() {
+fn candidates_are_valid_distinct_and_deterministic() {
     let folders = WORLDS.map(|name| (format!("experiments/{name}"), true));
     let cases = ["crossing", "errand", "delivery"].map(|name| (format!("cases/{name}"), false));
     for (folder, has_world) in folders.into_iter().chain(cases) {
@@ -169,7 +172,7 @@ fn candidates_are_valid_differ_from_each_other_and_are_the_same_each_time() {
             let situation = Situation::initial(&task);
             let limits = Limits {
                 work: u64::MAX,
-                patience: 1,
+                first_plan_factor: 1,
                 most_states: 20_000,
                 improve_states: 500,
                 other_states: 20_000,
@@ -206,7 +209,7 @@ fn candidates_are_valid_differ_from_each_other_and_are_the_same_each_time() {
 /// A workpiece often consumes more charge than planned. The shortest plan starts with the initial
 /// charge. The battery can also be filled first, which takes almost no time.
 #[test]
-fn where_amounts_vary_a_plan_is_made_for_less_than_planned() {
+fn uncertain_amounts_yield_plans_for_scarcer_amounts() {
     let folder = "experiments/table2";
     let problem = text(&format!("{folder}/problem.pddl"))
         .replace("{capacity}", "160")
@@ -219,7 +222,7 @@ fn where_amounts_vary_a_plan_is_made_for_less_than_planned() {
     let situation = Situation::initial(&task);
     let limits = Limits {
         work: u64::MAX,
-        patience: 1,
+        first_plan_factor: 1,
         most_states: 2_000,
         improve_states: 256,
         other_states: 10_000,
@@ -245,7 +248,7 @@ fn where_amounts_vary_a_plan_is_made_for_less_than_planned() {
 }
 
 #[test]
-fn the_estimate_agrees_with_a_count_of_other_runs() {
+fn estimate_agrees_with_independent_runs() {
     for name in ["counter", "weld"] {
         let (task, world, choice) = chosen(name, "live");
         let Value::Sampled { successes, samples } = choice.value else {
@@ -295,7 +298,7 @@ fn first_plan_of_a_run(spec: &RunSpec) -> (Vec<String>, Option<String>) {
     let task = Arc::new(Task::new(pddl::read_problem(&domain, &problem).unwrap().0));
     let first = First::default();
     let request = RunRequest::new(spec, &task).recorded_by(first.clone());
-    let outcome = simulate(request, &mut Unwatched).unwrap();
+    let outcome = simulate(request, &mut NoObserver).unwrap();
     let first = first.0.lock().unwrap().take().unwrap();
     assert_eq!(outcome.answer.first_plan, first.1);
     first
@@ -320,7 +323,7 @@ fn spec(name: &str, seed: u64, first_plan: FirstPlan) -> RunSpec {
 }
 
 #[test]
-fn a_run_begins_with_the_same_choice_whatever_its_dice_and_says_so() {
+fn first_plan_does_not_depend_on_the_seed() {
     let (plan, remark) = first_plan_of_a_run(&spec("counter", 1, FirstPlan::Likeliest));
     let (other, also) = first_plan_of_a_run(&spec("counter", 2, FirstPlan::Likeliest));
     assert_eq!((&plan, &remark), (&other, &also));
@@ -337,23 +340,23 @@ fn a_run_begins_with_the_same_choice_whatever_its_dice_and_says_so() {
 }
 
 #[test]
-fn without_a_clock_the_choice_is_by_the_exact_probability() {
+fn untimed_choice_uses_exact_probability() {
     let task = task("experiments/counter");
     let likely = "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\n\
          becomes_true = 0.0\nbecomes_false = 0.0\nstart = 1.0\neffect = 1.0\n\
          [actions.grasp-quickly]\nstart = 0.4\n[actions.grasp-carefully]\nstart = 0.98\n";
     let likelihoods = Arc::new(likelihoods::read(likely, &task).unwrap());
     let planner = Embedded::default();
-    let chooser = Chooser {
+    let chooser = PlanSelector {
         work: u64::MAX,
         settings: planner.settings.clone(),
         most_states: planner.most_states,
         improve_states: planner.improve_states,
-        known: Known::Likelihoods {
+        knowledge: WorldKnowledge::Likelihoods {
             likelihoods: Arc::clone(&likelihoods),
             reorders: true,
         },
-        goes_on: &|| true,
+        may_continue: &|| true,
     };
     let choice = chooser.choose(&task, &Situation::initial(&task)).unwrap();
     // By hand: everything else is certain, and there is one grasp.
@@ -366,7 +369,7 @@ fn without_a_clock_the_choice_is_by_the_exact_probability() {
         world: None,
         settings: OddsSettings::default(),
     };
-    let OddsFinding::Odds(odds) = odds(&request, &mut Unwatched).unwrap().finding else {
+    let OddsFinding::Odds(odds) = odds(&request, &mut NoObserver).unwrap().finding else {
         panic!("it has odds");
     };
     assert!((odds.order.probability - 0.98).abs() < 1e-12);
@@ -375,22 +378,22 @@ fn without_a_clock_the_choice_is_by_the_exact_probability() {
 /// Watcher that ends a search after this number of polls.
 struct Impatient(usize);
 
-impl Watcher for Impatient {
+impl Observer for Impatient {
     fn elapsed(&mut self) -> Duration {
         Duration::ZERO
     }
 
-    fn flow(&mut self) -> ControlFlow<Halt> {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         self.0 = self.0.saturating_sub(1);
         if self.0 == 0 {
-            ControlFlow::Break(Halt::Cancelled)
+            ControlFlow::Break(StopRequest::Cancelled)
         } else {
             ControlFlow::Continue(())
         }
     }
 }
 
-fn best(task: &Arc<Task>, aim: PlanAim<'_>, watcher: &mut dyn Watcher) -> PlanOutcome {
+fn best(task: &Arc<Task>, aim: PlanAim<'_>, watcher: &mut dyn Observer) -> PlanOutcome {
     let request = BestPlanRequest {
         task,
         aim,
@@ -406,12 +409,12 @@ fn choice(outcome: &PlanOutcome) -> &PlanChoice {
 }
 
 #[test]
-fn where_the_shortest_plan_has_no_slack_a_longer_one_is_chosen() {
+fn longer_plan_is_selected_if_the_shortest_has_no_slack() {
     let task = task("cases/crossing");
-    let outcome = best(&task, PlanAim::Slack, &mut Unwatched);
+    let outcome = best(&task, PlanAim::Slack, &mut NoObserver);
     let choice = choice(&outcome);
     // Computed by hand in the problem file.
-    let worth = |slack: Rational| PlanWorth::Slack { slack };
+    let worth = |slack: Rational| PlanValue::Slack { slack };
     assert_eq!(choice.value, worth(Rational::new(2999, 7000)));
     assert_eq!(choice.shortest, worth(Rational::ZERO));
     let plan = outcome.plan.as_ref().unwrap();
@@ -425,7 +428,7 @@ fn where_the_shortest_plan_has_no_slack_a_longer_one_is_chosen() {
 }
 
 #[test]
-fn no_plan_is_worse_than_the_shortest_and_none_is_claimed_to_be_more_when_it_is_interrupted() {
+fn selected_plan_is_never_worse_than_the_shortest() {
     for name in ["crossing", "delivery", "battery", "errand", "match", "tank"] {
         let task = task(&format!("cases/{name}"));
         for patience in [40, 400, usize::MAX] {
@@ -437,12 +440,12 @@ fn no_plan_is_worse_than_the_shortest_and_none_is_claimed_to_be_more_when_it_is_
             assert!(validate(&task, plan, &Settings::default()).is_valid());
             let choice = choice(&outcome);
             match (&choice.value, &choice.shortest) {
-                (PlanWorth::Slack { slack }, PlanWorth::Slack { slack: shortest }) => {
+                (PlanValue::Slack { slack }, PlanValue::Slack { slack: shortest }) => {
                     assert!(slack >= shortest, "{name}: {choice:?}");
                 }
                 (
-                    PlanWorth::Slack { .. } | PlanWorth::Unknown { .. },
-                    PlanWorth::Unknown { .. },
+                    PlanValue::Slack { .. } | PlanValue::Unknown { .. },
+                    PlanValue::Unknown { .. },
                 ) => {}
                 _ => panic!("{name}: {choice:?}"),
             }
@@ -451,14 +454,14 @@ fn no_plan_is_worse_than_the_shortest_and_none_is_claimed_to_be_more_when_it_is_
 }
 
 #[test]
-fn a_plan_made_for_its_probability_works_as_often_as_is_said() {
+fn success_rate_matches_reported_probability() {
     let task = task("experiments/counter");
     let world = world("experiments/counter", &task);
-    let outcome = best(&task, PlanAim::Probability(&world), &mut Unwatched);
+    let outcome = best(&task, PlanAim::Probability(&world), &mut NoObserver);
     let choice = choice(&outcome);
     let (
-        PlanWorth::Sampled { interval, .. },
-        PlanWorth::Sampled {
+        PlanValue::Sampled { interval, .. },
+        PlanValue::Sampled {
             interval: of_shortest,
             ..
         },

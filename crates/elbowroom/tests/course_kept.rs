@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom::flow;
+use elbowroom::pipeline;
 use elbowroom_envelope::{Guarantee, Oracle, irr};
 use elbowroom_model::validate::Settings;
 use elbowroom_model::{Task, Verdict, validate};
@@ -109,7 +109,7 @@ fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
 }
 
 #[test]
-fn a_constraint_on_the_course_holds_in_every_schedule() {
+fn trajectory_constraint_holds_in_every_schedule() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut needed = 0;
     for form in FORMS {
@@ -126,7 +126,7 @@ fn a_constraint_on_the_course_holds_in_every_schedule() {
             assert!(judge(&deordered.plan.scheduled(&deordered.nominal)).is_valid());
             let mut free = deordered.plan.clone();
             free.constraints
-                .retain(|constraint| constraint.reason != Reason::Course);
+                .retain(|constraint| constraint.reason != Reason::TrajectoryConstraint);
             for _ in 0..4 {
                 let schedule = draw(&deordered.plan, &mut rng);
                 if let Verdict::Invalid(why) = judge(&deordered.plan.scheduled(&schedule)) {
@@ -144,7 +144,7 @@ fn a_constraint_on_the_course_holds_in_every_schedule() {
 
 /// The constraint holds for all durations in the box, and for all their schedules.
 #[test]
-fn a_constraint_on_the_course_holds_throughout_the_box() {
+fn trajectory_constraint_holds_throughout_the_box() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut broken = 0;
     for form in FORMS {
@@ -155,8 +155,8 @@ fn a_constraint_on_the_course_holds_throughout_the_box() {
             if boxes == 6 || !validate(&task, &plan, &Settings::default()).is_valid() {
                 continue;
             }
-            let freed = flow::free(&task, &plan).unwrap();
-            let plan = Arc::new(flow::open(&task, freed, &[]).unwrap());
+            let freed = pipeline::free(&task, &plan).unwrap();
+            let plan = Arc::new(pipeline::open(&task, freed, &[]).unwrap());
             let task = Arc::new(task);
             let mut oracle = Oracle::new(&task, &plan, Guarantee::Weak).unwrap();
             let settings = elbowroom_envelope::Settings::default();
@@ -176,7 +176,9 @@ fn a_constraint_on_the_course_holds_throughout_the_box() {
                 assert!(verdict.is_valid(), "{form}\n{text}{verdict:?}");
                 // Some would be invalid without the constraints between happenings.
                 let mut loose = fixed.clone();
-                loose.constraints.retain(|one| one.reason != Reason::Course);
+                loose
+                    .constraints
+                    .retain(|one| one.reason != Reason::TrajectoryConstraint);
                 if let Some(schedule) = shared::draw::schedule(&loose, &valuation, &mut rng) {
                     let verdict =
                         validate(&task, &loose.scheduled(&schedule), &Settings::default());
@@ -190,7 +192,7 @@ fn a_constraint_on_the_course_holds_throughout_the_box() {
 }
 
 #[test]
-fn what_bounds_between_happenings_cannot_keep_is_refused_by_name() {
+fn constraint_beyond_temporal_bounds_is_rejected_by_name() {
     let refused = |functions: &str, effect: &str, constraint: &str| {
         let domain = format!(
             "(define (domain d) (:predicates (p) (q)) {functions}

@@ -14,16 +14,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use elbowroom::answers::envelope::Search;
-use elbowroom::execute::Analyst;
-use elbowroom::execution::{Need, Preparer};
-use elbowroom::{RoundingRule, flow};
+use elbowroom::execute::PlanPreparer;
+use elbowroom::execution::{PlanForm, Preparer};
+use elbowroom::{RoundingRule, pipeline};
 use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::soundness::broken_in;
 use elbowroom_envelope::{Guarantee, IrrRun, Oracle, irr};
 use elbowroom_model::validate::Settings;
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
-use elbowroom_plan::deorder::{Deordered, keeps_all_that_is_read, pinned_to};
+use elbowroom_plan::deorder::{Deordered, keeps_all_that_is_read, with_fixed_times};
 use elbowroom_plan::parametrize::parametrize;
 use elbowroom_plan::{DecoupledEnvelope, NodeId, Schedule, StnPlan, Valuation, network_node};
 use elbowroom_stn::{ConsistentNetwork, Constraint};
@@ -141,12 +141,13 @@ fn same_envelope(task: &Task, plan: &TimeTriggeredPlan, name: &str) -> bool {
     /// Maximum length of a plan, because the check of each condition takes quadratic time.
     const LONG: usize = 60;
     let task = Arc::new(task.clone());
-    let settings = flow::Settings {
+    let settings = pipeline::Settings {
         search: Search::irr(),
-        ..flow::Settings::default()
+        ..pipeline::Settings::default()
     };
-    let mut analyst = Analyst::new(settings.clone());
-    let ready = (plan.steps.len() <= LONG).then(|| analyst.prepare(&task, plan, Need::Envelope));
+    let mut analyst = PlanPreparer::new(settings.clone());
+    let ready =
+        (plan.steps.len() <= LONG).then(|| analyst.prepare(&task, plan, PlanForm::Envelope));
     let Some(Ok(ready)) = ready else { return false };
     if !keeps_all_that_is_read(&task, &ready.plan, &ready.nominal) {
         return false;
@@ -180,7 +181,7 @@ const DRAWS: usize = 50;
 #[derive(Default)]
 struct Count {
     plans: usize,
-    told: usize,
+    reported: usize,
     made_ready: usize,
     unsupported: usize,
     invalid: usize,
@@ -200,7 +201,7 @@ fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, co
     let (plan, _) = RoundingRule::default()
         .read_plan(&shared::source(plan_file), &task)
         .unwrap_or_else(|error| panic!("{}", error.render(false)));
-    let freed = match flow::free(&task, &plan) {
+    let freed = match pipeline::free(&task, &plan) {
         Ok(freed) => freed,
         Err(error) => {
             println!("{name}: {error}");
@@ -212,7 +213,7 @@ fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, co
     count.made_ready += usize::from(same_envelope(&task, &plan, &name.to_string()));
     assert_parametrized(&task, &freed);
     let nominal = freed.nominal.clone();
-    let closed = flow::closed(&task, freed);
+    let closed = pipeline::without_parameters(&task, freed);
     let network = closed.plan.network(&Valuation::default());
     assert!(
         elbowroom_stn::Schedule::from(nominal.clone()).holds_in(&network),
@@ -224,7 +225,7 @@ fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, co
         &DecoupledEnvelope::point(&Valuation::default()),
     ) {
         Ok(None) => {
-            count.told += 1;
+            count.reported += 1;
             closed.plan
         }
         Ok(Some(broken)) => {
@@ -234,7 +235,7 @@ fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, co
         }
         Err(refusal) => {
             println!("{name}: fixed, as nothing can be told: {refusal}");
-            pinned_to(closed.plan, &nominal)
+            with_fixed_times(closed.plan, &nominal)
         }
     };
     let drawn: Vec<Schedule> = (0..DRAWS).map(|_| draw(&sound, rng)).collect();
@@ -259,7 +260,7 @@ fn examine_all(plans: &[[PathBuf; 3]]) -> Count {
         count.plans,
         count.unsupported,
         count.invalid,
-        count.told,
+        count.reported,
         count.schedules,
         count.made_ready
     );
@@ -278,14 +279,14 @@ fn our_plans() -> Vec<[PathBuf; 3]> {
 }
 
 #[test]
-fn our_own_plans_are_sound_when_deordered_and_so_are_their_schedules() {
+fn own_plans_stay_valid_when_deordered() {
     let count = examine_all(&our_plans());
     assert!(count.plans >= 7, "{}", count.plans);
     assert_eq!((count.unsupported, count.invalid), (0, 0));
 }
 
 #[test]
-fn valid_plans_of_the_benchmarks_are_sound_when_deordered_and_so_are_their_schedules() {
+fn benchmark_plans_stay_valid_when_deordered() {
     let Some(data) = shared::data() else { return };
     let count = examine_all(&valid_plans(&data));
     assert!(count.plans >= 110, "{}", count.plans);
@@ -293,7 +294,7 @@ fn valid_plans_of_the_benchmarks_are_sound_when_deordered_and_so_are_their_sched
 }
 
 #[test]
-fn valid_plans_of_the_authors_are_sound_when_deordered_and_so_are_their_schedules() {
+fn plans_of_the_authors_stay_valid_when_deordered() {
     let Some(data) = shared::data() else { return };
     let count = examine_all(&plans_of_the_authors(&data));
     assert!(count.plans >= 20, "{}", count.plans);

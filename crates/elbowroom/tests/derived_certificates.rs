@@ -28,12 +28,12 @@ mod windows;
 use std::sync::Arc;
 
 use elbowroom::AnyPlan;
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::envelope::{EnvelopeRequest, envelope};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, read_plan};
-use elbowroom::verify::{AnswerError, Certificate, added_up, verify_answer_of};
+use elbowroom::verify::{AnswerError, Certificate, verify_answer_of, with_sums};
 use forgery::{Forger, claim, tightened};
 use serde_json::{Value, json};
 use shared::own::case;
@@ -84,7 +84,7 @@ fn request(
 
 /// Returns the answer, if it has a certificate.
 fn answered(request: &EnvelopeRequest) -> Option<Value> {
-    let outcome = envelope(request, &mut Unwatched).ok()?;
+    let outcome = envelope(request, &mut NoObserver).ok()?;
     let answer = serde_json::to_value(&outcome.answer).expect("a document");
     let certificate = answer.pointer("/best/certificate");
     certificate.is_some_and(Value::is_object).then_some(answer)
@@ -253,7 +253,7 @@ fn certificate_without_its_conditions_or_of_another_decimal_is_not_accepted() {
         bare["best"]["certificate"]["sound"]["conditions"] = json!([]);
         let certificate: Certificate =
             serde_json::from_value(bare["best"]["certificate"].clone()).expect("readable");
-        bare["best"]["certificate"] = json!(added_up(certificate).expect("a certificate"));
+        bare["best"]["certificate"] = json!(with_sums(certificate).expect("a certificate"));
         if let Ok(verified) = verify_answer_of(&bare.to_string(), &task, &plan) {
             assert!(verified.assumes.is_empty(), "{name}");
             assert_eq!(claim(&bare), claim(&answer), "{name}");
@@ -496,5 +496,5 @@ fn mutated_certificates_are_refused_unless_they_claim_the_same() {
             }
         }
     }
-    assert!(forger.told() > 5_000);
+    assert!(forger.print_counts() > 5_000);
 }

@@ -58,7 +58,7 @@ fn paths(text: &str) -> Vec<&str> {
 }
 
 #[test]
-fn links_and_paths_in_documents_lead_somewhere() {
+fn links_and_paths_in_documents_exist() {
     let mut missing = Vec::new();
     for document in documents() {
         let text = fs::read_to_string(&document).expect("a document");
@@ -77,7 +77,7 @@ fn links_and_paths_in_documents_lead_somewhere() {
 /// A package must contain all of its files. Links to files outside are lost when a repository is
 /// copied in some ways, so the licences are identical copies.
 #[test]
-fn every_package_carries_the_licences_word_for_word() {
+fn packages_contain_the_licence_texts() {
     let crates = fs::read_dir(root().join("crates")).expect("the folder of crates");
     for entry in crates {
         let folder = entry.expect("an entry").path();
@@ -91,7 +91,7 @@ fn every_package_carries_the_licences_word_for_word() {
 }
 
 #[test]
-fn every_chapter_of_the_tutorial_is_a_text() {
+fn tutorial_chapters_are_not_empty() {
     let chapters = documents();
     let chapters = chapters.iter().filter(|path| {
         let folder = path.parent().and_then(Path::file_name);

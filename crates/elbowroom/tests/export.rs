@@ -11,12 +11,12 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use elbowroom::answers::envelope::envelope;
-use elbowroom::answers::{EnvelopeRequest, Unwatched};
+use elbowroom::answers::{EnvelopeRequest, NoObserver};
 use elbowroom::envelope::{Guarantee, Oracle};
-use elbowroom::export::{ExportError, box_check, box_of, opened, region, stnu};
+use elbowroom::export::{ExportError, box_check, box_of, parametrized_plan, region, stnu};
 use elbowroom::model::Task;
 use elbowroom::network::{
-    NetworkFile, Request, Verdict, examine, read, write_graphml, write_json, write_plain,
+    NetworkFile, Request, Verdict, analyze, read, write_graphml, write_json, write_plain,
 };
 use elbowroom::num::Rational;
 use elbowroom::parse_box;
@@ -120,7 +120,7 @@ fn is_controllable(file: &NetworkFile) -> bool {
     let verdicts = texts.into_iter().flatten().map(|(name, text)| {
         let file = read(name, text.as_bytes()).unwrap_or_else(|error| panic!("{error}\n{text}"));
         assert!(file.remarks.is_empty(), "{:?}", file.remarks);
-        let answer = examine(&file, &Request::default()).expect("nothing to simulate");
+        let answer = analyze(&file, &Request::default()).expect("nothing to simulate");
         answer.dynamic.unwrap_or(answer.consistent).verdict == Verdict::Yes
     });
     let verdicts: Vec<bool> = verdicts.collect();
@@ -200,8 +200,8 @@ impl Tally {
 
 /// Returns the plan of a request and its envelope.
 fn found(request: &EnvelopeRequest) -> Option<(Arc<ParametrizedPlan>, DecoupledEnvelope)> {
-    let outcome = envelope(request, &mut Unwatched).expect("within exact reasoning");
-    let plan = opened(request).expect("a plan");
+    let outcome = envelope(request, &mut NoObserver).expect("within exact reasoning");
+    let plan = parametrized_plan(request).expect("a plan");
     let envelope = outcome.envelope?;
     assert_eq!(box_of(&outcome.answer, &plan), Ok(envelope.clone()));
     Some((Arc::new(plan), envelope))
@@ -327,14 +327,14 @@ fn sum(counts: &mut [usize; 3], own: [usize; 3]) {
 }
 
 #[test]
-fn the_region_has_a_point_exactly_if_the_plan_works_there() {
+fn region_contains_exactly_the_feasible_points() {
     if !has_z3() {
         return;
     }
     let mut counts = [0; 3];
     for name in CASES {
         let (task, plan) = case(name);
-        let plan = opened(&EnvelopeRequest::new(&task, plan));
+        let plan = parametrized_plan(&EnvelopeRequest::new(&task, plan));
         let plan = Arc::new(plan.expect("a plan"));
         sum(&mut counts, points_agree(name, (&task, &plan), 10));
     }
@@ -344,7 +344,7 @@ fn the_region_has_a_point_exactly_if_the_plan_works_there() {
 
 /// `ELBOWROOM_POINTS` sets the number of points of each plan; by default, a few of each fifth.
 #[test]
-fn z3_has_the_same_points_in_the_regions_of_published_plans() {
+fn z3_agrees_with_regions_of_published_plans() {
     let Some(data) = shared::data() else { return };
     if !has_z3() {
         return;
@@ -370,10 +370,10 @@ fn z3_has_the_same_points_in_the_regions_of_published_plans() {
 #[test]
 fn the_box_of_an_answer_about_another_plan_is_refused() {
     let (task, plan) = case("delivery");
-    let outcome = envelope(&EnvelopeRequest::new(&task, plan), &mut Unwatched);
+    let outcome = envelope(&EnvelopeRequest::new(&task, plan), &mut NoObserver);
     let answer = outcome.expect("within exact reasoning").answer;
     let (other_task, other) = case("hatchery");
-    let other = opened(&EnvelopeRequest::new(&other_task, other));
+    let other = parametrized_plan(&EnvelopeRequest::new(&other_task, other));
     let refused = box_of(&answer, &other.expect("a plan"));
     assert!(
         matches!(refused, Err(ExportError::OtherParameters { .. })),

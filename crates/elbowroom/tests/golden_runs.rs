@@ -136,7 +136,7 @@ fn every_box_found_by_the_authors_tool_is_inside() {
 }
 
 #[test]
-fn our_own_search_finishes_with_a_box_that_withstands_the_judge() {
+fn own_search_finds_box_accepted_by_validator() {
     let Some(envelopes) = envelopes() else { return };
     for run in SOUND {
         let _ = run.read(&envelopes).found(run.precision);
@@ -162,7 +162,7 @@ fn a_start_point_after_its_deadline_is_refused_with_the_late_literal() {
 }
 
 #[test]
-fn refuelling_takes_what_the_fuel_and_the_tank_allow() {
+fn refuelling_is_limited_by_fuel_and_tank() {
     let Some(envelopes) = envelopes() else { return };
     // With 990 in the tank, a rate of 4 makes the burnt 1000 from 10/4 on. Started at 5, with 985
     // in a tank for 1000, the level rises by 3 for 5 at most.
@@ -170,7 +170,7 @@ fn refuelling_takes_what_the_fuel_and_the_tank_allow() {
 }
 
 #[test]
-fn refuelling_at_once_waits_for_room_and_comes_before_the_tank_is_empty() {
+fn instantaneous_refuelling_respects_tank_limits() {
     let Some(envelopes) = envelopes() else { return };
     // 20 fit once 990 - x <= 980, and 990 are burnt at 990.
     assert_eq!(INSTANT.read(&envelopes).limits(), "x=[10,990]");
@@ -208,7 +208,7 @@ fn two_durations_share_the_time_before_a_literal() {
 }
 
 #[test]
-fn production_lasts_until_the_deadline_less_everything_around_it() {
+fn production_is_limited_by_deadline_and_other_actions() {
     let Some(envelopes) = envelopes() else { return };
     // Collecting, two drives before, stacking and two more drives take 180. The plan has seven
     // separations between them (an eighth between the starts of both productions).
@@ -231,7 +231,7 @@ fn production_lasts_until_the_deadline_less_everything_around_it() {
 }
 
 #[test]
-fn robots_that_nobody_waits_for_may_take_for_ever() {
+fn robots_without_successors_have_unbounded_durations() {
     let Some(envelopes) = envelopes() else { return };
     // The box that the authors' tool was still widening after eight minutes.
     let case = DELIVERY.read(&envelopes);

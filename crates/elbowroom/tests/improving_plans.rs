@@ -10,7 +10,7 @@ use elbowroom::answers::plan::{
     BetterPlan, ImprovingPlans, ImprovingPlansRequest, NextPlan, PlanFinding, PlanRequest,
     PlanStop, plan,
 };
-use elbowroom::answers::{Halt, Unwatched, Watcher};
+use elbowroom::answers::{NoObserver, Observer, StopRequest};
 use elbowroom::model::Task;
 use elbowroom::model::validate::{Settings, Verdict, validate};
 use elbowroom::num::Rational;
@@ -51,7 +51,7 @@ fn value(better: &BetterPlan) -> (Rational, Rational) {
 fn each_plan_is_valid_and_strictly_better_than_the_one_before() {
     for name in ["errand", "crossing", "match", "delivery"] {
         let task = task(name);
-        let mut search = ImprovingPlans::search(&request(&task), Box::new(Unwatched)).unwrap();
+        let mut search = ImprovingPlans::search(&request(&task), Box::new(NoObserver)).unwrap();
         let plans: Vec<_> = search.by_ref().collect();
         let values: Vec<_> = plans.iter().map(value).collect();
         assert!(!plans.is_empty(), "{name}");
@@ -75,33 +75,33 @@ fn each_plan_is_valid_and_strictly_better_than_the_one_before() {
             self_overlap: false,
             threads: 1,
         };
-        let alone = plan(&mut alone, &mut Unwatched).unwrap();
+        let alone = plan(&mut alone, &mut NoObserver).unwrap();
         assert_eq!(*outcome, alone, "{name}");
         assert_eq!(search.next_within(Duration::ZERO), NextPlan::Ended);
     }
 }
 
 #[test]
-fn where_there_is_a_better_plan_there_is_more_than_one() {
-    let search = ImprovingPlans::search(&request(&task("errand")), Box::new(Unwatched));
+fn improvable_plan_yields_several_plans() {
+    let search = ImprovingPlans::search(&request(&task("errand")), Box::new(NoObserver));
     assert!(search.unwrap().count() > 1);
 }
 
 /// Watcher that lives as long as the search.
-struct Attached(Arc<()>);
+struct LifetimeObserver(Arc<()>);
 
-impl Watcher for Attached {
-    fn flow(&mut self) -> ControlFlow<Halt> {
+impl Observer for LifetimeObserver {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         let _ = &self.0;
         ControlFlow::Continue(())
     }
 }
 
 #[test]
-fn a_search_ends_when_nobody_wants_its_plans_any_more() {
+fn dropped_iterator_ends_its_search() {
     let task = task("errand");
     let witness = Arc::new(());
-    let watcher = Box::new(Attached(Arc::clone(&witness)));
+    let watcher = Box::new(LifetimeObserver(Arc::clone(&witness)));
     let mut search = ImprovingPlans::search(&request(&task), watcher).unwrap();
     assert!(search.next().is_some());
     drop(search);
@@ -113,14 +113,14 @@ fn a_search_ends_when_nobody_wants_its_plans_any_more() {
 /// Watcher that ends the search at once.
 struct Impatient;
 
-impl Watcher for Impatient {
-    fn flow(&mut self) -> ControlFlow<Halt> {
-        ControlFlow::Break(Halt::TimeLimit)
+impl Observer for Impatient {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
+        ControlFlow::Break(StopRequest::TimeLimit)
     }
 }
 
 #[test]
-fn the_end_says_why_there_is_no_plan() {
+fn final_answer_states_reason_for_missing_plan() {
     let task = task("errand");
     let mut search = ImprovingPlans::search(&request(&task), Box::new(Impatient)).unwrap();
     assert_eq!(search.next(), None);

@@ -13,21 +13,21 @@ use elbowroom::plan::{
     BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, Valuation, format, network_node,
 };
 use elbowroom::stn::ConsistentNetwork;
-use elbowroom::{flow, parse_box};
+use elbowroom::{parse_box, pipeline};
 use kinds::{Kind, kinds};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-fn judge(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
+fn validate_plan(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
     validate(task, plan, &elbowroom::model::validate::Settings::default())
 }
 
 /// Returns the plan with all durations as parameters, and its nominal schedule.
 fn opened(task: &Task, plan: &TimeTriggeredPlan) -> (Arc<ParametrizedPlan>, Schedule) {
-    let freed = flow::free(task, plan).expect("a valid plan");
+    let freed = pipeline::free(task, plan).expect("a valid plan");
     let nominal = freed.nominal.clone();
-    let open = flow::open(task, freed, &[]).expect("durations");
+    let open = pipeline::open(task, freed, &[]).expect("durations");
     (Arc::new(open), nominal)
 }
 
@@ -84,10 +84,10 @@ fn schedules(
 fn the_plans_are_valid_and_so_is_their_nominal_schedule() {
     for kind in kinds() {
         let (task, plan) = kind.read();
-        assert!(judge(&task, &plan).is_valid(), "{}", kind.name);
-        let freed = flow::free(&task, &plan).expect("a valid plan");
+        assert!(validate_plan(&task, &plan).is_valid(), "{}", kind.name);
+        let freed = pipeline::free(&task, &plan).expect("a valid plan");
         let nominal = freed.nominal.clone();
-        let closed = Arc::new(flow::closed(&task, freed));
+        let closed = Arc::new(pipeline::without_parameters(&task, freed));
         let schedule = elbowroom::stn::Schedule::from(nominal);
         assert!(
             schedule.holds_in(&closed.plan.network(&Valuation::default())),
@@ -101,7 +101,7 @@ fn the_plans_are_valid_and_so_is_their_nominal_schedule() {
 }
 
 #[test]
-fn boxes_are_inside_or_not_as_worked_out_by_hand() {
+fn box_checks_match_hand_computation() {
     for kind in kinds() {
         for (boxes, expected) in [(kind.inside, true), (kind.outside, false)] {
             for text in boxes {
@@ -113,7 +113,7 @@ fn boxes_are_inside_or_not_as_worked_out_by_hand() {
 }
 
 #[test]
-fn promises_can_be_kept_by_what_has_been_seen_or_not_as_worked_out_by_hand() {
+fn controllability_matches_hand_computation() {
     for kind in kinds() {
         for (boxes, expected) in [(kind.dynamic, true), (kind.not_dynamic, false)] {
             for text in boxes {
@@ -126,7 +126,7 @@ fn promises_can_be_kept_by_what_has_been_seen_or_not_as_worked_out_by_hand() {
 }
 
 #[test]
-fn the_judge_accepts_every_schedule_drawn_from_a_box_that_is_inside() {
+fn validator_accepts_schedules_of_boxes_inside() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     for kind in kinds() {
         let (task, plan) = kind.read();
@@ -134,7 +134,7 @@ fn the_judge_accepts_every_schedule_drawn_from_a_box_that_is_inside() {
         for text in kind.inside.iter().chain(kind.dynamic) {
             let envelope = parse_box(text, &open).expect("a box of this plan");
             for schedule in schedules(&open, &envelope, &mut rng) {
-                let verdict = judge(&task, &schedule);
+                let verdict = validate_plan(&task, &schedule);
                 let violation = verdict.violation().map(ToString::to_string);
                 assert_eq!(violation, None, "{}: {text}: {schedule:?}", kind.name);
             }
@@ -143,7 +143,7 @@ fn the_judge_accepts_every_schedule_drawn_from_a_box_that_is_inside() {
 }
 
 #[test]
-fn each_kind_has_an_envelope_that_the_judge_accepts_and_that_holds_the_plan() {
+fn envelope_of_each_kind_is_valid_and_contains_the_plan() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     for kind in kinds() {
         let (task, plan) = kind.read();
@@ -162,7 +162,7 @@ fn each_kind_has_an_envelope_that_the_judge_accepts_and_that_holds_the_plan() {
         }
         for schedule in schedules(&open, &found, &mut rng) {
             assert!(
-                judge(&task, &schedule).is_valid(),
+                validate_plan(&task, &schedule).is_valid(),
                 "{}: {schedule:?}",
                 kind.name
             );
@@ -173,7 +173,7 @@ fn each_kind_has_an_envelope_that_the_judge_accepts_and_that_holds_the_plan() {
 /// Widens one end after the other. An oracle with a cache agrees with one without knowledge of
 /// earlier boxes.
 #[test]
-fn an_oracle_that_remembers_says_what_one_says_that_does_not() {
+fn caching_oracle_agrees_with_uncached_oracle() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
     let mut counts = [0; 2];
     for (kind, guarantee) in kinds()
@@ -242,18 +242,22 @@ fn the_order_of_the_lines_of_a_plan_does_not_matter() {
     for kind in kinds() {
         let (task, plan) = kind.read();
         let (open, nominal) = opened(&task, &plan);
-        let envelope = flow::robust_plan(&task, &plan, &flow::Settings::default());
+        let envelope = pipeline::robust_plan(&task, &plan, &pipeline::Settings::default());
         let envelope = envelope.expect("within reach").envelope;
         let lines: Vec<&str> = kind.plan.lines().collect();
         for text in orders(&lines) {
             let (task, plan) = kind.read_with(&text);
-            assert!(judge(&task, &plan).is_valid(), "{}:\n{text}", kind.name);
+            assert!(
+                validate_plan(&task, &plan).is_valid(),
+                "{}:\n{text}",
+                kind.name
+            );
             let (found, times) = opened(&task, &plan);
             let here = format!("{}:\n{text}", kind.name);
             assert_eq!(found.plan.constraints, open.plan.constraints, "{here}");
             assert_eq!(found.parameters, open.parameters, "{here}");
             assert_eq!((names(&found), &times), (names(&open), &nominal), "{here}");
-            let found = flow::robust_plan(&task, &plan, &flow::Settings::default());
+            let found = pipeline::robust_plan(&task, &plan, &pipeline::Settings::default());
             let found = found.expect("within reach").envelope;
             assert_eq!(found, envelope, "{}:\n{text}", kind.name);
         }
@@ -261,7 +265,7 @@ fn the_order_of_the_lines_of_a_plan_does_not_matter() {
 }
 
 #[test]
-fn nothing_ties_ends_together_that_do_not_need_each_other() {
+fn independent_ends_are_not_coupled() {
     for kind in kinds() {
         let (task, plan) = kind.read();
         let (open, _) = opened(&task, &plan);
@@ -328,7 +332,7 @@ fn twin_chains(count: usize) -> String {
 }
 
 #[test]
-fn what_was_found_is_kept_when_there_are_too_many_cases_to_tell_apart() {
+fn partial_result_is_kept_after_too_many_cases() {
     const DOMAIN: &str = "(define (domain clocks)
   (:requirements :durative-actions)
   (:predicates (ticked))
@@ -355,14 +359,14 @@ fn what_was_found_is_kept_when_there_are_too_many_cases_to_tell_apart() {
 }
 
 #[test]
-fn a_number_in_a_continuous_decrease_is_left_open_as_it_is_written() {
+fn rate_of_continuous_decrease_can_be_left_open() {
     let all = kinds();
     let jobs = all.iter().find(|kind| kind.domain.contains("workshop"));
     let (task, plan) = jobs.expect("the jobs with a battery").read();
     let opened = |spec: &str| {
-        let freed = flow::free(&task, &plan).expect("a valid plan");
+        let freed = pipeline::free(&task, &plan).expect("a valid plan");
         let spec = spec.parse().expect("a specification");
-        flow::open(&task, freed, &[spec])
+        pipeline::open(&task, freed, &[spec])
     };
     let open = Arc::new(opened("constant work charge shared").expect("a number"));
     assert_eq!(open.nominal(), Valuation::new(vec![Rational::ONE]));

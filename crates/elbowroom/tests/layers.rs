@@ -86,7 +86,7 @@ const LAYERS: &[(&str, &[&str])] = &[
 ];
 
 #[test]
-fn crates_import_only_what_their_layer_allows() {
+fn crates_respect_their_layer() {
     for (name, allowed) in LAYERS {
         let violations = forbidden_imports(&manifest_of(name), allowed);
         assert!(
@@ -97,7 +97,7 @@ fn crates_import_only_what_their_layer_allows() {
 }
 
 #[test]
-fn the_table_names_exactly_the_members_of_the_workspace() {
+fn layer_table_lists_all_workspace_members() {
     let root = read(&workspace().join("Cargo.toml"));
     let members: BTreeSet<_> = root["workspace"]["members"]
         .as_array()
@@ -110,7 +110,7 @@ fn the_table_names_exactly_the_members_of_the_workspace() {
 }
 
 #[test]
-fn the_table_goes_upwards_only() {
+fn layers_depend_only_on_lower_layers() {
     for (position, (name, allowed)) in LAYERS.iter().enumerate() {
         for import in *allowed {
             assert!(
@@ -124,7 +124,7 @@ fn the_table_goes_upwards_only() {
 /// Decisions during execution use results that were computed before. The executing crates have no
 /// access to solvers for envelopes or plans.
 #[test]
-fn what_executes_cannot_reach_a_solver() {
+fn execution_crates_do_not_depend_on_solvers() {
     for name in ["probability", "execution", "sim", "report"] {
         let reached = reachable(name);
         for solver in ["envelope", "planner", "external"] {
@@ -149,14 +149,14 @@ fn only_the_laboratory_has_a_pool_of_threads() {
 }
 
 /// Crates that communicate with the world. They use threads only to wait for others.
-const BESIDE_THE_WORLD: [&str; 5] = ["cli", "executive", "external", "plansys2", "python"];
+const ADAPTER_CRATES: [&str; 5] = ["cli", "executive", "external", "plansys2", "python"];
 
 /// The third rule of ARCHITECTURE.md. Tests may create threads.
 #[test]
-fn threads_are_made_in_one_file_below_what_stands_beside_the_world() {
+fn threads_are_spawned_in_one_file() {
     let mut found = Vec::new();
     for (name, _) in LAYERS {
-        if BESIDE_THE_WORLD.contains(name) {
+        if ADAPTER_CRATES.contains(name) {
             continue;
         }
         let mut left = vec![workspace().join("crates").join(name).join("src")];
@@ -221,7 +221,7 @@ fn reachable(name: &'static str) -> BTreeSet<&'static str> {
 }
 
 #[test]
-fn a_forbidden_import_is_found_wherever_it_is_written() {
+fn forbidden_import_is_detected_in_every_form() {
     let forbidden = |manifest: &str| {
         let manifest: Table = manifest.parse().expect("a manifest");
         forbidden_imports(&manifest, &["num"])

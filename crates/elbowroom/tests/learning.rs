@@ -3,16 +3,16 @@
 
 use std::sync::Arc;
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::learn::{
-    ConformalBox, DurationsLearnt, InsideRequest, LearnAnswer, LearnRequest, Log, Settings,
+    ConformalBox, ConformalRequest, LearnAnswer, LearnRequest, LearntDurations, Log, Settings,
     Verdict, learn,
 };
 use elbowroom::answers::run::{RunRequest, run as answer_run, simulate};
 use elbowroom::envelope::Guarantee;
 use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::execution::run::{TimeoutRule, Verdict as Ended};
-use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::execution::{Command, Observation, TimeAdvance, World, WorldError};
 use elbowroom::learning::records::{Outcome, Record, of_trace};
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -68,7 +68,7 @@ fn run(world: &str, seed: u64) -> (String, bool) {
     let request = RunRequest::new(&spec, &task)
         .beginning_with(plan)
         .recorded_by(&mut writer);
-    let outcome = simulate(request, &mut Unwatched).expect("a world");
+    let outcome = simulate(request, &mut NoObserver).expect("a world");
     let is_done = *outcome.verdict() == Ended::GoalReached;
     drop(writer);
     (text, is_done)
@@ -83,18 +83,18 @@ fn logs(count: u64) -> Vec<Log> {
         .collect()
 }
 
-fn learnt(logs: Vec<Log>, inside: Option<InsideRequest>) -> LearnAnswer {
+fn learnt(logs: Vec<Log>, inside: Option<ConformalRequest>) -> LearnAnswer {
     let request = LearnRequest {
         logs,
         settings: Settings::default(),
-        inside,
+        conformal_box: inside,
         expected: None,
     };
-    learn(&request, &mut Unwatched).expect("an answer")
+    learn(&request, &mut NoObserver).expect("an answer")
 }
 
 #[test]
-fn the_world_behind_traces_is_found_again() {
+fn true_world_is_recovered_from_traces() {
     let (task, _) = problem();
     for count in [20, 50, 200] {
         let answer = learnt(logs(count), None);
@@ -102,7 +102,7 @@ fn the_world_behind_traces_is_found_again() {
             let action = answer.actions.iter().find(|action| action.action == name);
             action.expect("it was executed")
         };
-        let DurationsLearnt::Relative { group } = &of("drive").durations else {
+        let LearntDurations::Relative { group } = &of("drive").durations else {
             panic!("{count}: {:?}", of("drive"));
         };
         let error = group
@@ -148,7 +148,7 @@ fn the_world_behind_traces_is_found_again() {
 }
 
 #[test]
-fn runs_in_the_learnt_world_go_as_in_the_true_one() {
+fn runs_in_learnt_world_match_true_world() {
     let learnt = learnt(logs(200), None).world;
     let rate = |world: &str| {
         let done = (1000..1400).filter(|&seed| run(world, seed).1).count();
@@ -164,7 +164,7 @@ fn runs_in_the_learnt_world_go_as_in_the_true_one() {
 
 /// Cancelled actions have long durations; without them, all durations would look short.
 #[test]
-fn what_was_cut_off_counts() {
+fn censored_durations_are_used() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let drawn = rand_distr::Normal::new(10.0, 3.0).expect("a distribution");
     let records: Vec<Record> = (0..300)
@@ -191,13 +191,13 @@ fn what_was_cut_off_counts() {
             vec![Log {
                 name,
                 records,
-                course: None,
+                fact_history: None,
                 world: None,
             }],
             None,
         );
         match &answer.actions[0].durations {
-            DurationsLearnt::Together { group } => group.fit.mean,
+            LearntDurations::Together { group } => group.fit.mean,
             other => panic!("{other:?}"),
         }
     };
@@ -215,7 +215,7 @@ fn what_was_cut_off_counts() {
 /// The intervals contain all durations of the next run with the promised frequency, up to the
 /// sampling error.
 #[test]
-fn conformal_intervals_hold_the_next_run() {
+fn conformal_intervals_contain_the_next_run() {
     let (task, plan) = problem();
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let shape = rand_distr::LogNormal::new(0.0, 0.25).expect("a distribution");
@@ -242,10 +242,10 @@ fn conformal_intervals_hold_the_next_run() {
         let logs = (0..80).map(|number| Log {
             name: number.to_string(),
             records: run(&mut rng),
-            course: None,
+            fact_history: None,
             world: None,
         });
-        let inside = InsideRequest {
+        let inside = ConformalRequest {
             task: Arc::clone(&task),
             plan: plan.clone().into(),
             guarantee: Guarantee::Dynamic,
@@ -275,9 +275,9 @@ fn conformal_intervals_hold_the_next_run() {
 }
 
 #[test]
-fn too_few_samples_are_told() {
+fn too_few_samples_are_reported() {
     let (task, plan) = problem();
-    let inside = InsideRequest {
+    let inside = ConformalRequest {
         task,
         plan: plan.into(),
         guarantee: Guarantee::Dynamic,
@@ -319,10 +319,10 @@ fn fetching(throughout: &str) -> ConformalBox {
             outcome: Outcome::Succeeded,
             planned: Some(5.0),
         }],
-        course: None,
+        fact_history: None,
         world: None,
     });
-    let inside = InsideRequest {
+    let inside = ConformalRequest {
         task,
         plan: plan.expect("a plan").0.into(),
         guarantee: Guarantee::Dynamic,
@@ -333,7 +333,7 @@ fn fetching(throughout: &str) -> ConformalBox {
 }
 
 #[test]
-fn a_plan_that_may_survive_another_course_is_not_said_to_fail() {
+fn plan_feasible_in_other_trajectory_is_not_reported_as_failing() {
     let found = fetching("(and)");
     assert_eq!(found.verdict, Verdict::Undecided);
     let reason = found.reason.expect("a reason");
@@ -347,7 +347,7 @@ fn a_plan_that_may_survive_another_course_is_not_said_to_fail() {
 
 /// Only believed events count, and a truncated log has actions that are still running.
 #[test]
-fn a_trace_that_was_cut_off_is_read_up_to_there() {
+fn truncated_trace_is_read_to_its_end() {
     let (trace, _) = run(WORLD, 3);
     let whole = of_trace(&Stored::read(&trace).expect("a trace"));
     assert!(
@@ -368,7 +368,7 @@ fn a_trace_that_was_cut_off_is_read_up_to_there() {
 
 /// Doors are unlocked and locked spontaneously, at rates. The robot unlocks one of them itself.
 #[test]
-fn rates_of_changes_are_found_again_and_actions_and_deadlines_are_no_changes() {
+fn rates_are_recovered_without_counting_actions_and_deadlines() {
     const UP: f64 = 0.01;
     const DOWN: f64 = 0.04;
     let world = format!(
@@ -410,7 +410,7 @@ fn rates_of_changes_are_found_again_and_actions_and_deadlines_are_no_changes() {
 
 /// A failed pick leaves the parcel where it was. This is not a spontaneous change.
 #[test]
-fn what_a_failure_undoes_has_not_changed_by_itself() {
+fn undone_effects_are_not_spontaneous_changes() {
     let world = WORLD.replace("when = \"midway\"", "when = \"midway\"\nundone = true");
     let undone = (0..20).map(|seed| {
         let (trace, _) = run(&world, seed);
@@ -434,7 +434,7 @@ fn what_a_failure_undoes_has_not_changed_by_itself() {
 /// With the true rates, the number of observed changes is as expected. With other rates the answer
 /// reports the difference, also for facts that never changed.
 #[test]
-fn expected_changes_stand_beside_those_that_were_seen() {
+fn expected_and_observed_changes_are_both_reported() {
     let world = format!(
         "{WORLD}[[hazard]]\nfact = \"unlocked\"\nbecomes_true_per_second = 0.01\n\
          becomes_false_per_second = 0.04\n"
@@ -449,10 +449,10 @@ fn expected_changes_stand_beside_those_that_were_seen() {
         let request = LearnRequest {
             logs: logs.to_vec(),
             settings: Settings::default(),
-            inside: None,
+            conformal_box: None,
             expected: Some(Source::new("expected.toml", expected)),
         };
-        learn(&request, &mut Unwatched)
+        learn(&request, &mut NoObserver)
     };
     let answer = asked(&logs, &world).expect("an answer");
     assert_eq!(answer.changes.len(), 2);
@@ -490,7 +490,7 @@ fn expected_changes_stand_beside_those_that_were_seen() {
         .iter()
         .cloned()
         .map(|log| Log {
-            course: None,
+            fact_history: None,
             world: None,
             ..log
         })
@@ -510,7 +510,7 @@ impl World for Early<'_> {
         self.0.command(now, command)
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let mut passage = self.0.wait(until)?;
         for observation in &mut passage.observations {
             observation.time = &passage.now + Rational::new(1, 1_000_000_000);
@@ -543,7 +543,7 @@ fn reports_with_corrected_times_count() {
     let request = RunRequest::new(&spec, &task)
         .beginning_with(plan)
         .recorded_by(&mut writer);
-    answer_run(request, &mut world, &mut Unwatched).expect("a run");
+    answer_run(request, &mut world, &mut NoObserver).expect("a run");
     drop(writer);
     assert!(text.contains("taken as now"), "{text}");
     let records = of_trace(&Stored::read(&text).expect("a trace"));

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::answers::envelope::{Best, EnvelopeFinding, EnvelopeRequest, envelope};
-use elbowroom::answers::{EnvelopeOutcome, RequestError, Unwatched};
+use elbowroom::answers::{EnvelopeOutcome, NoObserver, RequestError};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -19,7 +19,7 @@ use elbowroom::pddl;
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::sim::WorldModel;
 use elbowroom::verify::{AnswerError, verify_answer};
-use elbowroom::{AnyPlan, ChanceError};
+use elbowroom::{AnyPlan, DistributionError};
 use serde_json::Value;
 use shared::case::Case;
 use shared::changed::{changed, numbers};
@@ -67,7 +67,7 @@ fn request(task: &Arc<Task>, plan: impl Into<AnyPlan>, sections: &str) -> Envelo
 }
 
 fn answered(request: &EnvelopeRequest) -> EnvelopeOutcome {
-    envelope(request, &mut Unwatched).expect("within exact reasoning")
+    envelope(request, &mut NoObserver).expect("within exact reasoning")
 }
 
 fn best(outcome: &EnvelopeOutcome) -> &Best {
@@ -114,7 +114,7 @@ fn certificates_of_the_most_likely_boxes_are_accepted() {
 }
 
 #[test]
-fn each_number_that_is_changed_in_turn_makes_a_certificate_refused_or_leaves_it_a_proof() {
+fn changed_number_invalidates_certificate_or_leaves_it_valid() {
     let (mut count, mut still, mut wrong) = (0, 0, Vec::new());
     for (name, sections) in [
         ("delivery", AROUND),
@@ -157,11 +157,14 @@ fn each_number_that_is_changed_in_turn_makes_a_certificate_refused_or_leaves_it_
 }
 
 #[test]
-fn no_other_box_is_more_likely_and_irr_has_less() {
+fn most_likely_box_beats_irr_and_random_boxes() {
     let (task, plan) = case("delivery");
     let likely = answered(&request(&task, plan.clone(), AROUND));
     let best_one = best(&likely).probability.clone().expect("a probability");
-    let chances = elbowroom::chances(likely.plan.as_ref().expect("a plan"), &world(AROUND, &task));
+    let chances = elbowroom::duration_distributions(
+        likely.plan.as_ref().expect("a plan"),
+        &world(AROUND, &task),
+    );
     let chances = chances.expect("normal distributions");
     let resolution = Rational::new(1, 1000);
     for method in [Method::Irr, Method::Best] {
@@ -176,7 +179,7 @@ fn no_other_box_is_more_likely_and_irr_has_less() {
             let lower = interval.lower.value().cloned().unwrap_or(-&far);
             let upper = interval.upper.value().cloned().unwrap_or(far);
             let chance = chance.as_ref().expect("all durations vary");
-            product *= &chance.inside([&lower, &upper], &resolution);
+            product *= &chance.probability_inside([&lower, &upper], &resolution);
         }
         assert!(
             product <= best_one.most,
@@ -188,7 +191,7 @@ fn no_other_box_is_more_likely_and_irr_has_less() {
 }
 
 #[test]
-fn a_duration_that_never_is_as_the_plan_can_bear_leaves_no_probability() {
+fn infeasible_duration_gives_probability_zero() {
     let (task, plan) = case("delivery");
     let never = "[[duration]]\naction = \"pick\"\nconstant = 500";
     let outcome = answered(&request(&task, plan.clone(), never));
@@ -216,14 +219,14 @@ fn a_duration_that_never_is_as_the_plan_can_bear_leaves_no_probability() {
 }
 
 #[test]
-fn what_cannot_be_told_is_refused_with_what_to_do() {
+fn unknown_probability_is_rejected_with_advice() {
     let (task, plan) = case("delivery");
     let mut without = request(&task, plan.clone(), AROUND);
     without.world = None;
-    let refused = envelope(&without, &mut Unwatched);
+    let refused = envelope(&without, &mut NoObserver);
     assert!(matches!(
         refused,
-        Err(RequestError::Chance(ChanceError::NoWorld))
+        Err(RequestError::Distribution(DistributionError::NoWorld))
     ));
     let mut deadline = request(&task, plan, AROUND);
     deadline.vary = vec![
@@ -231,7 +234,7 @@ fn what_cannot_be_told_is_refused_with_what_to_do() {
             .parse()
             .expect("a specification"),
     ];
-    if let Err(refused) = envelope(&deadline, &mut Unwatched) {
+    if let Err(refused) = envelope(&deadline, &mut NoObserver) {
         assert!(
             refused.to_string().contains("is about durations"),
             "{refused}"
@@ -264,9 +267,9 @@ fn certificates_of_published_plans_are_accepted() {
             let mut request = request(&case.task, plan, AROUND);
             request.guarantee = guarantee;
             let begun = Instant::now();
-            let outcome = match envelope(&request, &mut Unwatched) {
+            let outcome = match envelope(&request, &mut NoObserver) {
                 Ok(outcome) => outcome,
-                Err(RequestError::Chance(_)) => continue,
+                Err(RequestError::Distribution(_)) => continue,
                 Err(wrong) => panic!("{}: {wrong}", instance.name),
             };
             search = search.max(begun.elapsed().as_secs_f64());

@@ -6,8 +6,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom::answers::envelope::{EnvelopeFinding, envelope};
-use elbowroom::answers::{EnvelopeRequest, Halt, Unwatched, Watcher};
-use elbowroom::{AnyPlan, flow};
+use elbowroom::answers::{EnvelopeRequest, NoObserver, Observer, StopRequest};
+use elbowroom::{AnyPlan, pipeline};
 use elbowroom_envelope::{Guarantee, Method, Oracle, Settings, irr};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -29,8 +29,8 @@ fn read(robots: usize, ways: usize, needs: Needs) -> (Arc<Task>, TimeTriggeredPl
 
 fn open(robots: usize, ways: usize, needs: Needs) -> (Arc<Task>, Arc<ParametrizedPlan>) {
     let (task, plan) = read(robots, ways, needs);
-    let freed = flow::free(&task, &plan).expect("a valid plan");
-    let plan = flow::open(&task, freed, &[]).expect("durations to leave open");
+    let freed = pipeline::free(&task, &plan).expect("a valid plan");
+    let plan = pipeline::open(&task, freed, &[]).expect("durations to leave open");
     assert_eq!(plan.parameters.len(), robots * ways);
     (task, Arc::new(plan))
 }
@@ -53,7 +53,7 @@ fn refutations(robots: usize, ways: usize, needs: Needs, guarantee: Guarantee) -
 }
 
 #[test]
-fn the_work_of_a_search_grows_in_proportion_to_the_plan() {
+fn search_effort_is_linear_in_plan_length() {
     for (robots, needs) in [(1, Needs::Time), (4, Needs::Time), (1, Needs::Charge)] {
         for guarantee in Guarantee::ALL {
             let small = refutations(robots, 12, needs, guarantee);
@@ -67,10 +67,10 @@ fn the_work_of_a_search_grows_in_proportion_to_the_plan() {
 }
 
 #[test]
-fn what_limits_each_end_is_told_in_a_plan_with_many_parameters() {
+fn limits_are_reported_for_many_parameters() {
     let (task, plan) = read(3, 40, Needs::Time);
     let request = EnvelopeRequest::new(&task, AnyPlan::TimeTriggered(plan));
-    let outcome = envelope(&request, &mut Unwatched).expect("within exact reasoning");
+    let outcome = envelope(&request, &mut NoObserver).expect("within exact reasoning");
     let EnvelopeFinding::Envelope { parameters, .. } = &outcome.answer.finding else {
         panic!("{:?}", outcome.answer);
     };
@@ -95,25 +95,25 @@ fn what_limits_each_end_is_told_in_a_plan_with_many_parameters() {
 }
 
 /// Watcher that ends the search after `left` polls, and counts the polls after that.
-struct Patience {
-    left: usize,
-    after: usize,
+struct PollLimit {
+    remaining_polls: usize,
+    polls_after_limit: usize,
 }
 
-impl Watcher for Patience {
-    fn flow(&mut self) -> ControlFlow<Halt> {
-        if let Some(left) = self.left.checked_sub(1) {
-            self.left = left;
+impl Observer for PollLimit {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
+        if let Some(left) = self.remaining_polls.checked_sub(1) {
+            self.remaining_polls = left;
             ControlFlow::Continue(())
         } else {
-            self.after += 1;
-            ControlFlow::Break(Halt::TimeLimit)
+            self.polls_after_limit += 1;
+            ControlFlow::Break(StopRequest::TimeLimit)
         }
     }
 }
 
 #[test]
-fn who_wants_no_more_is_not_asked_for_long_and_gets_what_has_been_found() {
+fn interrupted_search_returns_partial_result_soon() {
     for (needs, method) in [
         (Needs::Time, Method::Irr),
         (Needs::Charge, Method::Irr),
@@ -125,11 +125,18 @@ fn who_wants_no_more_is_not_asked_for_long_and_gets_what_has_been_found() {
         request.search.method = Some(method);
         let mut widest = Rational::ZERO;
         for left in [1, 2, 5, 20, 60, 100, 200, 500, 2_000, usize::MAX] {
-            let mut patience = Patience { left, after: 0 };
+            let mut patience = PollLimit {
+                remaining_polls: left,
+                polls_after_limit: 0,
+            };
             let outcome = envelope(&request, &mut patience);
             let place = format!("{needs:?} {method} after {left}");
             // Each part of the remaining work polls once.
-            assert!(patience.after <= 12, "{place}: {}", patience.after);
+            assert!(
+                patience.polls_after_limit <= 12,
+                "{place}: {}",
+                patience.polls_after_limit
+            );
             let outcome = outcome.expect(&place);
             let found = outcome.envelope.expect(&place);
             let width = (0..20).map(|index| {

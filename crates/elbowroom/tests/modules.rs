@@ -12,7 +12,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crate, modules, and the reason for the cycle.
-const KNOWN: &[(&str, &[&str], &str)] = &[
+const ALLOWED_CYCLES: &[(&str, &[&str], &str)] = &[
     (
         "elbowroom",
         &["answers", "execute", "flow"],
@@ -39,12 +39,12 @@ const KNOWN: &[(&str, &[&str], &str)] = &[
 ];
 
 #[test]
-fn modules_use_each_other_in_no_circle_that_is_not_listed() {
+fn modules_have_no_unlisted_cycles() {
     for folder in folders(&workspace().join("crates")) {
         let name = folder.file_name().expect("a folder's name");
         let name = name.to_str().expect("plain names");
-        for circle in circles(&uses(&sources(&folder.join("src")))) {
-            let is_known = KNOWN.iter().any(|(known, modules, _)| {
+        for circle in cycles(&uses(&sources(&folder.join("src")))) {
+            let is_known = ALLOWED_CYCLES.iter().any(|(known, modules, _)| {
                 *known == name
                     && circle
                         .iter()
@@ -60,10 +60,10 @@ fn modules_use_each_other_in_no_circle_that_is_not_listed() {
 }
 
 #[test]
-fn a_circle_is_found_however_the_path_is_written() {
+fn cycle_is_detected_in_every_path_form() {
     let found = |sources: &[(&str, &str)]| {
         let own = |&(path, text): &(&str, &str)| (path.to_owned(), text.to_owned());
-        circles(&uses(&sources.iter().map(own).collect()))
+        cycles(&uses(&sources.iter().map(own).collect()))
     };
     let root = (
         "lib.rs",
@@ -253,7 +253,7 @@ fn end_of_text(rest: &str) -> usize {
 }
 
 /// Returns the strongly connected components with more than one module.
-fn circles(uses: &BTreeMap<String, BTreeSet<String>>) -> Vec<BTreeSet<String>> {
+fn cycles(uses: &BTreeMap<String, BTreeSet<String>>) -> Vec<BTreeSet<String>> {
     let reached = |from: &String| {
         let mut reached: BTreeSet<String> = BTreeSet::new();
         let mut open = vec![from];

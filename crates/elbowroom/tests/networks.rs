@@ -1,7 +1,7 @@
 //! Simple temporal networks: analysis and simulation.
 
 use elbowroom::network::{
-    Answer, Durations, NetworkFile, Request, Simulation, Verdict, examine, read, write_json,
+    Answer, Durations, NetworkFile, Request, Simulation, Verdict, analyze, read, write_json,
 };
 use elbowroom::num::Rational;
 use elbowroom::stn::uncertain::{ContingentLink, UncertainNetwork};
@@ -20,11 +20,11 @@ fn network(points: &str, edges: &str, links: &str) -> NetworkFile {
 }
 
 fn examined(file: &NetworkFile) -> Answer {
-    examine(file, &Request::default()).expect("no runs")
+    analyze(file, &Request::default()).expect("no runs")
 }
 
 /// Returns the verdicts, and the texts of the reasons.
-fn told(answer: &Answer) -> String {
+fn answer_text(answer: &Answer) -> String {
     let promises = [
         Some(&answer.consistent),
         answer.weak.as_ref(),
@@ -61,17 +61,17 @@ fn simulated(file: &NetworkFile, runs: u64, seed: u64, durations: Durations) -> 
         }),
         ..Request::default()
     };
-    examine(file, &request).expect("durations can be drawn")
+    analyze(file, &request).expect("durations can be drawn")
 }
 
 #[test]
-fn a_contradiction_is_told_in_the_names_of_the_file() {
+fn contradiction_uses_names_of_the_file() {
     let file = network(
         "start lunch end",
         "start 5 end, end -3 lunch, lunch -3 start",
         "",
     );
-    insta::assert_snapshot!(told(&examined(&file)), @r"
+    insta::assert_snapshot!(answer_text(&examined(&file)), @r"
     No
       by 1
       end at least 3 after lunch
@@ -81,14 +81,14 @@ fn a_contradiction_is_told_in_the_names_of_the_file() {
 }
 
 #[test]
-fn who_would_have_to_know_a_duration_beforehand_is_told() {
+fn uncontrollable_network_names_points_that_need_foresight() {
     // Filming must begin two to four before the eggs hatch, at an uncontrollable time.
     let file = network(
         "laid hatched film",
         "film 4 hatched, hatched -2 film",
         "laid 3 9 hatched",
     );
-    insta::assert_snapshot!(told(&examined(&file)), @r"
+    insta::assert_snapshot!(answer_text(&examined(&file)), @r"
     Yes
     Yes
     No
@@ -111,9 +111,9 @@ fn who_would_have_to_know_a_duration_beforehand_is_told() {
 }
 
 #[test]
-fn durations_without_a_schedule_are_told() {
+fn durations_without_schedule_are_reported() {
     let file = network("A C D", "D 0 C, A 7 D", "A 3 9 C");
-    insta::assert_snapshot!(told(&examined(&file)), @r"
+    insta::assert_snapshot!(answer_text(&examined(&file)), @r"
     Yes
     No
       by 2
@@ -163,7 +163,7 @@ fn an_end_without_limit_and_a_deadline_contradict_each_other() {
         }),
         ..Request::default()
     };
-    let refused = examine(&file, &request).expect_err("no upper bound");
+    let refused = analyze(&file, &request).expect_err("no upper bound");
     assert_eq!(
         refused.to_string(),
         "the link from `A` to `C` has no upper bound, so no duration can be drawn evenly; draw \
@@ -172,7 +172,7 @@ fn an_end_without_limit_and_a_deadline_contradict_each_other() {
 }
 
 #[test]
-fn a_share_of_the_runs_succeeds_where_nothing_is_promised() {
+fn uncontrollable_network_succeeds_in_some_runs() {
     // At 5 at the latest, but it takes 0 to 10: half of the runs.
     let file = network("A C", "A 5 C", "A 0 10 C");
     let runs = simulated(&file, 4000, 3, Durations::Given)
@@ -185,7 +185,7 @@ fn a_share_of_the_runs_succeeds_where_nothing_is_promised() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_runs_and_another_one_others() {
+fn runs_depend_on_the_seed() {
     let file = network("A C", "A 5 C", "A 0 10 C");
     let runs = |seed| simulated(&file, 300, seed, Durations::Uniform).simulation;
     assert_eq!(runs(7), runs(7));
@@ -196,7 +196,7 @@ fn the_same_seed_gives_the_same_runs_and_another_one_others() {
 }
 
 #[test]
-fn correlated_durations_are_long_together() {
+fn correlated_durations_vary_together() {
     let links = |correlations: &str| {
         let text = format!(
             r#"{{ "format": "elbowroom-network", "version": 1, "points": ["A", "C", "B", "D"],
@@ -222,7 +222,7 @@ fn correlated_durations_are_long_together() {
 }
 
 #[test]
-fn answers_are_read_back() {
+fn answers_round_trip() {
     let file = network("A C D", "C 0 D, A 7 D", "A 3 9 C");
     let answer = simulated(&file, 20, 0, Durations::Given);
     let text = serde_json::to_string(&answer).expect("JSON");
@@ -265,10 +265,10 @@ proptest! {
     /// Promises imply each other, each promise is kept in every run, and the dispatchable form of a
     /// network is equivalent to it.
     #[test]
-    fn what_is_promised_is_kept(file in arbitrary_networks(), seed in 0..1000_u64) {
+    fn controllable_network_never_fails(file in arbitrary_networks(), seed in 0..1000_u64) {
         let answer = simulated(&file, 20, seed, Durations::Uniform);
         let is = |promise: &Option<_>| {
-            promise.as_ref().map(|promise: &elbowroom::network::Promise| promise.verdict)
+            promise.as_ref().map(|promise: &elbowroom::network::ControllabilityCheck| promise.verdict)
                 == Some(Verdict::Yes)
         };
         let (weak, dynamic, strong) = (is(&answer.weak), is(&answer.dynamic), is(&answer.strong));

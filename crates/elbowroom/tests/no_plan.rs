@@ -24,7 +24,7 @@ use elbowroom::pddl::read_problem;
 use elbowroom::planner::{Answer, Settings, plan};
 use elbowroom::text::Source;
 use elbowroom::verify::Exact;
-use elbowroom::verify::no_plan::{Apart, Kind, NoPlan, NoPlanFlaw, verify_no_plan};
+use elbowroom::verify::no_plan::{Kind, MutexPair, NoPlan, NoPlanFlaw, verify_no_plan};
 use game::Random;
 
 fn task(domain: &str, problem: &str) -> Task {
@@ -126,7 +126,7 @@ fn changed(certificate: &NoPlan) -> Vec<NoPlan> {
 /// The problem has a validated plan. No certificate of a reduced problem is accepted for it, and no
 /// modification of one.
 #[test]
-fn no_plan_is_denied_by_the_certificate_of_a_problem_with_less() {
+fn certificate_of_weaker_problem_does_not_deny_a_plan() {
     let mut random = Random(11);
     let mut made: BTreeMap<Kind, usize> = BTreeMap::new();
     let (mut attacks, mut denied, mut uncertified) = (0, 0, 0);
@@ -138,7 +138,7 @@ fn no_plan_is_denied_by_the_certificate_of_a_problem_with_less() {
         if is_solved {
             assert!(certificate(&whole).is_err(), "{domain}\n{problem}");
         }
-        let less = draft.with_less();
+        let less = draft.smaller_variants();
         for own in less.iter().chain(std::iter::once(&draft)) {
             let (own_domain, own_problem) = own.text();
             let task = task(&own_domain, &own_problem);
@@ -204,7 +204,7 @@ fn cellar(fuses: usize) -> Task {
 /// Two fuses can be mended by the light of one match, three cannot. Earliest times alone do not
 /// prove that.
 #[test]
-fn each_entry_of_a_closed_set_counts() {
+fn every_state_of_a_closed_set_is_needed() {
     let three = cellar(3);
     let proof = certificate(&three).unwrap();
     assert_eq!(proof.kind(), Kind::Closed);
@@ -230,7 +230,7 @@ fn each_entry_of_a_closed_set_counts() {
     other.closed.as_mut().unwrap().alike = vec![vec!["m".to_owned(), "f0".to_owned()]];
     assert!(matches!(
         verify_no_plan(&three, &other),
-        Err(NoPlanFlaw::NotAlike(..))
+        Err(NoPlanFlaw::NotInterchangeable(..))
     ));
     let mut nothing = proof;
     nothing.closed.as_mut().unwrap().states.clear();
@@ -253,7 +253,7 @@ const COURIER: &str = "(:requirements :durative-actions :timed-initial-literals)
 /// With the parcel in hand it is 7 at the earliest, although each of the two facts alone can be
 /// reached earlier.
 #[test]
-fn pairs_prove_that_it_is_too_late() {
+fn pairs_prove_missed_deadline() {
     let closing = |time: &str| {
         let problem = format!("(:init (here) (open) (at {time} (not (open)))) (:goal (given))");
         task(COURIER, &problem)
@@ -270,10 +270,10 @@ fn pairs_prove_that_it_is_too_late() {
     }
     // An unfounded claim.
     let mut forged = proof;
-    forged.apart = vec![Apart {
+    forged.apart = vec![MutexPair {
         from: None,
         together: vec![["(given)".to_owned(), "(given)".to_owned()]],
-        ..Apart::default()
+        ..MutexPair::default()
     }];
     assert!(matches!(
         verify_no_plan(&early, &forged),

@@ -49,7 +49,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn rigid_auv_plans_are_guaranteed_and_flexible_ones_unless_they_leave_too_little_charge() {
+fn auv_plans_are_guaranteed_unless_charge_is_too_low() {
     let Some(data) = shared::data() else { return };
     let folder = data.join("envelopes/auv");
     let read = |name: &String| {
@@ -82,7 +82,7 @@ fn rigid_auv_plans_are_guaranteed_and_flexible_ones_unless_they_leave_too_little
 }
 
 #[test]
-fn deliveries_are_guaranteed_or_later_than_a_deadline_with_a_name() {
+fn deliveries_are_guaranteed_or_miss_a_named_deadline() {
     let Some(data) = shared::data() else { return };
     let cases = figure_4(&data).into_iter().map(|instance| {
         let case = Case::read(&instance.domain, &instance.problem, &instance.plan);

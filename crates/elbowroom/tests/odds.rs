@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::odds::{
     LatticeFinding, LossReason, Odds, OddsAnswer, OddsFinding, OddsRequest, OddsSettings,
     ValueAnswer, odds,
@@ -50,7 +50,7 @@ impl Scene {
         self
     }
 
-    fn ask(&self, settings: OddsSettings) -> OddsAnswer {
+    fn answer(&self, settings: OddsSettings) -> OddsAnswer {
         let request = OddsRequest {
             task: &self.task,
             plan: self.plan.clone(),
@@ -58,11 +58,11 @@ impl Scene {
             world: self.world.as_ref(),
             settings,
         };
-        odds(&request, &mut Unwatched).unwrap()
+        odds(&request, &mut NoObserver).unwrap()
     }
 
     fn odds(&self, settings: OddsSettings) -> Odds {
-        match self.ask(settings).finding {
+        match self.answer(settings).finding {
             OddsFinding::Odds(odds) => *odds,
             other => panic!("{other:?}"),
         }
@@ -89,7 +89,7 @@ const LIKELY: &str = "format = \"elbowroom-likelihoods\"\nversion = 1
     facts.whole.becomes_false = 0.25\n";
 
 #[test]
-fn the_published_values_of_the_first_order_are_found() {
+fn published_values_of_first_order_are_reproduced() {
     // Results of the authors' code, to four digits, where it returned the best order.
     for (name, value) in [("sf3-p1", 0.1575), ("sf3-p2", 0.1541), ("sf3-p9", 0.0656)] {
         let odds = published(name).odds(OddsSettings::default());
@@ -112,7 +112,7 @@ fn the_published_values_of_the_first_order_are_found() {
 }
 
 #[test]
-fn an_answer_is_a_document_that_can_be_read_again() {
+fn answer_round_trips_as_document() {
     let scene = Scene::new(LAMP, EVENING, LIKELY)
         .with_plan("0: (screw) [5]")
         .in_world("[[failure]]\naction = \"screw\"\nprobability = 0.5\nwhen = \"start\"\n");
@@ -126,14 +126,14 @@ fn an_answer_is_a_document_that_can_be_read_again() {
         serde_json::from_str::<OddsSettings>(&text).unwrap(),
         settings
     );
-    let answer = scene.ask(settings);
+    let answer = scene.answer(settings);
     let text = serde_json::to_string_pretty(&answer).unwrap();
     let read: OddsAnswer = serde_json::from_str(&text).unwrap();
     assert_eq!(serde_json::to_string_pretty(&read).unwrap(), text);
 }
 
 #[test]
-fn the_odds_say_where_and_why_worlds_are_lost() {
+fn losses_are_located_and_explained() {
     let odds = Scene::new(LAMP, EVENING, LIKELY).with_plan("0: (screw) [5]");
     let odds = odds.odds(OddsSettings::default());
     // It starts, the lamp stays intact for one step, and the effect takes place.
@@ -178,7 +178,7 @@ fn the_odds_say_where_and_why_worlds_are_lost() {
 }
 
 #[test]
-fn beliefs_about_the_beginning_count() {
+fn initial_beliefs_affect_the_probability() {
     let likely = format!("{LIKELY}[beliefs]\nwhole = 0.8\n");
     let odds = Scene::new(LAMP, EVENING, &likely).with_plan("0: (screw) [5]");
     let odds = odds.odds(OddsSettings::default());
@@ -186,7 +186,7 @@ fn beliefs_about_the_beginning_count() {
 }
 
 #[test]
-fn samples_of_a_world_say_what_its_chances_are() {
+fn sampled_success_rate_matches_world() {
     let scene = Scene::new(LAMP, EVENING, LIKELY)
         .with_plan("0: (screw) [5]")
         .in_world("[[failure]]\naction = \"screw\"\nprobability = 0.3\nwhen = \"start\"\n");
@@ -224,7 +224,7 @@ fn samples_of_a_world_say_what_its_chances_are() {
 }
 
 #[test]
-fn all_orders_of_a_short_plan_make_a_picture_and_those_of_a_long_one_are_refused() {
+fn lattice_is_drawn_for_short_plans_only() {
     let settings = OddsSettings {
         with_lattice: true,
         ..OddsSettings::default()
@@ -274,20 +274,20 @@ fn all_orders_of_a_short_plan_make_a_picture_and_those_of_a_long_one_are_refused
 }
 
 #[test]
-fn what_is_no_plan_has_no_odds() {
+fn invalid_plan_has_no_probability() {
     let nothing = Scene::new(LAMP, EVENING, LIKELY).with_plan("0: (screw) [4]");
     assert!(matches!(
-        nothing.ask(OddsSettings::default()).finding,
+        nothing.answer(OddsSettings::default()).finding,
         OddsFinding::Invalid { .. }
     ));
     let dark = EVENING.replace("(:init (whole))", "(:init)");
-    let unsolvable = Scene::new(LAMP, &dark, LIKELY).ask(OddsSettings::default());
+    let unsolvable = Scene::new(LAMP, &dark, LIKELY).answer(OddsSettings::default());
     assert!(
         matches!(unsolvable.finding, OddsFinding::NoPlan),
         "{unsolvable:?}"
     );
     let never = LIKELY.replace("start = 0.5", "start = 0.0");
-    let never = Scene::new(LAMP, EVENING, &never).ask(OddsSettings::default());
+    let never = Scene::new(LAMP, EVENING, &never).answer(OddsSettings::default());
     assert!(matches!(never.finding, OddsFinding::NoOrder), "{never:?}");
 }
 
@@ -320,7 +320,7 @@ fn bound_of_a_condition_on_a_duration_delays_the_end() {
 }
 
 #[test]
-fn starts_that_need_each_other_at_one_moment_succeed_together() {
+fn mutually_dependent_starts_succeed_together() {
     let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (x) (y) (g))
       (:durative-action a :parameters () :duration (= ?duration 2) :condition (over all (y))
         :effect (and (at start (x)) (at end (not (x)))))
@@ -332,7 +332,7 @@ fn starts_that_need_each_other_at_one_moment_succeed_together() {
     let without = Scene::new(domain, problem, likely);
     let with = Scene::new(domain, problem, likely).with_plan("0: (a) [2]\n0: (b) [2]");
     for scene in [without, with] {
-        let answer = scene.ask(OddsSettings::default());
+        let answer = scene.answer(OddsSettings::default());
         let OddsFinding::Odds(odds) = &answer.finding else {
             panic!("{answer:?}");
         };

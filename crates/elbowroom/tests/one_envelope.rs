@@ -19,15 +19,15 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use elbowroom::answers::envelope::Search;
-use elbowroom::answers::{EnvelopeRequest, Unwatched, envelope};
+use elbowroom::answers::{EnvelopeRequest, NoObserver, envelope};
 use elbowroom::envelope::{Guarantee, Objective};
 use elbowroom::execute::Execution;
 use elbowroom::execution::run::{PlanningTime, RunSettings, TimeoutRule};
 use elbowroom::execution::{Entry, NoPlanner, Recorder};
-use elbowroom::flow;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl;
+use elbowroom::pipeline;
 use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 use sources::Origin;
@@ -38,7 +38,7 @@ struct First(Arc<Mutex<Option<DecoupledEnvelope>>>);
 
 impl Recorder for First {
     fn record(&mut self, entry: &Entry<'_>) {
-        if let Entry::Mission(mission) = entry {
+        if let Entry::PlanAdopted(mission) = entry {
             let mut first = self.0.lock().expect("nobody has panicked");
             if first.is_none() {
                 first.clone_from(&mission.envelope);
@@ -51,9 +51,9 @@ impl Recorder for First {
 fn of_run(
     task: &Arc<Task>,
     plan: &TimeTriggeredPlan,
-    settings: &flow::Settings,
+    settings: &pipeline::Settings,
 ) -> Option<DecoupledEnvelope> {
-    let model = WorldModel::as_planned();
+    let model = WorldModel::without_deviations();
     let mut world = SimWorld::new(Arc::clone(task), &model, 0);
     let first = First::default();
     Execution::of(task)
@@ -65,7 +65,7 @@ fn of_run(
             ..RunSettings::default()
         })
         .with_envelopes(settings.clone())
-        .planned_by(NoPlanner)
+        .with_planner(NoPlanner)
         .recorded_by(first.clone())
         .run_in(&mut world);
     first.0.lock().expect("nobody has panicked").take()
@@ -75,10 +75,10 @@ fn of_run(
 fn reported(
     task: &Arc<Task>,
     plan: &TimeTriggeredPlan,
-    settings: &flow::Settings,
+    settings: &pipeline::Settings,
 ) -> Option<DecoupledEnvelope> {
     let request = EnvelopeRequest::new(task, plan.clone()).with_settings(settings);
-    let outcome = envelope::envelope(&request, &mut Unwatched).ok()?;
+    let outcome = envelope::envelope(&request, &mut NoObserver).ok()?;
     outcome.envelope
 }
 
@@ -87,7 +87,7 @@ fn assert_one(
     label: &str,
     task: &Arc<Task>,
     plan: &TimeTriggeredPlan,
-    settings: &flow::Settings,
+    settings: &pipeline::Settings,
 ) -> bool {
     let reported = reported(task, plan, settings);
     let of_run = of_run(task, plan, settings);
@@ -118,9 +118,9 @@ fn folders(within: &Path) -> Vec<PathBuf> {
     folders
 }
 
-fn settings() -> Vec<(&'static str, flow::Settings)> {
-    let usual = flow::Settings::default();
-    let with = |guarantee, search| flow::Settings {
+fn settings() -> Vec<(&'static str, pipeline::Settings)> {
+    let usual = pipeline::Settings::default();
+    let with = |guarantee, search| pipeline::Settings {
         guarantee,
         search,
         ..usual.clone()
@@ -136,21 +136,21 @@ fn settings() -> Vec<(&'static str, flow::Settings)> {
         ),
         (
             "without time-outs",
-            flow::Settings {
+            pipeline::Settings {
                 timeout: TimeoutRule::Off,
                 ..usual.clone()
             },
         ),
         (
             "within a time-out that is too short",
-            flow::Settings {
+            pipeline::Settings {
                 timeout: "0.5".parse().expect("a time-out"),
                 ..usual.clone()
             },
         ),
         (
             "after 7 checks",
-            flow::Settings {
+            pipeline::Settings {
                 search: Search {
                     most_checks: Some(7),
                     ..usual.search.clone()
@@ -175,7 +175,7 @@ fn run_of_each_case_starts_under_its_reported_envelope() {
             for (name, settings) in settings() {
                 let label = format!("{}, {name}, {}", folder.display(), task.epsilon());
                 // Runs do not support processes and events.
-                if task.left_to_the_judge().is_none() {
+                if task.unsupported_by_analysis().is_none() {
                     count += usize::from(assert_one(&label, &task, &plan, &settings));
                 }
             }
@@ -191,7 +191,7 @@ fn run_of_a_random_plan_starts_under_its_reported_envelope() {
     for seed in 0..400 {
         let problem = solvable::problem(seed).expect("a problem");
         let task = Arc::new(problem.task());
-        if task.only_judged().is_some() || task.left_to_the_judge().is_some() {
+        if task.validator_only_feature().is_some() || task.unsupported_by_analysis().is_some() {
             continue;
         }
         let source = pddl::Source::new("plan", problem.plan.as_str());
@@ -244,13 +244,13 @@ fn run_of_each_benchmark_plan_starts_under_its_reported_envelope() {
         let Some(task) = read(&domain, &problem, None) else {
             continue;
         };
-        if task.left_to_the_judge().is_some() {
+        if task.unsupported_by_analysis().is_some() {
             continue;
         }
         let Some(plan) = shared::plan(&task, &file).filter(|plan| plan.steps.len() <= 25) else {
             continue;
         };
-        let usual = flow::Settings::default();
+        let usual = pipeline::Settings::default();
         count += usize::from(assert_one(&label, &task, &plan, &usual));
     }
     println!("{count} envelopes");

@@ -158,22 +158,22 @@ fn assert_kept_inside(subjects: &[Subject], runs: u64) {
 }
 
 #[test]
-fn our_own_plans_work_where_nothing_deviates_whatever_the_order_of_lines() {
+fn own_plans_succeed_without_deviations_for_any_line_order() {
     assert_kept_as_planned(&own_subjects());
 }
 
 #[test]
-fn our_own_plans_work_wherever_durations_are_in_their_intervals() {
+fn own_plans_succeed_inside_their_envelopes() {
     assert_kept_inside(&own_subjects(), 200);
 }
 
 #[test]
-fn a_slice_of_the_benchmarks_works_where_nothing_deviates() {
+fn benchmark_sample_succeeds_without_deviations() {
     assert_kept_as_planned(&slice());
 }
 
 #[test]
-fn a_slice_of_the_benchmarks_works_wherever_durations_are_in_their_intervals() {
+fn benchmark_sample_succeeds_inside_envelopes() {
     assert_kept_inside(&slice(), 40);
 }
 
@@ -188,7 +188,7 @@ fn own_plan(name: &str) -> Subject {
 /// if the start of the shot had been observed, if the brooding had not ended, if anything else had
 /// failed, or if an action had been started that must wait for the shot.
 #[test]
-fn a_late_start_excuses_only_what_it_is_too_late_for() {
+fn late_start_excuses_only_its_consequences() {
     let name = "an end that needs another end, which must not have come at the start";
     let subject = own_plan(name);
     let ready = Ready::new(&subject, SEARCH).expect("a box");
@@ -221,7 +221,7 @@ fn a_late_start_excuses_only_what_it_is_too_late_for() {
 }
 
 #[test]
-fn the_spoiler_beats_whoever_relies_on_a_box_that_is_weak_only() {
+fn adversary_defeats_executors_with_weak_boxes() {
     use elbowroom::envelope::Guarantee;
     use elbowroom::num::Rational;
     use elbowroom::plan::{DecoupledEnvelope, ParameterId};

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use elbowroom::AnyPlan;
 use elbowroom::answers::region::{RegionSettings, region};
-use elbowroom::answers::{EnvelopeRequest, Unwatched};
+use elbowroom::answers::{EnvelopeRequest, NoObserver};
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan};
 use rand::seq::IndexedRandom;
@@ -132,7 +132,7 @@ fn case(data: &Path, domain: &str, problem: &str, plan: &str, declarations: &str
 }
 
 #[test]
-fn the_energy_needed_may_rise_to_what_the_authors_found() {
+fn energy_limit_matches_published_value() {
     let Some(data) = shared::data() else { return };
     for (problem, limit) in [("01", 530), ("02", 530), ("03", 510), ("04", 505)] {
         let folder = rover(&data).join("results_aaai19/synthesize_pramDomain_stn_solar");
@@ -156,7 +156,7 @@ fn the_energy_needed_may_rise_to_what_the_authors_found() {
 }
 
 #[test]
-fn every_published_region_is_ours_point_by_point() {
+fn published_regions_are_reproduced() {
     let Some(data) = shared::data() else { return };
     let results = rover(&data).join("results_aaai19");
     let (mut regions, mut inside, mut outside) = (0, 0, 0);
@@ -206,7 +206,7 @@ fn compared(case: &Case, formula: &Formula<'_>) -> [usize; 2] {
     let points = points.map_or(200, |count| count.parse().expect("a number"));
     let plan: AnyPlan = ParametrizedPlan::clone(&case.plan).into();
     let request = EnvelopeRequest::new(&case.task, plan);
-    let outcome = region(&request, &RegionSettings::default(), &mut Unwatched);
+    let outcome = region(&request, &RegionSettings::default(), &mut NoObserver);
     let outcome = outcome.expect("within exact reasoning");
     let own = outcome.plan.expect("a plan");
     let whole = outcome.region.expect("a region");

@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use elbowroom::flow::{FlowError, free, open};
+use elbowroom::pipeline::{PipelineError, free, open};
 use elbowroom::{Explainer, plan::parametrize::VarySpec};
 use elbowroom_envelope::limits;
 use elbowroom_model::Task;
@@ -38,7 +38,12 @@ const RESOURCE_PLAN: &str = "
     410.006: (deliver_order r0 ow0 o0) [1.000]";
 
 /// Returns the deordered plan with some parameters.
-fn opened(domain: &Path, problem: &Path, plan: &str, specs: &[&str]) -> Result<Case, FlowError> {
+fn opened(
+    domain: &Path,
+    problem: &Path,
+    plan: &str,
+    specs: &[&str],
+) -> Result<Case, PipelineError> {
     let task = shared::task(domain, problem).expect("a readable problem");
     let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a readable plan");
     let specs: Result<Vec<VarySpec>, _> = specs.iter().map(|spec| spec.parse()).collect();
@@ -110,7 +115,7 @@ fn duration_limits(deadline: &Rational) -> [Rational; 4] {
 }
 
 #[test]
-fn durations_relaxed_here_and_durations_relaxed_by_hand_give_the_same_room() {
+fn relaxed_and_hand_written_durations_give_same_slack() {
     let Some(data) = shared::data() else { return };
     let (folder, problem, plan) = duration_files(&data);
     for domain in ["domain_rcll_simple.pddl", "domain_rcll_simple_robust.pddl"] {
@@ -143,7 +148,7 @@ fn problems(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn the_room_follows_the_deadline_and_without_room_the_deadline_is_named() {
+fn slack_follows_deadline_and_missing_slack_names_it() {
     let Some(data) = shared::data() else { return };
     let (folder, _, plan) = duration_files(&data);
     let domain = folder.join("domain_rcll_simple.pddl");
@@ -164,7 +169,7 @@ fn the_room_follows_the_deadline_and_without_room_the_deadline_is_named() {
                 }
                 Err(error) => {
                     let message = error.to_string();
-                    assert!(matches!(error, FlowError::Invalid(_)), "{message}");
+                    assert!(matches!(error, PipelineError::Invalid(_)), "{message}");
                     assert!(message.contains("(open ow0)"), "{message}");
                     // Nominally the delivery starts at 350.006.
                     assert!(closes < number("350.006"), "{message}");
@@ -191,7 +196,7 @@ fn consumption_limit(rate: &str) -> Rational {
 }
 
 #[test]
-fn consumption_may_deviate_by_what_the_battery_holds_beyond_the_need() {
+fn consumption_may_deviate_by_the_spare_charge() {
     let Some(data) = shared::data() else { return };
     for (rate, limit) in [("0.00", "21"), ("0.37", "28.4"), ("1.00", "41")] {
         let limit = number(limit);
@@ -259,7 +264,7 @@ fn durations_and_consumption_vary_together() {
 }
 
 #[test]
-fn consumption_beyond_the_battery_is_refused_by_the_judge_too() {
+fn validator_rejects_consumption_beyond_the_battery() {
     let Some(data) = shared::data() else { return };
     let (folder, problem) = resource_files(&data, "0.37");
     let case = opened(

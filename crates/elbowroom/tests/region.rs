@@ -12,7 +12,7 @@ use elbowroom::AnyPlan;
 use elbowroom::answers::region::{
     Others, PictureError, Plane, RegionFinding, RegionSettings, picture, region,
 };
-use elbowroom::answers::{EnvelopeRequest, Halt, RegionOutcome, Unwatched, Watcher};
+use elbowroom::answers::{EnvelopeRequest, NoObserver, Observer, RegionOutcome, StopRequest};
 use elbowroom::envelope::{Guarantee, Oracle};
 use elbowroom::model::Task;
 use elbowroom::num::{Interval, Rational};
@@ -29,7 +29,7 @@ fn of(task: &Arc<Task>, plan: AnyPlan) -> RegionOutcome {
     region(
         &EnvelopeRequest::new(task, plan),
         &RegionSettings::default(),
-        &mut Unwatched,
+        &mut NoObserver,
     )
     .expect("within exact reasoning")
 }
@@ -82,7 +82,7 @@ fn compare(name: &str, task: &Arc<Task>, outcome: &RegionOutcome, points: usize)
 }
 
 #[test]
-fn the_region_of_each_case_has_the_points_that_the_box_check_accepts() {
+fn regions_of_cases_match_the_box_check() {
     let mut inside = 0;
     for name in [
         "battery",
@@ -112,7 +112,7 @@ fn the_region_of_each_case_has_the_points_that_the_box_check_accepts() {
 /// The signal must be given before the gate opens, which waits for two crews. It is in time if it
 /// takes less time than one of them.
 #[test]
-fn where_one_of_two_things_has_to_be_so_there_are_two_pieces() {
+fn disjunction_gives_two_pieces() {
     let (task, plan) = gate();
     let outcome = of(&task, plan.into());
     let RegionFinding::Region { pieces, .. } = &outcome.answer.finding else {
@@ -170,7 +170,7 @@ fn gate() -> (Arc<Task>, ParametrizedPlan) {
 }
 
 #[test]
-fn volumes_and_shares_are_what_random_points_say() {
+fn volumes_and_shares_match_random_sampling() {
     let mut exact = 0;
     for name in [
         "battery",
@@ -196,7 +196,7 @@ fn measured(name: &str, task: &Arc<Task>, plan: AnyPlan) -> usize {
         seed: 3,
     };
     let request = EnvelopeRequest::new(task, plan);
-    let outcome = region(&request, &settings, &mut Unwatched).expect("within exact reasoning");
+    let outcome = region(&request, &settings, &mut NoObserver).expect("within exact reasoning");
     let RegionFinding::Region { boxes, measure, .. } = &outcome.answer.finding else {
         panic!("{name}: {:?}", outcome.answer.finding);
     };
@@ -262,30 +262,30 @@ fn measured(name: &str, task: &Arc<Task>, plan: AnyPlan) -> usize {
 }
 
 /// Watcher that ends a search after this number of polls.
-struct Patience(usize);
+struct PollLimit(usize);
 
-impl Watcher for Patience {
-    fn flow(&mut self) -> ControlFlow<Halt> {
+impl Observer for PollLimit {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         match self.0.checked_sub(1) {
             Some(left) => {
                 self.0 = left;
                 ControlFlow::Continue(())
             }
-            None => ControlFlow::Break(Halt::TimeLimit),
+            None => ControlFlow::Break(StopRequest::TimeLimit),
         }
     }
 }
 
 #[test]
-fn what_was_found_before_the_end_is_a_part_of_the_region() {
+fn interrupted_computation_returns_part_of_the_region() {
     let (task, plan) = gate();
     let request = EnvelopeRequest::new(&task, plan);
     let settings = RegionSettings::default();
-    let whole = region(&request, &settings, &mut Unwatched).expect("within exact reasoning");
+    let whole = region(&request, &settings, &mut NoObserver).expect("within exact reasoning");
     let whole = whole.region.expect("a region");
     let (mut nothing, mut parts) = (0, 0);
     for patience in 0.. {
-        let outcome = region(&request, &settings, &mut Patience(patience));
+        let outcome = region(&request, &settings, &mut PollLimit(patience));
         let outcome = outcome.expect("within exact reasoning");
         match &outcome.answer.finding {
             RegionFinding::None { .. } => nothing += 1,
@@ -309,14 +309,14 @@ fn what_was_found_before_the_end_is_a_part_of_the_region() {
 }
 
 #[test]
-fn a_picture_has_the_region_the_boxes_and_the_nominal_point() {
+fn picture_contains_region_boxes_and_nominal_point() {
     let (task, plan) = case("match");
     let settings = RegionSettings {
         with_boxes: true,
         ..RegionSettings::default()
     };
     let request = EnvelopeRequest::new(&task, plan);
-    let outcome = region(&request, &settings, &mut Unwatched).expect("within exact reasoning");
+    let outcome = region(&request, &settings, &mut NoObserver).expect("within exact reasoning");
     let mut flow = || ControlFlow::Continue(());
     for others in [Others::Nominal, Others::Any] {
         let plane = Plane {
@@ -352,7 +352,7 @@ fn a_picture_has_the_region_the_boxes_and_the_nominal_point() {
     clippy::disallowed_methods,
     reason = "how long a region takes is worth seeing"
 )]
-fn regions_of_published_plans_have_the_points_that_the_box_check_accepts() {
+fn regions_of_published_plans_match_the_box_check() {
     let Some(data) = shared::data() else { return };
     let points = std::env::var("ELBOWROOM_POINTS");
     let points = points.map_or(50, |count| count.parse().expect("a number"));

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::answers::repair::{RepairFinding, RepairOutcome, RepairRequest, repair};
-use elbowroom::answers::{EnvelopeRequest, Unwatched, envelope};
+use elbowroom::answers::{EnvelopeRequest, NoObserver, envelope};
 use elbowroom::envelope::Guarantee;
 use elbowroom::model::{Task, validate};
 use elbowroom::num::Rational;
@@ -55,8 +55,8 @@ fn any_plan(task: &Task, text: &str) -> Option<AnyPlan> {
 }
 
 /// Returns `deadline …: 120 instead of 100` for each change, or why there is no repair.
-fn said(request: &RepairRequest) -> String {
-    let outcome = repair(request, &mut Unwatched).expect("within reach");
+fn repair_text(request: &RepairRequest) -> String {
+    let outcome = repair(request, &mut NoObserver).expect("within reach");
     verified(&outcome);
     match outcome.answer.finding {
         RepairFinding::Repaired {
@@ -94,17 +94,17 @@ fn closing_at(time: &'static str) -> impl Fn(String) -> String {
 }
 
 #[test]
-fn a_deadline_that_is_too_early_moves_as_far_as_it_must() {
+fn early_deadline_moves_by_the_least_amount() {
     let request = case("delivery", &closing_at("25"), "");
     // 10 + 2 + 15 + 3 and three separations; the counter closes ε after the end.
     assert_eq!(
-        said(&request),
+        repair_text(&request),
         "deadline of (counter-open office): 30.004 instead of 25"
     );
 }
 
 #[test]
-fn where_the_deadline_stays_something_gets_shorter() {
+fn fixed_deadline_shortens_a_duration() {
     let mut request = case("delivery", &closing_at("25"), "");
     request.keep = vec![
         "deadline (counter-open office)"
@@ -114,7 +114,7 @@ fn where_the_deadline_stays_something_gets_shorter() {
     request.change = ["duration drive", "duration pick weight 1/2 in [1, 2]"]
         .map(|spec| spec.parse().expect("a quantity"))
         .into();
-    let outcome = repair(&request, &mut Unwatched).expect("within reach");
+    let outcome = repair(&request, &mut NoObserver).expect("within reach");
     verified(&outcome);
     let RepairFinding::Repaired { cost, changes, .. } = outcome.answer.finding else {
         panic!("{:?}", outcome.answer.finding);
@@ -128,32 +128,32 @@ fn where_the_deadline_stays_something_gets_shorter() {
 }
 
 #[test]
-fn a_plan_that_is_only_late_in_its_own_times_needs_no_change() {
+fn plan_with_wrong_times_needs_no_change() {
     let late = "0: (drive rover depot shelf) [10] 0: (unlock office) [6]
         10.001: (pick rover parcel shelf) [2] 52.002: (drive rover shelf office) [15]
         67.003: (drop rover parcel office) [3]";
     let request = case("delivery", &|problem| problem, &late.replace("] ", "]\n"));
-    assert_eq!(said(&request), "");
+    assert_eq!(repair_text(&request), "");
 }
 
 #[test]
-fn a_fact_that_nothing_makes_true_is_named() {
+fn unachievable_fact_is_named() {
     let request = case(
         "delivery",
         &|problem| problem,
         "0: (drive rover depot shelf) [10]",
     );
     assert_eq!(
-        said(&request),
+        repair_text(&request),
         "the goal (lies parcel office) must hold at the end, which nothing in the plan makes true"
     );
 }
 
 #[test]
-fn what_may_not_change_is_kept_even_if_that_leaves_no_repair() {
+fn kept_quantities_do_not_change_even_without_repair() {
     let mut request = case("delivery", &closing_at("25"), "");
     request.change = vec!["duration unlock".parse().expect("a quantity")];
-    let outcome = repair(&request, &mut Unwatched).expect("within reach");
+    let outcome = repair(&request, &mut NoObserver).expect("within reach");
     assert!(matches!(
         outcome.answer.finding,
         RepairFinding::Impossible { .. }
@@ -247,7 +247,7 @@ fn works(request: &RepairRequest) -> Option<bool> {
     let mut asked = EnvelopeRequest::new(&request.task, request.plan.clone());
     asked.guarantee = Guarantee::Weak;
     asked.contains = Some(String::new());
-    let outcome = envelope::envelope(&asked, &mut Unwatched).ok()?;
+    let outcome = envelope::envelope(&asked, &mut NoObserver).ok()?;
     Some(matches!(
         outcome.answer.finding,
         envelope::EnvelopeFinding::Inside { .. }
@@ -269,7 +269,7 @@ fn deliveries_with_deadlines_at_half_their_times_are_repaired() {
         let plan = any_plan(&task, &text).expect("a plan");
         let request = RepairRequest::new(&task, plan);
         let start = Instant::now();
-        let outcome = repair(&request, &mut Unwatched).expect("within reach");
+        let outcome = repair(&request, &mut NoObserver).expect("within reach");
         let seconds = start.elapsed().as_secs_f64();
         verified(&outcome);
         match outcome.answer.finding {
@@ -301,7 +301,7 @@ fn deliveries_with_deadlines_at_half_their_times_are_repaired() {
 }
 
 #[test]
-fn every_plan_of_the_benchmarks_that_does_not_work_is_repaired_or_says_why_not() {
+fn invalid_benchmark_plans_are_repaired_or_explained() {
     let Some(data) = shared::data() else { return };
     let (mut tried, mut repaired, mut unguaranteed, mut beyond, mut slowest) =
         (0, 0, 0, 0, (0.0, String::new()));
@@ -332,7 +332,7 @@ fn every_plan_of_the_benchmarks_that_does_not_work_is_repaired_or_says_why_not()
         }
         tried += 1;
         let start = Instant::now();
-        let outcome = repair(&request, &mut Unwatched);
+        let outcome = repair(&request, &mut NoObserver);
         let seconds = start.elapsed().as_secs_f64();
         if seconds > slowest.0 {
             slowest = (seconds, name.clone());

@@ -21,7 +21,9 @@ use std::sync::{Arc, Mutex};
 
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::{PlanningTime, RunSettings};
-use elbowroom::execution::{About, Cause, Decided, Decision, Entry, Mission, Promise, Recorder};
+use elbowroom::execution::{
+    Cause, Decided, Decision, Entry, GuaranteeLevel, PreparedPlan, Recorder, Subject,
+};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl;
@@ -62,7 +64,7 @@ struct Noted {
 }
 
 impl Noted {
-    fn note_mission(&mut self, mission: &Mission) {
+    fn note_mission(&mut self, mission: &PreparedPlan) {
         if !self.is_lacking_time || self.plan != mission.time_triggered {
             self.abandoned = 0;
         }
@@ -82,14 +84,14 @@ impl Noted {
                 self.is_lacking_time = matches!(
                     reason.cause,
                     Cause::OutsideInterval | Cause::Outlived | Cause::Failed
-                ) || matches!(reason.about, Some(About::TooLittleTime));
+                ) || matches!(reason.about, Some(Subject::InsufficientTime));
                 self.abandoned += usize::from(self.is_lacking_time);
             }
             Decision::Start(_) if self.abandoned == 2 => {
                 self.third_attempts += 1;
                 if reason
-                    .promise
-                    .is_some_and(|promise| promise < Promise::Luck)
+                    .guarantee
+                    .is_some_and(|promise| promise < GuaranteeLevel::Luck)
                 {
                     self.third_with_guarantee.push(now.clone());
                 }
@@ -109,7 +111,7 @@ impl Recorder for Requests {
                     noted.faults.push(format!("requested again at {now}"));
                 }
             }
-            Entry::Mission(mission) => noted.note_mission(mission),
+            Entry::PlanAdopted(mission) => noted.note_mission(mission),
             Entry::Taken { .. } => noted.begins = None,
             Entry::Decided { now, decided } => noted.note_decided(now, decided),
             _ => {}
@@ -149,7 +151,7 @@ fn run(
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             ..RunSettings::default()
         })
-        .planned_by(Embedded {
+        .with_planner(Embedded {
             most_states: 200,
             improve_states: 0,
             ..Embedded::default()
@@ -199,7 +201,7 @@ fn nested(least: [i64; 3]) -> Arc<Task> {
 }
 
 #[test]
-fn plan_that_short_durations_have_broken_twice_is_begun_without_a_guarantee() {
+fn plan_broken_twice_by_short_durations_starts_without_guarantee() {
     let mut count = 0;
     for least in [[3, 4, 2], [3, 5, 2], [2, 3, 1], [4, 5, 2], [5, 6, 4]] {
         let task = nested(least);
@@ -229,7 +231,7 @@ fn plan_of_a_case_is_requested_once_and_not_rejected() {
         let task = shared::task(&folder.join("domain.pddl"), &folder.join("problem.pddl"));
         let task = Arc::new(task.expect("a case"));
         // Runs do not support processes and events.
-        if task.left_to_the_judge().is_some() {
+        if task.unsupported_by_analysis().is_some() {
             continue;
         }
         let plan = folder.join("plan.plan");
@@ -248,7 +250,7 @@ fn plan_of_a_random_problem_is_requested_once_and_not_rejected() {
     for seed in (0..500).chain([1590]) {
         let problem = solvable::problem(seed).expect("a problem");
         let task = Arc::new(problem.task());
-        if task.only_judged().is_some() || task.left_to_the_judge().is_some() {
+        if task.validator_only_feature().is_some() || task.unsupported_by_analysis().is_some() {
             continue;
         }
         let source = pddl::Source::new("plan", problem.plan.as_str());
@@ -279,7 +281,7 @@ fn plan_of_a_benchmark_is_requested_once_and_not_rejected() {
             continue;
         };
         let task = Arc::new(task);
-        if task.left_to_the_judge().is_some() || task.only_judged().is_some() {
+        if task.unsupported_by_analysis().is_some() || task.validator_only_feature().is_some() {
             continue;
         }
         let Some(plan) = shared::plan(&task, file).filter(|plan| plan.steps.len() <= most_steps)

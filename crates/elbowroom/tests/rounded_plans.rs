@@ -130,7 +130,7 @@ fn accepted_plan_has_durations_of_domain_and_differs_from_text_by_rounding_only(
 }
 
 #[test]
-fn tolerance_takes_the_place_of_the_printed_digits() {
+fn tolerance_replaces_the_printed_digits() {
     let task = guard("5", "1");
     let accepted = |text, tolerance| is_valid(&task, &meant(&task, text, Some(tolerance)).0);
     let text = "0: (move) [5.01]\n5.011: (watch) [2]";
@@ -164,7 +164,7 @@ fn numeric_condition_at_its_limit_is_met_within_rounding() {
 }
 
 #[test]
-fn duration_that_depends_on_what_happened_before_is_taken_from_the_state() {
+fn state_dependent_duration_is_read_from_the_state() {
     let domain = "
         (define (domain tank)
           (:requirements :durative-actions :fluents :continuous-effects :duration-inequalities)
@@ -211,7 +211,7 @@ fn plan_is_written_in_decimals() {
 }
 
 #[test]
-fn more_digits_are_written_where_a_condition_needs_them() {
+fn strict_condition_needs_more_digits() {
     let domain = "
         (define (domain heat)
           (:requirements :durative-actions :fluents :continuous-effects :duration-inequalities)

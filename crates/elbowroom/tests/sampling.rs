@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::flow;
+use elbowroom::pipeline;
 use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_model::validate::{self, validate};
 use elbowroom_model::{Task, Verdict};
@@ -47,13 +47,13 @@ fn attack_all(instances: &[Instance], least: usize) {
 }
 
 #[test]
-fn values_and_schedules_in_the_boxes_of_figure_3_pass_the_judge() {
+fn samples_in_boxes_of_figure_3_are_valid() {
     let Some(data) = shared::data() else { return };
     attack_all(&figure_3(&data), 52);
 }
 
 #[test]
-fn values_and_schedules_in_the_boxes_of_figure_4_pass_the_judge() {
+fn samples_in_boxes_of_figure_4_are_valid() {
     let Some(data) = shared::data() else { return };
     attack_all(&figure_4(&data), 25);
 }
@@ -105,7 +105,7 @@ fn refuted(
 /// Tests the cases of the project like the instances of the papers. To show that the test can fail,
 /// it also uses a box that is too large: some of its values break the plan.
 #[test]
-fn values_and_schedules_in_the_boxes_of_our_cases_pass_the_judge() {
+fn samples_in_boxes_of_cases_are_valid() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
     let (mut attacked, mut broken) = (0, 0);
     for entry in std::fs::read_dir(cases).expect("the cases") {
@@ -117,8 +117,8 @@ fn values_and_schedules_in_the_boxes_of_our_cases_pass_the_judge() {
         let task = Arc::new(task.expect("a readable problem"));
         let plan = shared::source(&folder.join("plan.plan"));
         let (plan, _) = read_plan(&plan, &task).expect("a readable plan");
-        let freed = flow::free(&task, &plan).expect("a valid plan");
-        let plan = Arc::new(flow::open(&task, freed, &[]).expect("all durations"));
+        let freed = pipeline::free(&task, &plan).expect("a valid plan");
+        let plan = Arc::new(pipeline::open(&task, freed, &[]).expect("all durations"));
         let envelope = envelope(&task, &plan).expect("the plan works as it is");
         if let Some((valuation, verdict)) = refuted(&task, &plan, &envelope) {
             panic!("{}: {valuation:?} {verdict:?}", folder.display());

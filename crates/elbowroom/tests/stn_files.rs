@@ -12,7 +12,7 @@ mod shared;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use elbowroom::flow;
+use elbowroom::pipeline;
 use elbowroom_pddl::read_plan;
 use elbowroom_plan::format;
 
@@ -112,7 +112,7 @@ fn example_files(example: &str) -> (String, String) {
 }
 
 #[test]
-fn every_stn_plan_file_of_the_benchmarks_is_read_and_written() {
+fn benchmark_stn_files_round_trip() {
     let Some(data) = shared::data() else {
         return;
     };
@@ -156,7 +156,7 @@ fn every_stn_plan_file_of_the_benchmarks_is_read_and_written() {
 /// The networks and parameters of the project's cases are the same after writing and reading, like
 /// those of the benchmarks.
 #[test]
-fn the_networks_of_our_own_plans_are_the_same_after_writing_and_reading() {
+fn networks_of_own_plans_round_trip() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
     let mut count = 0;
     for entry in fs::read_dir(cases).unwrap() {
@@ -166,7 +166,7 @@ fn the_networks_of_our_own_plans_are_the_same_after_writing_and_reading() {
         }
         let task = shared::task(&folder.join("domain.pddl"), &folder.join("problem.pddl")).unwrap();
         let (plan, _) = read_plan(&shared::source(&folder.join("plan.plan")), &task).unwrap();
-        let plan = flow::open(&task, flow::free(&task, &plan).unwrap(), &[]).unwrap();
+        let plan = pipeline::open(&task, pipeline::free(&task, &plan).unwrap(), &[]).unwrap();
         let text = format::write(&task, &plan).unwrap();
         let again = format::read(text.as_bytes(), &task).unwrap();
         assert_eq!(again.parameters.len(), plan.parameters.len());

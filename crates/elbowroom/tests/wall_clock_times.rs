@@ -63,7 +63,7 @@ fn assert_solved(task: &Task, situation: &Situation) {
 }
 
 #[test]
-fn an_action_that_began_between_two_ticks_is_planned_on_with() {
+fn action_started_between_ticks_is_supported_in_replanning() {
     let task = delivery();
     let facts = ["(lies parcel shelf)", "(counter-open office)"];
     let drive: (&[&str], _, _, _) = (
@@ -84,7 +84,7 @@ fn an_action_that_began_between_two_ticks_is_planned_on_with() {
 }
 
 #[test]
-fn an_action_that_takes_a_time_between_two_ticks_is_planned_on_with() {
+fn action_duration_between_ticks_is_supported_in_replanning() {
     let task = delivery();
     let facts = [
         "(carries rover parcel)",

@@ -14,21 +14,21 @@
 //! - [`Objective::Probability`]: the same with the logarithm of a probability, and with cases for
 //!   values that have a probability of their own ([`probability`]).
 
-mod approach;
 mod barrier;
 mod branch;
-mod fill;
-mod goal;
+mod concave_maximum;
+mod leximin;
+mod log_probability;
 mod master;
+mod objective;
 mod probability;
-mod soft;
 mod volume;
 
 use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_num::chance::Chance;
+use elbowroom_num::log_concave::LogConcaveDistribution;
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
@@ -40,12 +40,12 @@ use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 use crate::row::Row;
 
-use goal::Goal;
+use objective::ObjectiveFunction;
 use probability::Probability;
 use volume::Volume;
 
-pub use elbowroom_num::chance::Touch;
-pub use volume::foot as volume_foot;
+pub use elbowroom_num::log_concave::TangentPoint;
+pub use volume::width_offset as volume_foot;
 
 /// The objective of a largest box.
 #[derive(
@@ -72,7 +72,7 @@ pub enum Objective {
 }
 
 /// Value of a box with probability 0, in place of the logarithm.
-pub const NEVER: i64 = -1_000_000;
+pub const LOG_OF_ZERO: i64 = -1_000_000;
 
 impl Objective {
     /// Returns its name in documents and on the command line.
@@ -100,10 +100,10 @@ pub struct BestSettings {
     /// `true` if both ends of an interval are equally far from the nominal value.
     pub symmetric: bool,
     /// Greatest deviation that counts, as a multiple of the nominal value.
-    pub most: Rational,
+    pub max_deviation: Rational,
     /// For [`Objective::Probability`]: the distribution of each parameter, in their order. A
     /// parameter without a distribution, or missing in the list, always has its nominal value.
-    pub chances: Vec<Option<Chance>>,
+    pub distributions: Vec<Option<LogConcaveDistribution>>,
 }
 
 impl Default for BestSettings {
@@ -112,8 +112,8 @@ impl Default for BestSettings {
         Self {
             objective: Objective::default(),
             symmetric: false,
-            most: Rational::from(9),
-            chances: Vec::new(),
+            max_deviation: Rational::from(9),
+            distributions: Vec::new(),
         }
     }
 }
@@ -152,20 +152,20 @@ pub struct BestProof {
     /// Cuts: inequalities that all boxes inside the envelope satisfy.
     pub cuts: Vec<Cut>,
     /// Derivation of the best value from the cuts.
-    pub reasons: Reasons,
+    pub reasons: OptimalityProof,
     /// Variables with their values in the best box; empty if there is no box.
-    pub variables: Vec<Moved>,
+    pub variables: Vec<BoxVariable>,
 }
 
 /// Variable that moves one end, or both ends of an interval if boxes are symmetric.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Moved {
+pub struct BoxVariable {
     /// The ends.
     pub ends: Vec<BoxEnd>,
     /// Size that its slack is relative to.
     pub scale: Rational,
     /// Greatest distance from the nominal value to which it can move the ends.
-    pub most: Rational,
+    pub max_distance: Rational,
     /// Distance from the nominal value in the best box. An end at the limit that nothing stops is
     /// infinite in the returned box.
     pub value: Rational,
@@ -173,14 +173,14 @@ pub struct Moved {
 
 /// Derivation of the best value from the cuts.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Reasons {
+pub enum OptimalityProof {
     /// The variables in the order in which they were stopped, each with the cut that stopped it.
-    Levels(Vec<Stopped>),
+    Levels(Vec<BlockedVariable>),
     /// A tree of cases, the first its root.
-    Tree(Vec<Case>),
+    Tree(Vec<ProofCase>),
 }
 
-impl Default for Reasons {
+impl Default for OptimalityProof {
     fn default() -> Self {
         Self::Levels(Vec::new())
     }
@@ -188,7 +188,7 @@ impl Default for Reasons {
 
 /// Variable that can only gain slack if another one with no more slack loses some.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Stopped {
+pub struct BlockedVariable {
     /// The ends that the variable moves.
     pub ends: Vec<BoxEnd>,
     /// Deviation relative to the nominal value.
@@ -199,9 +199,9 @@ pub struct Stopped {
 
 /// One case of a tree: a bound on the objective, or a distinction of cases.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Case {
+pub enum ProofCase {
     /// One row of the cut at this position holds: one case for each row.
-    Either {
+    AnyRow {
         /// The cut.
         cut: usize,
         /// The cases, by position in the tree.
@@ -211,12 +211,12 @@ pub enum Case {
     /// `is_impossible`, the bounds contradict each other.
     Bounded {
         /// The bounds.
-        multipliers: Vec<(Source, Rational)>,
+        multipliers: Vec<(BoundSource, Rational)>,
         /// For an objective that is not linear, the slope of the tangent of each parameter; for a
         /// probability, those of its lower end and of its upper one.
         slopes: Vec<Rational>,
         /// For a probability, the point of contact of each parameter's tangent.
-        touches: Vec<Touch>,
+        touches: Vec<TangentPoint>,
         /// `true` if there is no box in this case.
         is_impossible: bool,
     },
@@ -233,7 +233,7 @@ pub enum Case {
 
 /// The source of a bound on a variable of the master problem, or on a sum of variables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Source {
+pub enum BoundSource {
     /// A row of a cut: position of the cut, position of the row.
     Row(usize, usize),
     /// The upper bound of a variable.
@@ -259,7 +259,7 @@ pub(crate) struct Variables {
     /// Size of the nominal value that its slack is relative to.
     pub(crate) scales: Vec<Rational>,
     /// Greatest distance to which it can move the ends.
-    pub(crate) most: Vec<Rational>,
+    pub(crate) max_distances: Vec<Rational>,
 }
 
 impl Variables {
@@ -267,7 +267,7 @@ impl Variables {
         let mut variables = Self {
             ends: Vec::new(),
             scales: Vec::new(),
-            most: Vec::new(),
+            max_distances: Vec::new(),
         };
         let scales = scales(plan);
         for (index, parameter) in plan.parameters.iter().enumerate() {
@@ -278,7 +278,7 @@ impl Variables {
                 side,
             });
             let most = ends.map(|end| {
-                let counted = &scales[index] * &settings.most;
+                let counted = &scales[index] * &settings.max_deviation;
                 let natural = end.side.reach(&parameter.range);
                 let base = end.side.reach(&point).unwrap_or_default();
                 natural.map_or(counted.clone(), |most| counted.min(most - base))
@@ -292,21 +292,25 @@ impl Variables {
             for (ends, most) in groups {
                 variables.ends.push(ends);
                 variables.scales.push(scales[index].clone());
-                variables.most.push(most);
+                variables.max_distances.push(most);
             }
         }
         variables
     }
 
     /// Returns the variables with their values in a box.
-    fn moved(&self, nominal: &DecoupledEnvelope, envelope: &DecoupledEnvelope) -> Vec<Moved> {
-        let all = self.ends.iter().zip(&self.scales).zip(&self.most);
+    fn values_of(
+        &self,
+        nominal: &DecoupledEnvelope,
+        envelope: &DecoupledEnvelope,
+    ) -> Vec<BoxVariable> {
+        let all = self.ends.iter().zip(&self.scales).zip(&self.max_distances);
         all.map(|((ends, scale), most)| {
             let far = ends[0].reach(envelope).zip(ends[0].reach(nominal));
-            Moved {
+            BoxVariable {
                 ends: ends.clone(),
                 scale: scale.clone(),
-                most: most.clone(),
+                max_distance: most.clone(),
                 value: far.map_or_else(|| most.clone(), |(far, near)| far - near),
             }
         })
@@ -319,9 +323,9 @@ impl Variables {
         nominal: &DecoupledEnvelope,
         envelope: &DecoupledEnvelope,
     ) -> Option<Rational> {
-        let moved = self.moved(nominal, envelope);
+        let moved = self.values_of(nominal, envelope);
         let slacks = moved.iter().filter_map(|own| {
-            let far = own.value.clone().min(own.most.clone());
+            let far = own.value.clone().min(own.max_distance.clone());
             far.checked_div(&own.scale)
         });
         slacks.min()
@@ -397,18 +401,18 @@ pub fn best(
     }
     let variables = Variables::new(&plan, settings);
     let mut run = match settings.objective {
-        Objective::LeastSlack => fill::fill(oracle, &plan, &variables, on_step)?,
+        Objective::LeastSlack => leximin::maximize_leximin(oracle, &plan, &variables, on_step)?,
         Objective::Widths => {
-            let goal = Goal::widths(&plan, &variables);
+            let goal = ObjectiveFunction::widths(&plan, &variables);
             branch::branch(oracle, &plan, &variables, goal, start, on_step)?
         }
         Objective::Volume => {
-            let goal = Goal::Volume(Volume::new(&plan, &variables));
+            let goal = ObjectiveFunction::Volume(Volume::new(&plan, &variables));
             branch::branch(oracle, &plan, &variables, goal, start, on_step)?
         }
         Objective::Probability => {
             let probability = Probability::new(&plan, &variables, settings);
-            let goal = Goal::Probability(probability);
+            let goal = ObjectiveFunction::Probability(probability);
             branch::branch(oracle, &plan, &variables, goal, start, on_step)?
         }
     };
@@ -424,15 +428,15 @@ pub fn best(
         }
     }
     if let Ok(envelope) = &mut run.envelope {
-        run.proof.variables = variables.moved(&nominal, envelope);
-        *envelope = let_go(oracle, &plan, envelope, &variables)?;
+        run.proof.variables = variables.values_of(&nominal, envelope);
+        *envelope = extend_to_infinity(oracle, &plan, envelope, &variables)?;
     }
     run.checks = oracle.checks() - already;
     Ok(run)
 }
 
 /// Makes the ends at the greatest deviation infinite, if nothing stops them.
-fn let_go(
+fn extend_to_infinity(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,
@@ -440,7 +444,7 @@ fn let_go(
 ) -> Result<DecoupledEnvelope, Refusal> {
     let point = DecoupledEnvelope::point(&plan.nominal());
     let mut is_started = false;
-    for (ends, most) in variables.ends.iter().zip(&variables.most) {
+    for (ends, most) in variables.ends.iter().zip(&variables.max_distances) {
         let is_far = ends.iter().all(|end| {
             let moved = end.reach(envelope).zip(end.reach(&point));
             let range = &plan.parameter(end.parameter).range;

@@ -63,12 +63,12 @@ impl fmt::Display for ControlConflict {
 /// a box that differs from it in one parameter incrementally.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DynamicControl {
-    kept: Option<Kept>,
+    last_network: Option<CheckedNetwork>,
 }
 
 /// The network of a controllable box.
 #[derive(Clone, Debug)]
-struct Kept {
+struct CheckedNetwork {
     envelope: DecoupledEnvelope,
     network: PlanNetwork,
     unit: Unit,
@@ -85,12 +85,12 @@ impl DynamicControl {
         plan: &ParametrizedPlan,
         envelope: &DecoupledEnvelope,
     ) -> Option<ControlConflict> {
-        if let Some(kept) = &mut self.kept {
+        if let Some(kept) = &mut self.last_network {
             match kept.recheck(envelope) {
                 Rechecked::Unknown => {}
                 Rechecked::Controllable => return None,
                 Rechecked::Refused(grounds) => {
-                    return Some(in_the_plan(plan, &kept.network, &grounds));
+                    return Some(translate_conflict(plan, &kept.network, &grounds));
                 }
             }
         }
@@ -98,13 +98,13 @@ impl DynamicControl {
             Ok(network) => network,
             Err(impossible) => return Some(unsatisfiable(impossible)),
         };
-        let Some(whole) = network.network.whole() else {
+        let Some(whole) = network.network.to_integer_network() else {
             let conflict = network.network.conflict()?;
-            return Some(in_the_plan(plan, &network, &grounds_of(&conflict)));
+            return Some(translate_conflict(plan, &network, &grounds_of(&conflict)));
         };
         match Recheck::new(whole.network) {
             Ok(check) => {
-                self.kept = Some(Kept {
+                self.last_network = Some(CheckedNetwork {
                     envelope: envelope.clone(),
                     links: links_of(plan, &network),
                     network,
@@ -113,12 +113,12 @@ impl DynamicControl {
                 });
                 None
             }
-            Err(conflict) => Some(in_the_plan(plan, &network, &grounds_of(&conflict))),
+            Err(conflict) => Some(translate_conflict(plan, &network, &grounds_of(&conflict))),
         }
     }
 }
 
-impl Kept {
+impl CheckedNetwork {
     /// Checks a box that differs from the kept one in the interval of one link only. If it is
     /// controllable, it becomes the kept one.
     fn recheck(&mut self, envelope: &DecoupledEnvelope) -> Rechecked {
@@ -142,9 +142,9 @@ impl Kept {
 
     /// Returns the bounds of a link in whole numbers, if they can be represented.
     fn bounds(&self, interval: &Interval) -> Option<(i64, Option<i64>)> {
-        let lower = self.unit.whole(interval.lower.value()?)?;
+        let lower = self.unit.to_integer(interval.lower.value()?)?;
         let upper = match interval.upper.value() {
-            Some(upper) => Some(self.unit.whole(upper)?),
+            Some(upper) => Some(self.unit.to_integer(upper)?),
             None => None,
         };
         let is_in_order = lower >= 0 && upper.is_none_or(|upper| lower <= upper);
@@ -192,7 +192,7 @@ pub(crate) fn strong_conflict(
         Err(impossible) => return Some(unsatisfiable(impossible)),
     };
     let StrongConflict { grounds, .. } = network.network.strong().err()?;
-    Some(in_the_plan(plan, &network, &grounds))
+    Some(translate_conflict(plan, &network, &grounds))
 }
 
 /// Returns a number that is greater than the sum of the finite bounds on any cycle of the network
@@ -226,7 +226,7 @@ fn grounds_of<W: Weight>(conflict: &Conflict<W>) -> Vec<Ground> {
     conflict.steps.iter().map(|step| step.ground).collect()
 }
 
-fn in_the_plan(
+fn translate_conflict(
     plan: &ParametrizedPlan,
     network: &PlanNetwork,
     grounds: &[Ground],

@@ -27,7 +27,7 @@ pub enum Ground {
     /// constraint with the constraints of the durations that end early or late before it.
     Fixed(Vec<ProofPart>),
     /// A semi-reducible cycle: the proof that no strategy exists in a box that violates all rows.
-    Semireducible(Vec<ProofWay>),
+    Semireducible(Vec<ProofPath>),
     /// A condition that some schedule violates for some values in a box that violates the row.
     Condition(Broken),
     /// A box that violates all rows includes this one, which the oracle refuses.
@@ -36,7 +36,7 @@ pub enum Ground {
 
 /// Sequence of parts: [`elbowroom_stn::uncertain::Way`], in terms of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ProofWay {
+pub struct ProofPath {
     /// The parts; each begins where the previous one ends.
     pub parts: Vec<ProofPart>,
     /// The constraint (by position in the plan) with the duration whose negated lower end is a
@@ -54,7 +54,7 @@ pub enum ProofPart {
     /// The same duration at its upper end, in the backward direction.
     Late(usize),
     /// A way that counts as one bound.
-    Way(ProofWay),
+    Path(ProofPath),
 }
 
 impl Cut {
@@ -66,7 +66,7 @@ impl Cut {
 
 /// `constant + Σ factor · end`, where an end is the number itself: the length of a cycle of bounds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Ends {
+pub(crate) struct EndSum {
     pub(crate) constant: Rational,
     factors: BTreeMap<BoxEnd, Rational>,
 }
@@ -93,7 +93,7 @@ impl Length {
     }
 }
 
-impl From<Length> for Ends {
+impl From<Length> for EndSum {
     fn from(length: Length) -> Self {
         let mut ends = Self::default();
         ends.add_length(&length);
@@ -101,7 +101,7 @@ impl From<Length> for Ends {
     }
 }
 
-impl Ends {
+impl EndSum {
     pub(crate) fn constant(constant: Rational) -> Self {
         Self {
             constant,
@@ -156,7 +156,7 @@ impl Ends {
     }
 
     /// Returns `true` if a parameter occurs with both of its ends.
-    pub(crate) fn tears(&self) -> bool {
+    pub(crate) fn uses_both_ends(&self) -> bool {
         let ends: Vec<&BoxEnd> = self.factors.keys().collect();
         ends.windows(2)
             .any(|pair| pair[0].parameter == pair[1].parameter)

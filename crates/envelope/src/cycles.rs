@@ -28,7 +28,7 @@ pub(crate) enum Role {
 /// so `p >= -k - c` is required. For such `p`, the latter edge is at least as tight as `k`, which
 /// can be left out. The case with `s` and `d` exchanged is analogous. If such bounds were kept, the
 /// parameter would lie on cycles in both directions.
-pub(crate) fn own_limits(
+pub(crate) fn reach_limits(
     edges: &[Edge],
     coupled: &[ParameterId],
 ) -> (BTreeMap<BoxEnd, Rational>, Vec<u32>) {
@@ -162,7 +162,11 @@ mod tests {
     use super::*;
 
     /// Returns `true` if edges other than the parameter's own lead from one class to another.
-    fn leads(edges: &[Edge], (from, to): (ClassId, ClassId), parameter: ParameterId) -> bool {
+    fn is_reachable(
+        edges: &[Edge],
+        (from, to): (ClassId, ClassId),
+        parameter: ParameterId,
+    ) -> bool {
         let (mut seen, mut stack) = (Vec::new(), vec![from]);
         while let Some(class) = stack.pop() {
             if class == to {
@@ -208,7 +212,7 @@ mod tests {
             for parameter in (0..known).map(ParameterId::from) {
                 let on = |side: Side| edges.iter().any(|edge| {
                     edge.end == Some(BoxEnd { parameter, side })
-                        && leads(&edges, (edge.to, edge.from), parameter)
+                        && is_reachable(&edges, (edge.to, edge.from), parameter)
                 });
                 let role = match (on(Side::Upper), on(Side::Lower)) {
                     (false, false) => Role::None,

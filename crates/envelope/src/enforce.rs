@@ -18,7 +18,7 @@ use crate::soundness::earliest_schedule;
 /// # Errors
 /// If the plan has no schedule at its nominal values, or contains something beyond exact linear
 /// reasoning.
-pub fn enforced(
+pub fn with_obligations(
     task: &Task,
     plan: &ParametrizedPlan,
 ) -> Result<(ParametrizedPlan, usize), Refusal> {
@@ -33,8 +33,8 @@ pub fn enforced(
         let Some(network) = &network else {
             return false;
         };
-        let (from, from_offset) = reduction.place(wanted.from);
-        let (to, to_offset) = reduction.place(wanted.to);
+        let (from, from_offset) = reduction.class_of(wanted.from);
+        let (to, to_offset) = reduction.class_of(wanted.to);
         // `from - to <= distance`, so that `to - from >= -distance`.
         let distance = network.distance(to, from);
         distance.is_some_and(|distance| {

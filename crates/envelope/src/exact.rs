@@ -8,7 +8,7 @@
 //! The polyhedra of the union are disjoint.
 
 mod polyhedron;
-mod shadow;
+mod projection;
 mod volume;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,11 +21,11 @@ use crate::linear::Linear;
 use crate::obligations::{Inequality, Obligation};
 use polyhedron::{Halfspace, Polyhedron};
 
-pub use shadow::Flat;
-pub use volume::{Body, Component};
+pub use projection::Polygon;
+pub use volume::{BoundedRegion, Component};
 
 /// The limit on polyhedra of the union.
-const MOST_PIECES: usize = 256;
+const MAX_PIECES: usize = 256;
 
 /// All values for which a plan works: the union of the pieces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -94,7 +94,7 @@ pub enum ExactError {
     },
     /// The caller ended the computation.
     #[error("the region was not done when there was no more time")]
-    Ended,
+    Stopped,
 }
 
 impl RegionRow {
@@ -164,7 +164,7 @@ pub fn exact(
                 rows.push(row.ok_or(ExactError::NotLinear { requirement })?);
             }
             if flow().is_break() {
-                return Err(ExactError::Ended);
+                return Err(ExactError::Stopped);
             }
             if !rows.is_feasible() {
                 continue;
@@ -178,7 +178,7 @@ pub fn exact(
     // Those that cut off a half-space come first, because they do not split a piece.
     bad.sort_by_key(|(count, _)| *count);
     let bad: Vec<Polyhedron> = bad.into_iter().map(|(_, broken)| broken).collect();
-    let (pieces, missing) = without_all(scheduled, &bad, flow);
+    let (pieces, missing) = subtract_all(scheduled, &bad, flow);
     match missing {
         Some(limit) if pieces.is_empty() => Err(limit),
         missing => Ok(Region {
@@ -190,7 +190,7 @@ pub fn exact(
 
 /// Subtracts polyhedra from another one, and returns disjoint parts. Each part is completed before
 /// the next one, so that the completed parts are correct when a limit is reached.
-fn without_all(
+fn subtract_all(
     whole: Polyhedron,
     bad: &[Polyhedron],
     flow: &mut dyn FnMut() -> ControlFlow<()>,
@@ -199,18 +199,18 @@ fn without_all(
     let mut open = vec![(whole, 0)];
     while let Some((piece, next)) = open.pop() {
         if flow().is_break() {
-            return (done, Some(ExactError::Ended));
+            return (done, Some(ExactError::Stopped));
         }
         let Some(broken) = bad.get(next) else {
-            if done.len() == MOST_PIECES {
-                let limit = MOST_PIECES;
+            if done.len() == MAX_PIECES {
+                let limit = MAX_PIECES;
                 return (done, Some(ExactError::TooManyPieces { limit }));
             }
             done.push(piece);
             continue;
         };
         let before = open.len();
-        for mut part in piece.minus(broken) {
+        for mut part in piece.subtract(broken) {
             if let Err(ended) = part.reduce(flow) {
                 return (done, Some(ended));
             }

@@ -8,17 +8,17 @@ use std::sync::Arc;
 use crate::reduction::{Edge, Reduction};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side, Valuation};
-use elbowroom_stn::branching::{Branching, OpenBound, TooManyBranches};
+use elbowroom_stn::corner_search::{Branching, OpenBound, TooManyBranches};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
-use crate::cycles::{Cycles, Role, own_limits};
+use crate::cycles::{Cycles, Role, reach_limits};
 
 /// Limit on corners that are kept from one box to the next. If there are more, [`Branching`]
 /// searches for the relevant ones.
-const MOST_CORNERS: usize = 1 << 8;
+const MAX_CORNERS: usize = 1 << 8;
 
 /// Limit on branches that [`Branching`] examines before the check is undecided.
-pub(crate) const MOST_BRANCHES: usize = 1 << 14;
+pub(crate) const MAX_BRANCHES: usize = 1 << 14;
 
 /// Feasibility check: a plan's network has a schedule for every value in a box (weak
 /// controllability).
@@ -64,14 +64,14 @@ pub(crate) enum Infeasible {
     /// These values.
     At(Valuation),
     /// Some values far out on that side, whatever the other parameters are.
-    FarOut(BoxEnd),
+    BeyondLimit(BoxEnd),
 }
 
 impl Feasibility {
     pub(crate) fn new(plan: &ParametrizedPlan, reduction: &Reduction) -> Self {
         let all_edges = reduction.shared_edges();
         let class_count = reduction.class_count();
-        let (own_limits, left) = own_limits(&all_edges, &reduction.coupled);
+        let (own_limits, left) = reach_limits(&all_edges, &reduction.coupled);
         let edges = left.iter().map(|&index| &all_edges[index as usize]);
         let cycles = Cycles::new(edges.collect(), class_count);
         let roles: Vec<Role> = (0..plan.parameters.len())
@@ -92,7 +92,7 @@ impl Feasibility {
             class_count,
             roles,
             coupled: reduction.coupled.clone(),
-            branches: both > MOST_CORNERS.ilog2() as usize,
+            branches: both > MAX_CORNERS.ilog2() as usize,
             corners: Vec::new(),
         }
     }
@@ -119,8 +119,8 @@ impl Feasibility {
         };
         for end in ends {
             match (end.reach(envelope), self.own_limits.get(&end)) {
-                (None, _) if !self.goes_on_for_ever(end) => {
-                    return Ok(Some(Infeasible::FarOut(end)));
+                (None, _) if !self.is_unlimited(end) => {
+                    return Ok(Some(Infeasible::BeyondLimit(end)));
                 }
                 (Some(reach), Some(limit)) if reach > *limit => {
                     let sides = BTreeMap::from([(end.parameter, end.side)]);
@@ -143,7 +143,7 @@ impl Feasibility {
     /// whatever its other ends. `None` is infinitely far.
     pub(crate) fn is_too_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
         match reach {
-            None => !self.goes_on_for_ever(end),
+            None => !self.is_unlimited(end),
             Some(reach) => self.own_limits.get(&end).is_some_and(|limit| reach > limit),
         }
     }
@@ -153,7 +153,7 @@ impl Feasibility {
         &self,
         envelope: &DecoupledEnvelope,
     ) -> Result<Option<BTreeMap<ParameterId, Side>>, TooManyBranches> {
-        let bounds = self.edges().filter(|edge| self.matters(edge));
+        let bounds = self.edges().filter(|edge| self.is_on_cycle(edge));
         let bounds = bounds.map(|edge| OpenBound {
             from: edge.from,
             to: edge.to,
@@ -164,15 +164,15 @@ impl Feasibility {
             bounds: bounds.collect(),
             node_count: self.class_count,
             is_pair: &|parameter| !self.coupled.contains(&parameter),
-            value: &|parameter, side| any_value(envelope.interval(parameter), side),
-            most_branches: MOST_BRANCHES,
+            value: &|parameter, side| end_or_finite(envelope.interval(parameter), side),
+            most_branches: MAX_BRANCHES,
         };
         network.corner_without_schedule()
     }
 
     /// Returns `true` if an edge lies on a cycle. An edge "at most the parameter" lies on cycles
     /// that small values violate.
-    fn matters(&self, edge: &Edge) -> bool {
+    fn is_on_cycle(&self, edge: &Edge) -> bool {
         edge.end.is_none_or(|end| {
             matches!(
                 (self.roles[end.parameter.index()], end.side),
@@ -186,7 +186,7 @@ impl Feasibility {
     ///
     /// The values that have a schedule form a polyhedron. It is unbounded in a direction exactly if
     /// the network has a schedule when each bound is replaced by the change in that direction.
-    fn goes_on_for_ever(&self, end: BoxEnd) -> bool {
+    fn is_unlimited(&self, end: BoxEnd) -> bool {
         if self.own_limits.contains_key(&end) {
             return false;
         }
@@ -219,18 +219,18 @@ impl Feasibility {
     pub(crate) fn values(&self, envelope: &DecoupledEnvelope, found: Infeasible) -> Valuation {
         match found {
             Infeasible::At(values) => values,
-            Infeasible::FarOut(end) => self.far_out(envelope, end),
+            Infeasible::BeyondLimit(end) => self.far_values(envelope, end),
         }
     }
 
     /// Returns values without a schedule, with the parameter as far out on that side as necessary.
-    fn far_out(&self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Valuation {
+    fn far_values(&self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Valuation {
         let mut values: Valuation = envelope
             .intervals()
             .iter()
-            .map(|interval| any_value(interval, Side::Lower))
+            .map(|interval| end_or_finite(interval, Side::Lower))
             .collect();
-        let base = any_value(envelope.interval(end.parameter), end.side.opposite());
+        let base = end_or_finite(envelope.interval(end.parameter), end.side.opposite());
         let mut step = Rational::ONE;
         loop {
             values[end.parameter] = match end.side {
@@ -318,10 +318,10 @@ impl Feasibility {
         let Some(end) = edge.end else {
             return Some(edge.constant.clone());
         };
-        let (true, Some(&side)) = (self.matters(edge), sides.get(&end.parameter)) else {
+        let (true, Some(&side)) = (self.is_on_cycle(edge), sides.get(&end.parameter)) else {
             return None;
         };
-        let value = any_value(envelope.interval(end.parameter), side);
+        let value = end_or_finite(envelope.interval(end.parameter), side);
         Some(match end.side {
             Side::Upper => &edge.constant + value,
             Side::Lower => &edge.constant - value,
@@ -402,14 +402,14 @@ fn valuation(sides: &BTreeMap<ParameterId, Side>, envelope: &DecoupledEnvelope) 
         .enumerate()
         .map(|(index, interval)| {
             let side = sides.get(&ParameterId::from(index));
-            any_value(interval, side.copied().unwrap_or(Side::Lower))
+            end_or_finite(interval, side.copied().unwrap_or(Side::Lower))
         })
         .collect()
 }
 
 /// Returns that end of the interval or, if it is infinite, some value in it. Whether the plan has
 /// schedules arbitrarily far in that direction is checked separately.
-fn any_value(interval: &Interval, side: Side) -> Rational {
+fn end_or_finite(interval: &Interval, side: Side) -> Rational {
     let (wanted, other) = (side.of(interval), side.opposite().of(interval));
     let value = wanted.value().or(other.value());
     value.cloned().unwrap_or_default()

@@ -25,7 +25,7 @@ pub(crate) struct Frontier {
     growth: Growth,
     parameters: Vec<Progress>,
     /// Number of parameters with a step worth taking; the search continues while there are any.
-    going: usize,
+    active_count: usize,
     /// Position of the round robin.
     next: usize,
 }
@@ -73,7 +73,7 @@ impl Frontier {
             .collect();
         Self {
             growth,
-            going: parameters.iter().filter(|own| own.goes_on()).count(),
+            active_count: parameters.iter().filter(|own| own.is_active()).count(),
             parameters,
             next: 0,
         }
@@ -85,7 +85,7 @@ impl Frontier {
     /// precision, parameters with at least half the precision also take part, as in the authors'
     /// code.
     pub(crate) fn next_end(&mut self) -> Option<(BoxEnd, Rational)> {
-        if self.going == 0 {
+        if self.active_count == 0 {
             return None;
         }
         let count = self.parameters.len();
@@ -140,15 +140,15 @@ impl Frontier {
 
     fn change(&mut self, end: BoxEnd, change: impl FnOnce(&mut Progress, usize)) {
         let progress = &mut self.parameters[end.parameter.index()];
-        self.going -= usize::from(progress.goes_on());
+        self.active_count -= usize::from(progress.is_active());
         change(progress, end.side.index());
-        self.going += usize::from(progress.goes_on());
+        self.active_count += usize::from(progress.is_active());
     }
 }
 
 impl Progress {
     /// Returns `true` if this parameter has a step worth taking.
-    fn goes_on(&self) -> bool {
+    fn is_active(&self) -> bool {
         self.is_done != [true; 2] && self.step >= self.precision
     }
 

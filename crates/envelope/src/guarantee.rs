@@ -5,20 +5,20 @@ use std::sync::{Arc, OnceLock};
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
-use elbowroom_stn::branching::TooManyBranches;
+use elbowroom_stn::corner_search::TooManyBranches;
 
 use serde::{Deserialize, Serialize};
 
 use crate::control::{ControlConflict, DynamicControl, strong_conflict};
-use crate::feasibility::{Feasibility, Infeasible, MOST_BRANCHES};
-use crate::learn::{Learnt, without_fixed_times, without_schedule, without_strategy};
+use crate::cut_generation::{CheckOutcome, fixed_time_cuts, schedule_cut, strategy_cuts};
+use crate::feasibility::{Feasibility, Infeasible, MAX_BRANCHES};
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::reduction::Reduction;
 
 /// Number of parameters above which data about a box is not kept for the next one: the memory would
 /// cost more than the time saved.
-const MANY: usize = 10_000;
+const MAX_CACHED_PARAMETERS: usize = 10_000;
 
 /// Guarantee that holds inside an envelope.
 ///
@@ -164,27 +164,27 @@ impl Controllability {
     ///
     /// # Errors
     /// If there are too many cases to decide.
-    pub(crate) fn learn(
+    pub(crate) fn generate_cuts(
         &mut self,
         plan: &ParametrizedPlan,
         envelope: &DecoupledEnvelope,
         most: usize,
-    ) -> Result<Learnt, Refusal> {
+    ) -> Result<CheckOutcome, Refusal> {
         match self {
             Self::Weak(feasibility) => {
                 let found = feasibility.infeasible(envelope, None).map_err(too_many)?;
-                Ok(found.map_or(Learnt::Nothing, |found| {
+                Ok(found.map_or(CheckOutcome::Accepted, |found| {
                     let values = feasibility.values(envelope, found);
-                    without_schedule(plan, &values, envelope)
+                    schedule_cut(plan, &values, envelope)
                 }))
             }
             Self::Dynamic(_, dynamic) => {
-                if plan.parameters.len() > MANY {
+                if plan.parameters.len() > MAX_CACHED_PARAMETERS {
                     *dynamic = DynamicControl::default();
                 }
-                Ok(without_strategy(plan, envelope, most))
+                Ok(strategy_cuts(plan, envelope, most))
             }
-            Self::Strong(_) => Ok(without_fixed_times(plan, envelope)),
+            Self::Strong(_) => Ok(fixed_time_cuts(plan, envelope)),
         }
     }
 
@@ -213,6 +213,6 @@ impl Controllability {
 fn too_many(TooManyBranches: TooManyBranches) -> Refusal {
     Refusal::TooManyCases {
         place: "parameters on constraints in both directions".to_owned(),
-        limit: MOST_BRANCHES,
+        limit: MAX_BRANCHES,
     }
 }

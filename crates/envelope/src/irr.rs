@@ -1,8 +1,8 @@
 //! Incremental Rectangular Robustification.
 
-mod ahead;
-mod own_bounds;
-mod pieces;
+mod conflict_split;
+mod parameter_bounds;
+mod speculative;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParametrizedPlan};
 use crate::frontier::{Frontier, Growth};
 use crate::objection::Objection;
 use crate::oracle::Oracle;
-use ahead::Ahead;
+use speculative::Speculation;
 
 /// Settings of IRR.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,11 +98,11 @@ pub enum StopReason {
 }
 
 /// The number of undecided boxes after which a search ends, because each of them takes long.
-const MOST_UNDECIDED: usize = 4;
+const MAX_UNDECIDED: usize = 4;
 
 /// Returns the greatest reach of an end that could move out without limit and is not infinite: a
 /// thousand million times the nominal value, or 1.
-pub(crate) fn farthest(parameter: &Parameter) -> Rational {
+pub(crate) fn max_reach(parameter: &Parameter) -> Rational {
     &Rational::from(1_000_000_000) * &parameter.nominal.abs().max(Rational::ONE)
 }
 
@@ -165,8 +165,8 @@ pub fn irr(
         widenings += usize::from(widening.is_some());
         on_step(widening)
     };
-    let asks_little = oracle.asks_little();
-    let mut search = Ahead::new(oracle, settings, frontier, envelope);
+    let asks_little = oracle.is_wide_check_cheap();
+    let mut search = Speculation::new(oracle, settings, frontier, envelope);
     // A box inside the envelope proves that the nominal values in it are inside as well.
     let at_once = asks_little
         .then(|| search.run_at_once(&mut count))
@@ -207,7 +207,7 @@ pub fn limits(
     tell: &mut dyn FnMut(BoxEnd, &Limit),
 ) {
     let plan = Arc::clone(oracle.plan());
-    oracle.stand_at(envelope);
+    oracle.accept_if_inside(envelope);
     for &end in ends {
         if flow().is_break() {
             break;
@@ -235,9 +235,9 @@ fn limit(
     }
     let target = &reach + step;
     let target = border.map_or(target.clone(), |border| border.min(target));
-    match oracle.objection_beside(envelope, end, Some(target)) {
+    match oracle.objection_to_widening(envelope, end, Some(target)) {
         Ok(None) => {
-            let is_far = &reach * &Rational::from(FAR) > farthest(parameter);
+            let is_far = &reach * &Rational::from(FAR_DIVISOR) > max_reach(parameter);
             let is_any = is_far && oracle.accepts_all_finite(envelope, end).unwrap_or(false);
             is_any.then_some(Limit::AnyFinite)
         }
@@ -247,4 +247,4 @@ fn limit(
 }
 
 /// Divisor of the [`farthest`] value: an end beyond the quotient may have no limit.
-const FAR: i64 = 4;
+const FAR_DIVISOR: i64 = 4;

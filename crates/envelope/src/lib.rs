@@ -57,10 +57,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod balance;
 mod best;
 mod control;
 mod cut;
+mod cut_generation;
+mod cut_pool;
 mod cycles;
 mod enforce;
 mod exact;
@@ -68,40 +69,41 @@ mod feasibility;
 mod frontier;
 mod guarantee;
 mod irr;
-mod known;
-mod learn;
+mod line_search;
 pub mod linear;
 mod method;
 mod objection;
 pub mod obligations;
 mod oracle;
-mod proved;
-mod ray;
+mod proof;
 pub mod reduction;
 mod repair;
 mod row;
 mod sharpen;
 pub mod soundness;
+mod uniform_slack;
 
-pub use balance::{Balance, Share, balance};
 pub use best::{
-    BestProof, BestRun, BestSettings, BestStep, Case, Moved, NEVER, Objective, Reasons, Source,
-    Stopped, Touch, best, volume_foot,
+    BestProof, BestRun, BestSettings, BestStep, BlockedVariable, BoundSource, BoxVariable,
+    LOG_OF_ZERO, Objective, OptimalityProof, ProofCase, TangentPoint, best, volume_foot,
 };
 pub use control::{ControlConflict, ControlGround};
-pub use cut::{Cut, Ground, ProofPart, ProofWay};
-pub use enforce::enforced;
-pub use exact::{Body, Component, ExactError, Flat, Piece, Region, RegionRow, RegionSource, exact};
+pub use cut::{Cut, Ground, ProofPart, ProofPath};
+pub use enforce::with_obligations;
+pub use exact::{
+    BoundedRegion, Component, ExactError, Piece, Polygon, Region, RegionRow, RegionSource, exact,
+};
 pub use frontier::Growth;
 pub use guarantee::Guarantee;
 pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};
 pub use method::Method;
 pub use objection::Objection;
 pub use oracle::Oracle;
-pub use proved::{
-    ConditionProof, ControlProof, Impossible, Refutation, ScheduleCase, Strategy, Summand,
-    TimeRule, Unfailing,
+pub use proof::{
+    ConditionProof, ControlProof, ImpossibilityProof, Refutation, RefutedCase, ScheduleCase,
+    Strategy, Summand, TimeRule,
 };
-pub use repair::{Changeable, Hindrance, Repair, RepairLimits, RepairRun, repair};
+pub use repair::{BindingConstraint, Changeable, Repair, RepairLimits, RepairRun, repair};
 pub use row::Row;
 pub use sharpen::sharpen;
+pub use uniform_slack::{DeviationBounds, UniformSlack, max_uniform_slack};

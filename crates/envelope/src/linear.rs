@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cancels_disappears() {
+    fn cancelled_terms_are_removed() {
         let difference = Linear::difference(NodeId(1), NodeId(2));
         assert_eq!(difference.minus(&difference), Linear::default());
         assert_eq!(

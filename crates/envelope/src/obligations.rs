@@ -130,7 +130,7 @@ pub enum Requirement {
     },
     /// A happening changes a fluent in one way only, unless all its changes are increases and
     /// decreases.
-    OneUpdate {
+    SingleUpdate {
         /// The happening.
         node: NodeId,
         /// The fluent.
@@ -245,12 +245,12 @@ impl Requirement {
         match self {
             Self::Separation { first, second } => format!(
                 "{} must come before {}, by at least ε",
-                plan.node_words(task, *first),
-                plan.node_words(task, *second)
+                plan.describe_node(task, *first),
+                plan.describe_node(task, *second)
             ),
             Self::Condition { node, condition } => format!(
                 "{} needs {}",
-                plan.node_words(task, *node),
+                plan.describe_node(task, *node),
                 task.describe_condition(condition)
             ),
             Self::OverAll {
@@ -270,18 +270,18 @@ impl Requirement {
             Self::Defined { node } => {
                 format!(
                     "{} needs a number that has no value",
-                    plan.node_words(task, *node)
+                    plan.describe_node(task, *node)
                 )
             }
-            Self::OneUpdate { node, fluent } => {
+            Self::SingleUpdate { node, fluent } => {
                 format!(
                     "{} must not change {} in several ways at once",
-                    plan.node_words(task, *node),
+                    plan.describe_node(task, *node),
                     task.fluent_name(*fluent)
                 )
             }
             Self::Nature { after, course } => {
-                format!("after {}, {course}", plan.node_words(task, *after))
+                format!("after {}, {course}", plan.describe_node(task, *after))
             }
             Self::Goal { condition } => {
                 format!(

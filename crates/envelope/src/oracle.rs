@@ -1,7 +1,7 @@
 //! The exact box check.
 
-mod inside;
-mod learn;
+mod cut_generation;
+mod proofs;
 
 use std::sync::Arc;
 
@@ -10,8 +10,8 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Valuation};
 
 use crate::control::{beyond_all_bounds, strong_conflict};
+use crate::cut_pool::CutPool;
 use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
-use crate::known::Known;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::soundness::{Broken, Conditions, Counterexample, Soundness};
@@ -41,34 +41,34 @@ pub struct Oracle {
     task: Arc<Task>,
     plan: Arc<ParametrizedPlan>,
     guarantee: Guarantee,
-    asked: Asked,
+    scope: CheckScope,
     controllability: Controllability,
     /// The conditions on all schedules; `None` while no values with a schedule are known, or if
     /// only the times are checked.
     soundness: Option<Soundness>,
     /// Values that determine the order of happenings in `soundness`; initially the nominal ones.
-    around: Valuation,
+    order_values: Valuation,
     /// The number of bad cases refuted from scratch before `around` changed last.
-    refuted_before: usize,
+    earlier_refutations: usize,
     accepted: Option<DecoupledEnvelope>,
     /// `true` if `accepted` is the last box that was found inside, so that the stored proofs are
     /// about it.
-    remembers_accepted: bool,
+    has_accepted_proofs: bool,
     /// `true` if all proofs stored in `soundness` hold in the last box found inside.
     proofs_hold_in_last: bool,
     checks: usize,
     without_schedule: usize,
     /// Reasons that the last search has found.
-    known: Known,
+    cut_pool: CutPool,
 }
 
 /// Scope of the check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Asked {
+enum CheckScope {
     /// The conditions on all schedules, and the times.
     All,
     /// Only the times: the network is known to imply the conditions.
-    Times,
+    TimesOnly,
 }
 
 /// [`Objection`] without its values.
@@ -90,7 +90,7 @@ impl Oracle {
         plan: &Arc<ParametrizedPlan>,
         guarantee: Guarantee,
     ) -> Result<Self, Refusal> {
-        Self::asking(task, plan, guarantee, Asked::All)
+        Self::with_scope(task, plan, guarantee, CheckScope::All)
     }
 
     /// Creates the oracle for a plan whose schedules are all known to be valid, whatever the values
@@ -106,19 +106,19 @@ impl Oracle {
         plan: &Arc<ParametrizedPlan>,
         guarantee: Guarantee,
     ) -> Result<Self, Refusal> {
-        Self::asking(task, plan, guarantee, Asked::Times)
+        Self::with_scope(task, plan, guarantee, CheckScope::TimesOnly)
     }
 
-    fn asking(
+    fn with_scope(
         task: &Arc<Task>,
         plan: &Arc<ParametrizedPlan>,
         guarantee: Guarantee,
-        asked: Asked,
+        asked: CheckScope,
     ) -> Result<Self, Refusal> {
         let around = plan.nominal();
         let soundness = match asked {
-            Asked::All => Soundness::around(task, plan, &around)?,
-            Asked::Times => None,
+            CheckScope::All => Soundness::for_values(task, plan, &around)?,
+            CheckScope::TimesOnly => None,
         };
         let reduction = soundness.as_ref().map(Soundness::reduction);
         let controllability = Controllability::new(guarantee, plan, reduction);
@@ -126,17 +126,17 @@ impl Oracle {
             task: Arc::clone(task),
             plan: Arc::clone(plan),
             guarantee,
-            asked,
+            scope: asked,
             controllability,
             soundness,
-            around,
-            refuted_before: 0,
+            order_values: around,
+            earlier_refutations: 0,
             accepted: None,
-            remembers_accepted: false,
+            has_accepted_proofs: false,
             proofs_hold_in_last: true,
             checks: 0,
             without_schedule: 0,
-            known: Known::default(),
+            cut_pool: CutPool::default(),
         })
     }
 
@@ -175,7 +175,7 @@ impl Oracle {
     /// Returns the number of bad cases refuted from scratch: a measure of work.
     pub fn refutations(&self) -> usize {
         let now = self.soundness.as_ref().map_or(0, Soundness::refutations);
-        self.refuted_before + now
+        self.earlier_refutations + now
     }
 
     /// Makes a box the accepted one, or returns the objection if it is not inside the envelope. In
@@ -184,10 +184,10 @@ impl Oracle {
     /// # Errors
     /// If there are too many cases to decide.
     pub fn start(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Objection>, Refusal> {
-        let reason = self.check_afresh(envelope)?;
+        let reason = self.check_from_scratch(envelope)?;
         if reason.is_none() {
             self.accepted = Some(envelope.clone());
-            self.remembers_accepted = true;
+            self.has_accepted_proofs = true;
         }
         Ok(reason.map(|reason| self.objection_of(envelope, reason)))
     }
@@ -227,9 +227,9 @@ impl Oracle {
         &mut self,
         envelope: &DecoupledEnvelope,
     ) -> Result<Option<Objection>, Refusal> {
-        let reason = self.check_afresh(envelope)?;
+        let reason = self.check_from_scratch(envelope)?;
         if reason.is_none() {
-            self.remembers_accepted = self.accepted.as_ref() == Some(envelope);
+            self.has_accepted_proofs = self.accepted.as_ref() == Some(envelope);
         }
         Ok(reason.map(|reason| self.objection_of(envelope, reason)))
     }
@@ -253,11 +253,11 @@ impl Oracle {
             return Ok(false);
         }
         let plan = Arc::clone(&self.plan);
-        self.remembers_accepted = false;
+        self.has_accepted_proofs = false;
         self.proofs_hold_in_last = false;
-        if self.asked == Asked::All
+        if self.scope == CheckScope::All
             && self
-                .unsound(&end.with_reach(envelope, None), None)?
+                .soundness_violation(&end.with_reach(envelope, None), None)?
                 .is_some()
         {
             return Ok(false);
@@ -313,11 +313,11 @@ impl Oracle {
             return Ok(None);
         }
         let candidate = end.with_reach(&accepted, reach);
-        let reason = self.check_moved(&accepted, &candidate, end);
+        let reason = self.check_widened(&accepted, &candidate, end);
         match reason {
             Ok(None) => {
                 self.accepted = Some(candidate);
-                self.remembers_accepted = true;
+                self.has_accepted_proofs = true;
                 Ok(None)
             }
             refused => {
@@ -332,28 +332,28 @@ impl Oracle {
         &mut self,
     ) -> Result<Result<DecoupledEnvelope, (DecoupledEnvelope, Reason)>, Refusal> {
         let point = DecoupledEnvelope::point(&self.plan.nominal());
-        if let Some(reason) = self.check_afresh(&point)? {
+        if let Some(reason) = self.check_from_scratch(&point)? {
             return Ok(Err((point, reason)));
         }
-        self.remembers_accepted = true;
+        self.has_accepted_proofs = true;
         Ok(Ok(point))
     }
 
     /// Checks `accepted` with `end` moved out.
-    fn check_moved(
+    fn check_widened(
         &mut self,
         accepted: &DecoupledEnvelope,
         candidate: &DecoupledEnvelope,
         end: BoxEnd,
     ) -> Result<Option<Reason>, Refusal> {
-        if !self.remembers_accepted {
+        if !self.has_accepted_proofs {
             // Another box has been found inside since, so the stored proofs are about that one.
-            let again = self.check_afresh(accepted);
+            let again = self.check_from_scratch(accepted);
             self.checks -= 1;
-            self.remembers_accepted = again?.is_none();
+            self.has_accepted_proofs = again?.is_none();
         }
-        if !self.remembers_accepted {
-            return self.check_afresh(candidate);
+        if !self.has_accepted_proofs {
+            return self.check_from_scratch(candidate);
         }
         self.checks += 1;
         // Proofs found for a refused box that is not the last accepted one with an end moved out
@@ -367,7 +367,10 @@ impl Oracle {
     }
 
     /// Checks a box that may be unrelated to the previous one.
-    fn check_afresh(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Reason>, Refusal> {
+    fn check_from_scratch(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+    ) -> Result<Option<Reason>, Refusal> {
         self.checks += 1;
         let reason = self.sound_and_controllable(envelope, None, None);
         self.proofs_hold_in_last = matches!(&reason, Ok(None));
@@ -382,8 +385,8 @@ impl Oracle {
     ) -> Result<Option<Reason>, Refusal> {
         // Soundness comes first. If a feasible box were rejected as unsound afterwards, the
         // networks of the feasibility check would be ahead of the accepted box.
-        if self.asked == Asked::All
-            && let Some(reason) = self.unsound(envelope, trusted)?
+        if self.scope == CheckScope::All
+            && let Some(reason) = self.soundness_violation(envelope, trusted)?
         {
             return Ok(Some(reason));
         }
@@ -396,12 +399,12 @@ impl Oracle {
 
     /// Returns the reason why some schedule in the box violates a condition, or why there is no
     /// schedule.
-    fn unsound(
+    fn soundness_violation(
         &mut self,
         envelope: &DecoupledEnvelope,
         trusted: Option<BoxEnd>,
     ) -> Result<Option<Reason>, Refusal> {
-        let is_there = self.soundness.is_some() && envelope.contains(&self.around);
+        let is_there = self.soundness.is_some() && envelope.contains(&self.order_values);
         let without_schedule = if is_there {
             None
         } else {
@@ -409,7 +412,7 @@ impl Oracle {
         };
         let (None, Some(soundness)) = (&without_schedule, &mut self.soundness) else {
             self.without_schedule += 1;
-            let values = without_schedule.unwrap_or_else(|| self.around.clone());
+            let values = without_schedule.unwrap_or_else(|| self.order_values.clone());
             return Ok(Some(Reason::NoSchedule(values)));
         };
         let broken = soundness.broken(&self.task, &self.plan, envelope, trusted)?;
@@ -423,12 +426,12 @@ impl Oracle {
     /// changes.
     fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
         let nearest = envelope.nearest(&self.plan.nominal());
-        let Some(soundness) = Soundness::around(&self.task, &self.plan, &nearest)? else {
+        let Some(soundness) = Soundness::for_values(&self.task, &self.plan, &nearest)? else {
             return Ok(Some(nearest));
         };
-        self.refuted_before = self.refutations();
+        self.earlier_refutations = self.refutations();
         self.soundness = Some(soundness);
-        self.around = nearest;
+        self.order_values = nearest;
         Ok(None)
     }
 

@@ -226,10 +226,10 @@ impl Reduction {
 
     /// Returns the node's class, and the node's offset from it. The node after the plan's last is
     /// the moment of an over-all condition; it has its own class, the last.
-    pub fn place(&self, node: NodeId) -> (ClassId, Rational) {
+    pub fn class_of(&self, node: NodeId) -> (ClassId, Rational) {
         match self.places.get(node.index()) {
             Some((class, offset)) => (*class, offset.clone()),
-            None => (self.moment(), Rational::ZERO),
+            None => (self.moment_class(), Rational::ZERO),
         }
     }
 
@@ -239,7 +239,7 @@ impl Reduction {
     }
 
     /// Returns the class of the moment at which an over-all condition is read.
-    pub fn moment(&self) -> ClassId {
+    pub fn moment_class(&self) -> ClassId {
         ClassId(u32::try_from(self.class_count).expect("fewer classes than nodes"))
     }
 
@@ -420,7 +420,7 @@ fn scaled(networks: [&Network<Delta>; 2]) -> Option<[Network<i128>; 2]> {
             whole.add(Constraint {
                 from: constraint.from,
                 to: constraint.to,
-                bound: i128::from(unit.whole(&constraint.bound.real)?),
+                bound: i128::from(unit.to_integer(&constraint.bound.real)?),
             });
         }
         Some(whole)

@@ -15,7 +15,7 @@
 //! The cases are exhaustive, and each linear program is a lower bound on the cost in its case. So
 //! the first schedule that the validator accepts is proven to be the cheapest.
 
-mod flaw;
+mod defect;
 mod moment;
 mod orders;
 mod program;
@@ -32,7 +32,7 @@ use elbowroom_stn::{ConsistentNetwork, Constraint};
 
 use crate::obligations::{Refusal, Requirement};
 use crate::reduction::Reduction;
-use flaw::{Finder, Flaw};
+use defect::{Defect, DefectFinder};
 use orders::Orders;
 use program::{Program, Solved};
 
@@ -42,18 +42,18 @@ pub struct Changeable {
     /// The parameter. It stays in its range; open ends of the range count as closed.
     pub parameter: ParameterId,
     /// Values without cost: the nominal value, or the values that the domain allows.
-    pub free: Interval,
+    pub free_range: Interval,
     /// Cost per unit of the value's distance from `free`; positive.
     pub weight: Rational,
 }
 
 /// Constraint that prevents a cheaper repair, or any repair.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Hindrance {
+pub enum BindingConstraint {
     /// One side of the plan's constraint at this position.
     Bound(usize, Side),
     /// Nothing happens before time zero.
-    Beginning,
+    TimeZero,
     /// Two interfering happenings keep their order, at least ε apart.
     Order(NodeId, NodeId),
     /// A requirement on every valid schedule.
@@ -75,7 +75,7 @@ pub struct Repair {
     /// the bound are possible, but not the bound itself.
     pub bound: Rational,
     /// Explanation of the cost: inequalities that add up to the bound, each with its multiplier.
-    pub because: Vec<(Hindrance, Rational)>,
+    pub explanation: Vec<(BindingConstraint, Rational)>,
 }
 
 /// Result of a search for a repair.
@@ -92,7 +92,7 @@ pub enum RepairRun {
     Impossible {
         /// Constraints that are in conflict in the case with the least change; some or all of them
         /// together.
-        because: Vec<Hindrance>,
+        because: Vec<BindingConstraint>,
     },
     /// The validator rejects a plan that meets every obligation: the violated requirement has no
     /// obligation.
@@ -117,20 +117,20 @@ pub struct RepairLimits {
     /// The search is stopped after this number of linear programs.
     pub cases: usize,
     /// The search is stopped once it is known that no repair costs less than this.
-    pub below: Option<Rational>,
+    pub cost_limit: Option<Rational>,
 }
 
 impl Default for RepairLimits {
     fn default() -> Self {
         Self {
             cases: 4_000,
-            below: None,
+            cost_limit: None,
         }
     }
 }
 
 /// Solved case that has not been examined yet.
-struct Open {
+struct OpenCase {
     /// The rows of this case, in addition to those of all cases.
     rows: Vec<usize>,
     /// The happenings whose order it decides.
@@ -166,13 +166,13 @@ pub fn repair(
             schedule,
             cost: Rational::ZERO,
             bound: Rational::ZERO,
-            because: Vec::new(),
+            explanation: Vec::new(),
         };
         return Ok(RepairRun::Repaired { repair, cases: 0 });
     }
-    let mut program = Program::new(plan, changeable, task.epsilon(), &orders.kept);
+    let mut program = Program::new(plan, changeable, task.epsilon(), &orders.fixed_pairs);
     let reduction = Reduction::new(plan);
-    let finder = Finder {
+    let finder = DefectFinder {
         task,
         plan,
         orders: &orders,
@@ -180,7 +180,7 @@ pub fn repair(
     };
     let mut cases = 1;
     let mut open = match program.solve(&[]) {
-        Ok(solved) => vec![Open {
+        Ok(solved) => vec![OpenCase {
             rows: Vec::new(),
             decided: BTreeSet::new(),
             solved,
@@ -188,10 +188,13 @@ pub fn repair(
         Err(because) => return Ok(RepairRun::Impossible { because }),
     };
     // Constraints in conflict in the first case without a solution, which has the least change.
-    let mut hopeless: Option<Vec<Hindrance>> = None;
+    let mut hopeless: Option<Vec<BindingConstraint>> = None;
     while let Some(case) = take_cheapest(&mut open) {
         let cost = &case.solved.cost.real;
-        let is_dear = limits.below.as_ref().is_some_and(|below| cost >= below);
+        let is_dear = limits
+            .cost_limit
+            .as_ref()
+            .is_some_and(|below| cost >= below);
         let is_over = is_dear || cases > limits.cases;
         if is_over || flow().is_break() {
             return Ok(RepairRun::Stopped {
@@ -211,21 +214,21 @@ pub fn repair(
                 values: values.clone(),
                 schedule: schedule.clone(),
                 bound: cost.real.clone(),
-                because: because.clone(),
+                explanation: because.clone(),
             };
             return Ok(RepairRun::Repaired { repair, cases });
         }
         match finder.find(values, schedule, &case.decided)? {
-            Flaw::None => {
+            Defect::None => {
                 return Ok(RepairRun::Unexplained {
                     values: values.clone(),
                     schedule: schedule.clone(),
                 });
             }
-            Flaw::Hopeless(requirement) => {
-                hopeless.get_or_insert_with(|| vec![Hindrance::Requirement(requirement)]);
+            Defect::Unrepairable(requirement) => {
+                hopeless.get_or_insert_with(|| vec![BindingConstraint::Requirement(requirement)]);
             }
-            Flaw::Cases {
+            Defect::Cases {
                 alternatives,
                 decides,
             } => {
@@ -238,7 +241,7 @@ pub fn repair(
                         Ok(solved) => {
                             let mut decided = case.decided.clone();
                             decided.extend(decides);
-                            open.push(Open {
+                            open.push(OpenCase {
                                 rows,
                                 decided,
                                 solved,
@@ -268,7 +271,7 @@ fn unchanged(
     let mut values = plan.nominal();
     for own in changeable {
         let value = &mut values[own.parameter];
-        let [least, most] = Side::BOTH.map(|side| side.of(&own.free).value());
+        let [least, most] = Side::BOTH.map(|side| side.of(&own.free_range).value());
         if let Some(end) = least.filter(|least| *value < **least) {
             value.clone_from(end);
         }
@@ -277,7 +280,7 @@ fn unchanged(
         }
     }
     let mut network = plan.plan.network(&values);
-    for &(first, second) in &orders.kept {
+    for &(first, second) in &orders.fixed_pairs {
         let (first, second) = (network_node(first), network_node(second));
         network.add(Constraint::at_least(first, second, task.epsilon().clone()));
     }
@@ -287,8 +290,8 @@ fn unchanged(
 }
 
 /// Removes the case of least cost. Ties go to the newest case, which has the most decisions.
-fn take_cheapest(open: &mut Vec<Open>) -> Option<Open> {
-    let cost = |case: &Open| -> Delta { case.solved.cost.clone() };
+fn take_cheapest(open: &mut Vec<OpenCase>) -> Option<OpenCase> {
+    let cost = |case: &OpenCase| -> Delta { case.solved.cost.clone() };
     let best = (0..open.len()).rev().min_by_key(|&at| cost(&open[at]))?;
     Some(open.remove(best))
 }

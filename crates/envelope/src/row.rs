@@ -1,6 +1,6 @@
 //! Linear inequalities in the ends of boxes.
 
-use elbowroom_num::{Rational, Total};
+use elbowroom_num::{Accumulator, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
 use crate::linear::Terms;
@@ -20,7 +20,7 @@ pub struct Row {
 impl Row {
     /// Returns the left-hand side in a box; `None` if it contains an infinite end.
     pub fn value(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
-        let mut value = Total::default();
+        let mut value = Accumulator::default();
         for (end, factor) in &self.factors {
             value.add_product(&end.reach(envelope)?, factor);
         }

@@ -6,7 +6,7 @@ use crate::obligations::Refusal;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side};
 
-use crate::irr::farthest;
+use crate::irr::max_reach;
 use crate::oracle::Oracle;
 
 /// The largest distance between an end and a limit that is not found exactly: 10⁻¹².
@@ -59,7 +59,7 @@ fn push(
     if border.as_ref() == Some(&inside) {
         return ControlFlow::Continue(());
     }
-    let farthest = farthest(oracle.plan().parameter(end.parameter));
+    let farthest = max_reach(oracle.plan().parameter(end.parameter));
     // An undecided box counts as refused.
     let mut accepts = |reach| oracle.try_reach(end, reach).unwrap_or(false);
     if accepts(border.clone()) {

@@ -7,17 +7,17 @@
 //! and they are stored. When a box is widened, only proofs that use the moved end and no longer
 //! hold are searched again.
 
-mod bad_case;
 mod certificate;
 mod corner;
 mod flow;
 mod half_space;
-mod lazy;
+mod lazy_network;
 mod linear_program;
 mod proof;
+mod proof_export;
 mod scale;
 mod sound_box;
-mod told;
+mod violation_case;
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -26,12 +26,12 @@ use elbowroom_stn::ConsistentNetwork;
 use crate::linear::Linear;
 use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Requirement};
 use crate::reduction::Reduction;
-use bad_case::Outcome;
 use certificate::Certificate;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, Valuation};
-use lazy::{Lazy, numbers};
+use lazy_network::{LazyNetwork, numbers};
 use proof::Proof;
 use scale::Numbers;
+use violation_case::Outcome;
 
 pub use sound_box::SoundBox;
 
@@ -53,7 +53,7 @@ pub(crate) struct Soundness {
     numbers: Option<Numbers>,
     /// The case that was violated last, which is likely to be violated next. Initially one past the
     /// end.
-    suspect: usize,
+    last_violated: usize,
     /// The number of bad cases refuted from scratch.
     refutations: usize,
 }
@@ -101,7 +101,7 @@ pub fn broken_in(
     envelope: &DecoupledEnvelope,
 ) -> Result<Option<Broken>, Refusal> {
     let nearest = envelope.nearest(&plan.nominal());
-    let soundness = Soundness::around(task, plan, &nearest)?;
+    let soundness = Soundness::for_values(task, plan, &nearest)?;
     let mut soundness = soundness.ok_or(Refusal::NoNominalSchedule)?;
     soundness.broken(task, plan, envelope, None)
 }
@@ -141,7 +141,7 @@ impl Soundness {
     ///
     /// # Errors
     /// If the plan contains something beyond exact linear reasoning.
-    pub(crate) fn around(
+    pub(crate) fn for_values(
         task: &Task,
         plan: &ParametrizedPlan,
         valuation: &Valuation,
@@ -183,7 +183,7 @@ impl Soundness {
             over_all,
             is_in_ranges: true,
             numbers,
-            suspect: usize::MAX - 1,
+            last_violated: usize::MAX - 1,
             refutations: 0,
         }))
     }
@@ -238,11 +238,11 @@ impl Soundness {
             over_all,
             is_in_ranges,
             numbers,
-            suspect,
+            last_violated: suspect,
             refutations,
             ..
         } = self;
-        let mut schedules = Lazy::Unmade(reduction, envelope, numbers.as_ref());
+        let mut schedules = LazyNetwork::Unbuilt(reduction, envelope, numbers.as_ref());
         // Deviations accumulate, so in a box later conditions are violated first, and the one that
         // was violated last is the most likely. In a point, the earliest violation is reported.
         let is_point = envelope.is_point();
@@ -259,7 +259,7 @@ impl Soundness {
             // So a violated separation is the better reason, and the only one with a
             // counterexample.
             let is_enough = found.len() >= most || !apart.is_empty();
-            if is_enough && !is_separation || direct.stands(envelope, moved) {
+            if is_enough && !is_separation || direct.proofs_hold(envelope, moved) {
                 continue;
             }
             let Some(schedules) = schedules.get() else {
@@ -352,12 +352,12 @@ impl Soundness {
             // happenings in order, and too close.
             let mut near = broken.case.clone();
             near.differences.push(Difference::not_after(first, second));
-            let witness = bad_case::witness(&self.reduction, envelope, &near, None);
+            let witness = violation_case::witness(&self.reduction, envelope, &near, None);
             if witness.is_some() {
                 return witness;
             }
         }
-        bad_case::witness(&self.reduction, envelope, &broken.case, None)
+        violation_case::witness(&self.reduction, envelope, &broken.case, None)
     }
 
     /// Like [`counterexample`](Self::counterexample), but with the greatest violation of the
@@ -372,13 +372,13 @@ impl Soundness {
             Requirement::Separation { first, second } => Some(Linear::difference(first, second)),
             _ => None,
         };
-        bad_case::witness(&self.reduction, envelope, &broken.case, gap.as_ref())
+        violation_case::witness(&self.reduction, envelope, &broken.case, gap.as_ref())
     }
 }
 
 impl DirectCase {
     /// Returns `true` if the known proofs still hold.
-    fn stands(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
+    fn proofs_hold(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
         let Some(proofs) = &self.proofs else {
             return false;
         };

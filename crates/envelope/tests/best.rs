@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::ops::ControlFlow;
 
 use elbowroom_envelope::{
-    BestRun, BestSettings, Guarantee, Objective, Oracle, Settings, balance, best, irr,
+    BestRun, BestSettings, Guarantee, Objective, Oracle, Settings, best, irr, max_uniform_slack,
 };
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan};
@@ -36,9 +36,9 @@ const DOMAIN: &str = "
       :condition (at end (>= (x) ?duration)) :effect (at end (decrease (x) ?duration)))";
 
 /// Pseudorandom number generator.
-struct Dice(u64);
+struct Random(u64);
 
-impl Dice {
+impl Random {
     fn below(&mut self, bound: u64) -> u64 {
         self.0 = self
             .0
@@ -157,8 +157,8 @@ fn found(
 }
 
 #[test]
-fn no_box_on_a_grid_is_better_than_the_best_one() {
-    let mut dice = Dice(11);
+fn best_box_beats_all_grid_boxes() {
+    let mut dice = Random(11);
     let (mut proved, mut unproved, mut torn) = (0, 0, 0);
     for _ in 0..60 {
         let bounds = dice.bounds();
@@ -236,8 +236,8 @@ fn relay(unit: &Rational) -> String {
 }
 
 #[test]
-fn no_box_on_a_grid_has_more_volume_than_the_best_one() {
-    let mut dice = Dice(23);
+fn best_volume_beats_all_grid_boxes() {
+    let mut dice = Random(23);
     let (mut proved, mut unproved, mut torn, mut flat, mut others) = (0, 0, 0, 0, 0);
     for _ in 0..40 {
         let bounds = dice.bounds();
@@ -286,8 +286,8 @@ fn no_box_on_a_grid_has_more_volume_than_the_best_one() {
 
 /// A search for the least slack that is cancelled returns at least its initial box.
 #[test]
-fn search_that_is_ended_is_no_worse_than_its_beginning() {
-    let mut dice = Dice(11);
+fn stopped_search_is_no_worse_than_start() {
+    let mut dice = Random(11);
     let (mut ended, mut kept) = (0, 0);
     while ended < 60 {
         let given = Given {
@@ -333,7 +333,7 @@ fn search_that_is_ended_is_no_worse_than_its_beginning() {
 }
 
 #[test]
-fn everything_may_deviate_by_exactly_what_fits() {
+fn uniform_deviation_equals_available_slack() {
     for unit in [Rational::ONE, Rational::new(1, 3600)] {
         let given = Given {
             domain: DOMAIN,
@@ -343,29 +343,29 @@ fn everything_may_deviate_by_exactly_what_fits() {
         let (task, plan) = given.task_and_plan();
         for guarantee in Guarantee::ALL {
             let mut oracle = Oracle::new(&task, &plan, guarantee).unwrap();
-            let shares = balance(&mut oracle, &mut || ControlFlow::Continue(()));
+            let shares = max_uniform_slack(&mut oracle, &mut || ControlFlow::Continue(()));
             let shares = shares.unwrap().unwrap();
             if guarantee == Guarantee::Strong {
                 // The second start follows the first end at once, which requires an observation.
-                for share in [shares.more, shares.less, shares.either] {
-                    assert_eq!(share.inside, Rational::ZERO);
-                    assert_eq!(share.outside, Some(Rational::ZERO));
+                for share in [shares.increase, shares.decrease, shares.both_directions] {
+                    assert_eq!(share.lower_bound, Rational::ZERO);
+                    assert_eq!(share.upper_bound, Some(Rational::ZERO));
                 }
                 continue;
             }
             // With both of them five times as long, the makespan is ten units.
             let four = Rational::from(4);
-            for share in [&shares.more, &shares.either] {
-                assert_eq!(share.inside, four, "{guarantee}");
-                assert_eq!(share.outside.as_ref(), Some(&four), "{guarantee}");
+            for share in [&shares.increase, &shares.both_directions] {
+                assert_eq!(share.lower_bound, four, "{guarantee}");
+                assert_eq!(share.upper_bound.as_ref(), Some(&four), "{guarantee}");
             }
-            assert!(shares.less.inside >= Rational::ONE, "{guarantee}");
+            assert!(shares.decrease.lower_bound >= Rational::ONE, "{guarantee}");
         }
     }
 }
 
 #[test]
-fn a_search_in_relative_steps_finds_the_same_in_any_unit() {
+fn relative_steps_are_unit_independent() {
     let settings = Settings {
         relative: Some(Rational::new(1, 100)),
         ..Settings::default()

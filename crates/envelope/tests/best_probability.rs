@@ -7,9 +7,9 @@ mod given;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-use elbowroom_envelope::{BestRun, BestSettings, Guarantee, NEVER, Objective, Oracle, best};
-use elbowroom_num::chance::{Chance, Density};
-use elbowroom_num::{Interval, Rational, enclosed};
+use elbowroom_envelope::{BestRun, BestSettings, Guarantee, LOG_OF_ZERO, Objective, Oracle, best};
+use elbowroom_num::log_concave::{Density, LogConcaveDistribution};
+use elbowroom_num::{Interval, Rational, enclosures};
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan};
 
 use given::Given;
@@ -48,17 +48,18 @@ fn number(tenths: i64) -> Rational {
     Rational::new(tenths, 10)
 }
 
-fn dense(density: Density, cuts: [Option<i64>; 2]) -> Chance {
+fn dense(density: Density, cuts: [Option<i64>; 2]) -> LogConcaveDistribution {
     let [minimum, maximum] = cuts.map(|cut| cut.map(number));
-    Chance::dense(density, minimum, maximum, &Rational::new(1, 1000)).expect("a density")
+    LogConcaveDistribution::dense(density, minimum, maximum, &Rational::new(1, 1000))
+        .expect("a density")
 }
 
-fn values(tenths: &[i64]) -> Chance {
-    Chance::values(tenths.iter().copied().map(number).collect()).expect("values")
+fn values(tenths: &[i64]) -> LogConcaveDistribution {
+    LogConcaveDistribution::values(tenths.iter().copied().map(number).collect()).expect("values")
 }
 
 /// Distributions of all kinds for three durations; `None` for a duration that is as planned.
-fn families() -> Vec<[Option<Chance>; 3]> {
+fn families() -> Vec<[Option<LogConcaveDistribution>; 3]> {
     let normal = |mean, deviation, cuts| {
         let (mean, deviation) = (number(mean), number(deviation));
         Some(dense(Density::Normal { mean, deviation }, cuts))
@@ -136,7 +137,7 @@ type Known = BTreeMap<(usize, Rational, Rational), Option<f64>>;
 /// Returns the logarithm of the probability that all durations are inside; `None` if that is 0.
 fn logarithm(
     envelope: &DecoupledEnvelope,
-    chances: &[Option<Chance>],
+    chances: &[Option<LogConcaveDistribution>],
     known: &mut Known,
 ) -> Option<f64> {
     let nominal = Rational::from(NOMINAL);
@@ -146,8 +147,9 @@ fn logarithm(
         let (lower, upper) = (interval.lower.value()?, interval.upper.value()?);
         let key = (index, lower.clone(), upper.clone());
         let own = known.entry(key).or_insert_with(|| {
-            let [mass, _] = chance.mass(&nominal, &[&nominal - lower, upper - &nominal]);
-            enclosed::ln(&mass).map(|[below, _]| below.to_f64())
+            let [mass, _] =
+                chance.probability_bounds(&nominal, &[&nominal - lower, upper - &nominal]);
+            enclosures::ln(&mass).map(|[below, _]| below.to_f64())
         });
         sum += (*own)?;
     }
@@ -156,13 +158,13 @@ fn logarithm(
 
 fn found(
     oracle: &mut Oracle,
-    chances: &[Option<Chance>],
+    chances: &[Option<LogConcaveDistribution>],
     symmetric: bool,
 ) -> Option<(BestRun, DecoupledEnvelope)> {
     let settings = BestSettings {
         objective: Objective::Probability,
         symmetric,
-        chances: chances.to_vec(),
+        distributions: chances.to_vec(),
         ..BestSettings::default()
     };
     let run = best(oracle, &settings, None, &mut |_| ControlFlow::Continue(()));
@@ -172,7 +174,7 @@ fn found(
 }
 
 #[test]
-fn in_no_box_on_a_grid_do_durations_stay_more_likely_than_in_the_best_one() {
+fn best_probability_beats_all_grid_boxes() {
     let (mut proved, mut unproved, mut split, mut never, mut others) = (0, 0, 0, 0, 0);
     for bounds in BOUNDS {
         let given = Given {
@@ -197,9 +199,9 @@ fn in_no_box_on_a_grid_do_durations_stay_more_likely_than_in_the_best_one() {
                     let (value, bound) = (run.value.to_f64(), run.bound.to_f64());
                     match logarithm(&best, &chances, &mut known) {
                         Some(own) => assert!((own - value).abs() < 1e-8, "{own} {what}"),
-                        None => assert_eq!(run.value, Rational::from(NEVER), "{what}"),
+                        None => assert_eq!(run.value, Rational::from(LOG_OF_ZERO), "{what}"),
                     }
-                    never += usize::from(run.value == Rational::from(NEVER));
+                    never += usize::from(run.value == Rational::from(LOG_OF_ZERO));
                     assert!(value <= bound && bound <= 1e-6, "{what}");
                     assert_eq!(run.is_proved, bound <= value + 1e-6, "{what}");
                     proved += usize::from(run.is_proved);

@@ -41,7 +41,7 @@ fn a_proof_about_a_multiplied_parameter_holds_for_its_own_box_only() {
 }
 
 #[test]
-fn a_parameter_on_two_constraints_may_grow_for_ever() {
+fn parameter_on_two_constraints_may_be_unlimited() {
     let given = Given {
         domain: "(:action first :parameters () :precondition (and) :effect (and))
                  (:action second :parameters () :precondition (and) :effect (and))",
@@ -84,7 +84,7 @@ fn a_counterexample_at_an_infinite_end_has_a_value_far_enough_out() {
 }
 
 #[test]
-fn a_parameter_that_bounds_a_time_and_stands_in_an_effect_is_one_quantity() {
+fn parameter_in_bound_and_effect_is_one_quantity() {
     let given = Given {
         domain: "(:synth-parameters ?s)
                  (:durative-action burn :parameters () :duration (>= ?duration 0)
@@ -121,7 +121,7 @@ fn two_numbers_that_a_parameter_multiplies_are_not_decided_at_corners() {
 }
 
 #[test]
-fn a_condition_that_says_nothing_does_not_hold_and_its_opposite_neither() {
+fn undefined_condition_and_its_negation_both_fail() {
     let with = |condition: &str| {
         let domain =
             format!("(:action look :parameters () :precondition {condition} :effect (and))");
@@ -140,7 +140,7 @@ fn a_condition_that_says_nothing_does_not_hold_and_its_opposite_neither() {
 }
 
 #[test]
-fn what_changes_continuously_must_have_a_value() {
+fn continuous_change_requires_defined_value() {
     let given = Given {
         domain: "(:durative-action fill :parameters () :duration (= ?duration 3)
                     :effect (increase (z) (* #t 1)))",
@@ -154,7 +154,7 @@ fn what_changes_continuously_must_have_a_value() {
 }
 
 #[test]
-fn one_happening_does_not_change_a_number_in_two_ways() {
+fn happening_must_not_change_number_in_two_ways() {
     let given = Given {
         domain: "(:action set :parameters () :precondition (and)
                     :effect (and (assign (x) 3) (increase (x) 1)))",
@@ -200,7 +200,7 @@ fn a_box_away_from_the_nominal_values_may_have_its_own_order() {
 }
 
 #[test]
-fn timed_initials_that_move_may_change_places() {
+fn moved_timed_initials_may_swap() {
     let given = Given {
         domain: "(:action look :parameters () :precondition (and) :effect (and))",
         init: "(q) (at 2 (p)) (at 4 (not (q)))",
@@ -224,7 +224,7 @@ fn timed_initials_that_move_may_change_places() {
 }
 
 #[test]
-fn proofs_found_for_a_refused_box_are_not_taken_to_hold_in_the_last_accepted_one() {
+fn proofs_of_refused_box_are_not_reused_for_accepted_box() {
     // The duration is at most the lesser of ?a and ?b, and must be at most 10.
     let given = Given {
         domain: "(:synth-parameters ?a ?b ?c)
@@ -251,7 +251,7 @@ fn proofs_found_for_a_refused_box_are_not_taken_to_hold_in_the_last_accepted_one
 }
 
 #[test]
-fn in_a_box_beside_the_nominal_values_happenings_may_come_in_another_order() {
+fn order_may_change_in_box_without_nominal_values() {
     let given = Given {
         domain: "(:action set :parameters () :precondition (and) :effect (p))
                  (:action look :parameters () :precondition (or (p) (q)) :effect (and))",

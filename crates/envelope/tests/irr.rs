@@ -14,9 +14,9 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, S
 use given::Given;
 
 /// Pseudorandom number generator.
-struct Dice(u64);
+struct Random(u64);
 
-impl Dice {
+impl Random {
     fn below(&mut self, bound: usize) -> usize {
         self.0 = self
             .0
@@ -34,7 +34,7 @@ const DOMAIN: &str = "
 
 /// Returns a plan of sequential or parallel actions, some of which consume a resource, with bounds
 /// between their starts and ends and ranges of their durations.
-fn plan_text(dice: &mut Dice) -> String {
+fn plan_text(dice: &mut Random) -> String {
     let count = 2 + dice.below(4);
     let mut text = String::new();
     for action in 0..count {
@@ -57,7 +57,7 @@ fn plan_text(dice: &mut Dice) -> String {
         }
     }
     for _ in 0..dice.below(6) {
-        let point = |dice: &mut Dice| {
+        let point = |dice: &mut Random| {
             let side = ["start", "end"][dice.below(2)];
             format!("a{}.{side}", dice.below(count))
         };
@@ -78,7 +78,7 @@ fn plan_text(dice: &mut Dice) -> String {
 
 /// Returns a plan of sequential actions, many with a window, so that conflicts span several
 /// windows.
-fn plan_in_windows(dice: &mut Dice, count: usize) -> String {
+fn plan_in_windows(dice: &mut Random, count: usize) -> String {
     let mut text = String::new();
     for action in 0..count {
         let range = ["lb 0 ub inf", "lb 0 ub 6", "lb 1 ub 9"][dice.below(3)];
@@ -110,7 +110,7 @@ fn plan_in_windows(dice: &mut Dice, count: usize) -> String {
 /// Result of a search: the steps, each with the resulting box and the number of checks so far, and
 /// the reason for the end.
 #[derive(Debug, PartialEq)]
-struct Told {
+struct SearchLog {
     steps: Vec<Option<(DecoupledEnvelope, BoxEnd, usize)>>,
     envelope: Option<DecoupledEnvelope>,
     checks: usize,
@@ -140,8 +140,8 @@ fn one_by_one(
     plan: &ParametrizedPlan,
     settings: &Settings,
     most: usize,
-) -> Told {
-    let mut told = Told {
+) -> SearchLog {
+    let mut told = SearchLog {
         steps: Vec::new(),
         envelope: None,
         checks: 1,
@@ -219,7 +219,7 @@ fn one_by_one(
     told
 }
 
-fn as_built(oracle: &mut Oracle, settings: &Settings, most: usize) -> Told {
+fn as_built(oracle: &mut Oracle, settings: &Settings, most: usize) -> SearchLog {
     let mut steps = Vec::new();
     let run = irr(oracle, settings, &mut |widening| {
         steps.push(widening.map(|it| (it.envelope.clone(), it.end, it.checks)));
@@ -232,7 +232,7 @@ fn as_built(oracle: &mut Oracle, settings: &Settings, most: usize) -> Told {
     .expect("few cases");
     let widened = steps.iter().flatten().count();
     assert_eq!(run.widenings, widened);
-    Told {
+    SearchLog {
         steps,
         envelope: run.envelope.ok(),
         checks: run.checks,
@@ -256,7 +256,7 @@ fn objections(
             };
             let reach = reach + distance;
             let farther = end.with_reach(envelope, Some(reach.clone()));
-            let found = own.objection_beside(envelope, end, Some(reach));
+            let found = own.objection_to_widening(envelope, end, Some(reach));
             let found = found.expect("few cases");
             let expected = fresh.objection(&farther).expect("few cases");
             assert_eq!(found.is_some(), expected.is_some(), "{end:?} {envelope:?}");
@@ -292,8 +292,8 @@ fn task_and_plan(text: &str) -> (Arc<Task>, Arc<ParametrizedPlan>) {
 }
 
 #[test]
-fn the_search_takes_the_steps_of_one_check_after_the_other() {
-    let mut dice = Dice(3);
+fn speculative_search_takes_same_steps_as_sequential() {
+    let mut dice = Random(3);
     let (mut long, mut limited, mut cancelled, mut without, mut objected) = (0, 0, 0, 0, 0);
     for round in 0..800 {
         let text = if round < 600 {
@@ -339,7 +339,7 @@ fn the_search_takes_the_steps_of_one_check_after_the_other() {
 
 /// Returns the sum of the distances of ends from the nominal values, without ends that have no
 /// limit.
-fn room(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
+fn total_slack(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
     let point = DecoupledEnvelope::point(&plan.nominal());
     BoxEnd::all(plan.parameters.len())
         .filter_map(|end| Some(&end.reach(envelope)? - &end.reach(&point)?))
@@ -348,8 +348,8 @@ fn room(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
 }
 
 #[test]
-fn where_long_conflicts_are_divided_the_box_is_inside_and_hardly_smaller() {
-    let mut dice = Dice(5);
+fn conflict_split_keeps_box_inside_and_almost_as_large() {
+    let mut dice = Random(5);
     let (mut divided, mut rooms) = ([0; 2], [Rational::ZERO, Rational::ZERO]);
     for round in 0..60 {
         let mut text = plan_in_windows(&mut dice, 60);
@@ -386,8 +386,8 @@ fn where_long_conflicts_are_divided_the_box_is_inside_and_hardly_smaller() {
                 "{guarantee} {text}"
             );
             divided[usize::from(round >= 40)] += usize::from(whole != other);
-            rooms[0] += room(&plan, whole);
-            rooms[1] += room(&plan, other);
+            rooms[0] += total_slack(&plan, whole);
+            rooms[1] += total_slack(&plan, other);
         }
     }
     let share = (&rooms[1] / &rooms[0]).to_f64();

@@ -33,7 +33,7 @@ fn number(number: i64) -> Rational {
 }
 
 #[test]
-fn a_look_at_another_box_changes_nothing_about_how_the_accepted_one_can_be_widened() {
+fn query_of_other_box_keeps_accepted_state() {
     let (task, plan) = RELAY.task_and_plan();
     let mut oracle = oracle(&task, &plan).unwrap();
     let accepted = envelope("[1, 1] [1, 8]");
@@ -51,7 +51,7 @@ fn a_look_at_another_box_changes_nothing_about_how_the_accepted_one_can_be_widen
 }
 
 #[test]
-fn looks_are_counted_but_what_it_takes_to_come_back_from_them_is_not() {
+fn queries_are_counted_without_the_return() {
     let (task, plan) = RELAY.task_and_plan();
     let mut oracle = oracle(&task, &plan).unwrap();
     assert_eq!(oracle.start(&envelope("[1, 1] [1, 1]")), Ok(None));
@@ -61,7 +61,7 @@ fn looks_are_counted_but_what_it_takes_to_come_back_from_them_is_not() {
 }
 
 #[test]
-fn an_end_that_reaches_so_far_already_stays_where_it_is() {
+fn widening_to_shorter_reach_keeps_end() {
     let (task, plan) = RELAY.task_and_plan();
     let mut oracle = oracle(&task, &plan).unwrap();
     let accepted = envelope("[1, 4] [1, 4]");
@@ -75,7 +75,7 @@ fn an_end_that_reaches_so_far_already_stays_where_it_is() {
 }
 
 #[test]
-fn the_nominal_values_are_the_box_to_start_from_if_nobody_names_another() {
+fn search_starts_at_nominal_values_by_default() {
     let (task, plan) = RELAY.task_and_plan();
     let mut oracle = oracle(&task, &plan).unwrap();
     assert_eq!(oracle.accepted(), None);
@@ -84,7 +84,7 @@ fn the_nominal_values_are_the_box_to_start_from_if_nobody_names_another() {
 }
 
 #[test]
-fn a_box_that_is_refused_is_not_started_from() {
+fn refused_box_cannot_be_start() {
     let (task, plan) = RELAY.task_and_plan();
     let mut oracle = oracle(&task, &plan).unwrap();
     let accepted = envelope("[1, 1] [1, 1]");

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use elbowroom_execution::{Progression, Ticket};
+use elbowroom_execution::{ActionHandle, BeliefState};
 use elbowroom_model::ground::{
     Action, Body, Change, Condition, DurativeBody, Effect, FactId, Guard, SnapAction,
 };
@@ -42,18 +42,18 @@ fn belief(bencher: Bencher<'_, '_>, facts: usize) {
         .collect();
     bencher
         .counter(ItemsCount::new(ACTIONS))
-        .with_inputs(|| Progression::new(Arc::clone(&task)))
+        .with_inputs(|| BeliefState::new(Arc::clone(&task)))
         .bench_local_values(|mut belief| {
             let mut now = Rational::ZERO;
             for (action, ticket) in actions.iter().zip(0..) {
-                let ticket = Ticket(ticket);
-                belief.arrive(&now).expect("no numbers");
+                let ticket = ActionHandle(ticket);
+                belief.advance_for_happening(&now).expect("no numbers");
                 let outcome = belief.start(ticket, action, &Rational::ONE, &[]);
                 outcome.expect("no numbers");
                 now += Rational::ONE;
-                belief.arrive(&now).expect("no numbers");
+                belief.advance_for_happening(&now).expect("no numbers");
                 belief.end(ticket, &[]).expect("no numbers");
-                assert!(belief.broken().is_none());
+                assert!(belief.violated_action().is_none());
             }
             belief
         });
@@ -80,7 +80,7 @@ fn action(index: usize, needed: FactId, changed: FactId) -> Action {
             over_all: Condition::Fact(needed),
             end: snap(Condition::TRUE, vec![effect]),
             continuous: Vec::new(),
-            is_under_way: false,
+            is_running: false,
         }),
     }
 }

@@ -21,9 +21,10 @@ use std::fmt::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means};
+use elbowroom_execution::executors::{ExecutorServices, ExecutorSpec, PolicyTableCache};
 use elbowroom_execution::{
-    Decision, Ending, Executor, Mission, Moment, News, Order, Progression, StepId, Ticket,
+    ActionHandle, BeliefState, Decision, DecisionContext, Ending, Executor, Order, PlanEvent,
+    PreparedPlan, StepId,
 };
 use elbowroom_model::ground::Action;
 use elbowroom_model::{Task, TimeTriggeredPlan};
@@ -66,14 +67,14 @@ fn row(executor: &str, robots: usize, actions: usize) {
     let mut likelihoods = Likelihoods::certain();
     likelihoods.defaults.becomes_false = Some(1e-6);
     likelihoods.defaults.start = Some(0.99);
-    let mut decider = spec.build(Means {
-        region: Box::new(robots::Everywhere),
+    let mut decider = spec.build(ExecutorServices {
+        region: Box::new(robots::UnlimitedRegion),
         likelihoods: Arc::new(likelihoods),
-        odds: None,
-        foresight: Foresight::default(),
-        orders: None,
-        outlook: None,
-        rehearsal: None,
+        comparator: None,
+        policy_cache: PolicyTableCache::default(),
+        order_cache: None,
+        action_values: None,
+        rollout: None,
     });
     let begin = Instant::now();
     decider.adopt(&mission).expect("a plan with orders");
@@ -103,17 +104,17 @@ fn milliseconds(time: Duration) -> String {
 struct World {
     running: BTreeMap<(Rational, StepId), Arc<Action>>,
     now: Rational,
-    news: Vec<News>,
-    belief: Progression,
+    news: Vec<PlanEvent>,
+    belief: BeliefState,
 }
 
 impl World {
-    fn new(mission: &Mission) -> Self {
+    fn new(mission: &PreparedPlan) -> Self {
         Self {
             running: BTreeMap::new(),
             now: Rational::ZERO,
             news: Vec::new(),
-            belief: Progression::new(Arc::clone(&mission.task)),
+            belief: BeliefState::new(Arc::clone(&mission.task)),
         }
     }
 
@@ -121,9 +122,9 @@ impl World {
     fn run(mut self, executor: &mut dyn Executor) -> Vec<Duration> {
         let mut times = Vec::new();
         loop {
-            let moment = Moment {
+            let moment = DecisionContext {
                 now: &self.now,
-                news: &std::mem::take(&mut self.news),
+                plan_events: &std::mem::take(&mut self.news),
                 belief: &self.belief,
             };
             let begin = Instant::now();
@@ -140,13 +141,15 @@ impl World {
 
     fn start(&mut self, order: Order) {
         let duration = order.duration.expect("all take time");
-        self.belief.arrive(&self.now).expect("no numbers");
-        let ticket = Ticket(u64::from(order.step.0));
+        self.belief
+            .advance_for_happening(&self.now)
+            .expect("no numbers");
+        let ticket = ActionHandle(u64::from(order.step.0));
         let started = self.belief.start(ticket, &order.action, &duration, &[]);
         started.expect("no numbers");
         self.running
             .insert((&self.now + duration, order.step), order.action);
-        self.news.push(News::Started {
+        self.news.push(PlanEvent::Started {
             step: order.step,
             time: self.now.clone(),
             measured: Vec::new(),
@@ -162,10 +165,12 @@ impl World {
         }
         let ((time, step), _) = self.running.pop_first().expect("something to wait for");
         self.now.clone_from(&time);
-        self.belief.arrive(&time).expect("no numbers");
-        let ended = self.belief.end(Ticket(u64::from(step.0)), &[]);
+        self.belief
+            .advance_for_happening(&time)
+            .expect("no numbers");
+        let ended = self.belief.end(ActionHandle(u64::from(step.0)), &[]);
         ended.expect("no numbers");
-        self.news.push(News::Ended {
+        self.news.push(PlanEvent::Ended {
             step,
             time,
             ending: Ending::Succeeded,
@@ -175,7 +180,7 @@ impl World {
 }
 
 /// Creates a mission with `actions` moves.
-fn mission(robots: usize, actions: usize) -> Mission {
+fn mission(robots: usize, actions: usize) -> PreparedPlan {
     let rooms = actions / robots;
     let (mut init, mut goal, mut plan) = (String::new(), String::new(), String::new());
     let text = |into: &mut String, line: String| writeln!(into, "{line}").expect("memory");
@@ -213,7 +218,7 @@ fn mission(robots: usize, actions: usize) -> Mission {
     let read = read_plan(&Source::new("x", plan), &task);
     let (plan, _): (TimeTriggeredPlan, _) =
         read.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
-    Mission {
+    PreparedPlan {
         order: Some(partial_order(&task, &plan)),
         time_triggered: plan,
         task,

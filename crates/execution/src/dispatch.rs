@@ -5,17 +5,17 @@
 //! are fixed in the network. With a whole [`Horizon`], this updates the windows of all others,
 //! including deadlines. The work per event is proportional to the number of windows that change.
 
-mod apart;
+mod decide;
 mod explain;
-mod news;
+mod interference;
+mod observe;
 mod overrun;
 mod progress;
 mod projection;
 mod retry;
-mod watch;
 
-pub(crate) use overrun::{Overdue, Until};
-pub(crate) use watch::{in_words, replan};
+pub(crate) use decide::{in_words, replan};
+pub(crate) use overrun::{EndAssumption, Overdue};
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -23,18 +23,18 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, DurationConstraint};
 use elbowroom_num::Rational;
-use elbowroom_plan::uncertain::{Impossible, PlanNetwork, Reading};
+use elbowroom_plan::uncertain::{ConstraintRole, Impossible, PlanNetwork};
 use elbowroom_plan::{
     Bound, Constraint, InstanceId, Node, NodeId, Schedule, StnPlan, network_node,
 };
 use elbowroom_stn::{ConsistentNetwork, Network};
 
-use crate::executor::{Mission, Planned, StepId};
-use crate::horizon::{Horizon, NetworkLimit, grounds};
-use crate::reason::{About, Behind, Cause, Reason};
+use crate::executor::{Planned, PreparedPlan, StepId};
+use crate::reason::{Cause, Evidence, Reason, Subject};
 use crate::separation::Separation;
-use overrun::Strain;
-use progress::Progress;
+use crate::window_propagation::{NetworkLimit, WindowPropagation, constraints_of_steps};
+use overrun::BoundViolations;
+use progress::PlanProgress;
 use retry::Retry;
 
 /// Finite bounds of a constraint.
@@ -42,8 +42,8 @@ pub(crate) type Bounds = (Option<Rational>, Option<Rational>);
 
 /// The reach of constraint propagation; see [`Horizon`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sight {
-    Whole,
+pub(crate) enum PropagationReach {
+    WholeNetwork,
     OneHop,
 }
 
@@ -67,13 +67,13 @@ impl Sources {
 
 /// Returns the reason for rejecting a plan whose network is not controllable: the conflicting
 /// constraints.
-fn contradiction(mission: &Mission, sources: &Sources, behind: &[NetworkLimit]) -> Reason {
-    let mut reason = Reason::new(Cause::Late).about(About::NoTimes);
+fn contradiction(mission: &PreparedPlan, sources: &Sources, behind: &[NetworkLimit]) -> Reason {
+    let mut reason = Reason::new(Cause::Late).about(Subject::NoSchedule);
     let indices = behind.iter().filter_map(|behind| sources.of(*behind));
-    reason.behind = indices
-        .map(|index| explain::named(&mission.task, &mission.plan.plan, index))
+    reason.evidence = indices
+        .map(|index| explain::describe_constraint(&mission.task, &mission.plan.plan, index))
         .collect();
-    reason.behind.dedup();
+    reason.evidence.dedup();
     reason
 }
 
@@ -88,18 +88,18 @@ pub(crate) struct Dispatch {
     /// The time on the world's clock when the plan's clock reads 0.
     origin: Rational,
     epsilon: Rational,
-    horizon: Horizon,
+    horizon: WindowPropagation,
     sources: Sources,
     /// Start and end node of each instance; the same node twice if it is instantaneous.
     ends: Vec<[NodeId; 2]>,
     /// Bounds on the duration of each instance.
     durations: Vec<Bounds>,
-    progress: Progress,
+    progress: PlanProgress,
     /// See [`watch::numbers_of_durations`].
     numbers_of_durations: BTreeMap<InstanceId, Vec<DurationConstraint>>,
     /// The times, on the plan's clock, at which instances were commanded whose start has not been
     /// observed.
-    told: BTreeMap<InstanceId, Rational>,
+    commanded_unstarted: BTreeMap<InstanceId, Rational>,
     /// Coming timed initials with their times, the last one first.
     timed: Vec<(Rational, NodeId)>,
     /// Instances that were running before the plan began. The plan contains only their remainder.
@@ -107,7 +107,7 @@ pub(crate) struct Dispatch {
     /// Failed starts that are to be retried.
     retries: BTreeMap<NodeId, Retry>,
     /// Violations of the network's bounds since the network was last known to be executable.
-    strain: Strain,
+    bound_violations: BoundViolations,
     /// The happenings that starts are separated from; `None` if the network orders all interfering happenings.
     separation: Option<Separation>,
 }
@@ -119,8 +119,8 @@ impl Dispatch {
     /// # Errors
     /// If no times satisfy the bounds.
     pub(crate) fn new(
-        mission: &Mission,
-        sight: Sight,
+        mission: &PreparedPlan,
+        sight: PropagationReach,
         bounds: &dyn Fn(&Constraint) -> Bounds,
     ) -> Result<Self, Box<Reason>> {
         let plan = &mission.plan.plan;
@@ -130,9 +130,9 @@ impl Dispatch {
             links: Vec::new(),
         };
         let horizon = match sight {
-            Sight::OneHop => Horizon::one_hop(network),
-            Sight::Whole => match ConsistentNetwork::try_from(network) {
-                Ok(network) => Horizon::whole(network),
+            PropagationReach::OneHop => WindowPropagation::one_hop(network),
+            PropagationReach::WholeNetwork => match ConsistentNetwork::try_from(network) {
+                Ok(network) => WindowPropagation::whole_network(network),
                 Err(cycle) => {
                     let behind: Vec<NetworkLimit> = cycle
                         .constraints
@@ -154,25 +154,25 @@ impl Dispatch {
     ///
     /// # Errors
     /// If the network is not dynamically controllable: the conflicting constraints.
-    pub(crate) fn controlled(
-        mission: &Mission,
-        reading: &dyn Fn(&Constraint) -> Reading,
+    pub(crate) fn with_contingent_durations(
+        mission: &PreparedPlan,
+        reading: &dyn Fn(&Constraint) -> ConstraintRole,
     ) -> Result<Self, Box<Reason>> {
         let plan = &mission.plan.plan;
         let network = plan
             .uncertain_network(reading)
             .map_err(|Impossible(index)| {
-                let mut reason = Reason::new(Cause::Late).about(About::EmptyConstraint);
-                reason.behind = vec![explain::named(&mission.task, plan, index)];
+                let mut reason = Reason::new(Cause::Late).about(Subject::UnsatisfiableConstraint);
+                reason.evidence = vec![explain::describe_constraint(&mission.task, plan, index)];
                 Box::new(reason)
             })?;
         let sources = Sources {
             requirements: network.requirements,
             links: network.links,
         };
-        let form = mission.forms.of(network.network);
+        let form = mission.dispatchable_cache.get_or_compute(network.network);
         let form = form.map_err(|behind| Box::new(contradiction(mission, &sources, &behind)))?;
-        let horizon = Horizon::dispatchable(form);
+        let horizon = WindowPropagation::dispatchable(form);
         let bounds = |constraint: &Constraint| bounds_of(reading(constraint));
         Ok(Self::with_horizon(mission, horizon, sources, &bounds))
     }
@@ -182,14 +182,14 @@ impl Dispatch {
     ///
     /// # Errors
     /// If the new network is not dynamically controllable: the conflicting constraints of the plan.
-    pub(crate) fn rebound(
+    pub(crate) fn with_bounds(
         &mut self,
         now: &Rational,
-        reading: &dyn Fn(&Constraint) -> Reading,
-    ) -> Result<(), Vec<Behind>> {
+        reading: &dyn Fn(&Constraint) -> ConstraintRole,
+    ) -> Result<(), Vec<Evidence>> {
         let known = self.plan.constraints.len();
-        let network = self.rest(now, reading);
-        let named = |index: usize| explain::named(&self.task, &self.plan, index);
+        let network = self.remaining_network(now, reading);
+        let named = |index: usize| explain::describe_constraint(&self.task, &self.plan, index);
         let network = network.map_err(|Impossible(index)| vec![named(index)])?;
         let own = |index: &usize| *index < known;
         let sources = Sources {
@@ -202,7 +202,7 @@ impl Dispatch {
         };
         let form = network.network.into_executable();
         let form = form.map_err(|(_, conflict)| {
-            let mut behind: Vec<Behind> = grounds(&conflict.steps)
+            let mut behind: Vec<Evidence> = constraints_of_steps(&conflict.steps)
                 .iter()
                 .filter_map(|limit| sources.of(*limit))
                 .map(named)
@@ -210,9 +210,9 @@ impl Dispatch {
             behind.dedup();
             behind
         })?;
-        let mut horizon = Horizon::dispatchable(Arc::new(form));
+        let mut horizon = WindowPropagation::dispatchable(Arc::new(form));
         for (node, _) in self.plan.nodes() {
-            if let Some(time) = self.happened(node) {
+            if let Some(time) = self.execution_time(node) {
                 let _ = horizon.fix(network_node(node), time);
             }
         }
@@ -224,7 +224,7 @@ impl Dispatch {
         }
         self.horizon = horizon;
         self.sources = sources;
-        self.strain = Strain::default();
+        self.bound_violations = BoundViolations::default();
         let bounds = |constraint: &Constraint| bounds_of(reading(constraint));
         self.durations = durations(&self.plan, &bounds);
         Ok(())
@@ -232,25 +232,27 @@ impl Dispatch {
 
     /// Returns the network of the remaining plan. Executed time points keep their times; the others
     /// cannot happen before `now`.
-    fn rest(
+    fn remaining_network(
         &self,
         now: &Rational,
-        reading: &dyn Fn(&Constraint) -> Reading,
+        reading: &dyn Fn(&Constraint) -> ConstraintRole,
     ) -> Result<PlanNetwork, Impossible> {
-        let has_happened = |node: NodeId| self.happened(node).is_some();
+        let has_happened = |node: NodeId| self.execution_time(node).is_some();
         // The executor does not decide when a running action ends, so ends have no lower bound at
         // `now`.
         let waits = |what: Node| !matches!(what, Node::End(_));
-        let plan = self.plan.remainder(now, |node| self.happened(node), waits);
+        let plan = self
+            .plan
+            .remainder(now, |node| self.execution_time(node), waits);
         plan.uncertain_network(&|constraint| {
             if constraint.from == NodeId::ZERO && constraint.reason == elbowroom_plan::Reason::Given
             {
                 // These include constraints of the plan itself; their bounds are kept as they are.
-                let (lower, upper) = given(constraint);
-                return Reading::Requirement { lower, upper };
+                let (lower, upper) = constant_bounds(constraint);
+                return ConstraintRole::Requirement { lower, upper };
             }
             if has_happened(constraint.from) && has_happened(constraint.to) {
-                return Reading::Requirement {
+                return ConstraintRole::Requirement {
                     lower: None,
                     upper: None,
                 };
@@ -266,13 +268,13 @@ impl Dispatch {
         &self,
         id: InstanceId,
         now: &Rational,
-        reading: &dyn Fn(&Constraint) -> Reading,
+        reading: &dyn Fn(&Constraint) -> ConstraintRole,
     ) -> Option<Rational> {
-        self.latest_end_in(&self.possible_times(now, reading)?, id)
+        self.latest_end_in_network(&self.possible_schedules(now, reading)?, id)
     }
 
-    /// Returns the same for a network from [`Dispatch::possible_times`].
-    pub(crate) fn latest_end_in(
+    /// Returns the same for a network from [`Dispatch::possible_schedules`].
+    pub(crate) fn latest_end_in_network(
         &self,
         network: &ConsistentNetwork,
         id: InstanceId,
@@ -280,17 +282,20 @@ impl Dispatch {
         let origin = network_node(NodeId::ZERO);
         let end = network_node(self.ends[id.index()][1]);
         let latest = network.distance(origin, end)?;
-        Some(self.world(&latest))
+        Some(self.to_world_time(&latest))
     }
 
     /// Returns the schedules of the remaining plan as a consistent network; `None` if there are
     /// none. Contingent links may take any time within their reading.
-    pub(crate) fn possible_times(
+    pub(crate) fn possible_schedules(
         &self,
         now: &Rational,
-        reading: &dyn Fn(&Constraint) -> Reading,
+        reading: &dyn Fn(&Constraint) -> ConstraintRole,
     ) -> Option<ConsistentNetwork> {
-        let rest = self.rest(&self.local(now), reading).ok()?.network;
+        let rest = self
+            .remaining_network(&self.to_plan_time(now), reading)
+            .ok()?
+            .network;
         let mut network = rest.requirements().clone();
         for link in rest.links() {
             let (from, to) = (link.activation, link.end);
@@ -307,8 +312,8 @@ impl Dispatch {
     }
 
     fn with_horizon(
-        mission: &Mission,
-        horizon: Horizon,
+        mission: &PreparedPlan,
+        horizon: WindowPropagation,
         sources: Sources,
         bounds: &dyn Fn(&Constraint) -> Bounds,
     ) -> Self {
@@ -316,7 +321,7 @@ impl Dispatch {
         let nominal = mission.plan.nominal();
         let ends = ends_of(&plan);
         let durations = durations(&plan, bounds);
-        let progress = Progress::new(&plan, &plan.constraints_at(&nominal));
+        let progress = PlanProgress::new(&plan, &plan.constraints_at(&nominal));
         let timed = plan
             .nodes()
             .filter(|(_, what)| matches!(what, Node::Timed(_)));
@@ -336,12 +341,12 @@ impl Dispatch {
             ends,
             durations,
             progress,
-            numbers_of_durations: watch::numbers_of_durations(mission),
-            told: BTreeMap::new(),
+            numbers_of_durations: decide::numeric_duration_bounds(mission),
+            commanded_unstarted: BTreeMap::new(),
             timed,
             resumed: mission.running.keys().map(|step| step.instance()).collect(),
             retries: BTreeMap::new(),
-            strain: Strain::default(),
+            bound_violations: BoundViolations::default(),
             separation: None,
         };
         dispatch.begin(&mission.running);
@@ -349,21 +354,22 @@ impl Dispatch {
     }
 
     /// Marks time 0 and the starts of the running actions as executed.
-    fn begin(&mut self, running: &BTreeMap<StepId, crate::event::Ticket>) {
-        if let Horizon::Dispatchable(_) = self.horizon {
+    fn begin(&mut self, running: &BTreeMap<StepId, crate::event::ActionHandle>) {
+        if let WindowPropagation::Dispatchable(_) = self.horizon {
             // In other horizons, the origin is always executed.
             let _ = self
                 .horizon
                 .fix(network_node(NodeId::ZERO), &Rational::ZERO);
         }
         self.progress
-            .happen(&self.plan, NodeId::ZERO, &Rational::ZERO);
+            .record_execution(&self.plan, NodeId::ZERO, &Rational::ZERO);
         for step in running.keys() {
             let id = step.instance();
             let start = self.ends[id.index()][0];
             // The plan contains the remainder of a running action, which begins with the plan.
             let _ = self.horizon.fix(network_node(start), &Rational::ZERO);
-            self.progress.happen(&self.plan, start, &Rational::ZERO);
+            self.progress
+                .record_execution(&self.plan, start, &Rational::ZERO);
             self.progress.ready.remove(&start);
             self.progress.running.insert(id);
         }
@@ -372,7 +378,7 @@ impl Dispatch {
     /// Executes the timed initials up to `now`, on the plan's clock.
     fn pass_time(&mut self, now: &Rational) {
         while let Some((time, node)) = self.timed.pop_if(|(time, _)| *time <= *now) {
-            if let Horizon::Dispatchable(_) = self.horizon {
+            if let WindowPropagation::Dispatchable(_) = self.horizon {
                 let _ = self.horizon.fix(network_node(node), &time);
             }
         }
@@ -395,22 +401,22 @@ impl Dispatch {
     }
 
     /// Returns the start and the end node of an instance.
-    pub(crate) fn nodes_of(&self, id: InstanceId) -> [NodeId; 2] {
+    pub(crate) fn start_and_end_nodes(&self, id: InstanceId) -> [NodeId; 2] {
         self.ends[id.index()]
     }
 
     /// Returns the name of the plan's own bounds on an instance's duration, for reasons.
-    fn duration_of(&self, id: InstanceId) -> About {
+    fn duration_subject(&self, id: InstanceId) -> Subject {
         if self.resumed.contains(&id) {
-            About::RestOfDuration
+            Subject::RemainingDuration
         } else {
-            About::Duration
+            Subject::Duration
         }
     }
 
     /// Returns the time at which a node was executed, on the plan's clock.
-    pub(crate) fn happened(&self, node: NodeId) -> Option<&Rational> {
-        self.progress.happened[node.index()].as_ref()
+    pub(crate) fn execution_time(&self, node: NodeId) -> Option<&Rational> {
+        self.progress.executed[node.index()].as_ref()
     }
 
     /// Instances that have started, or were commanded to, and have not ended.
@@ -426,17 +432,17 @@ impl Dispatch {
     /// Returns the window of a node, on the world's clock.
     pub(crate) fn window_of(&self, node: NodeId) -> Bounds {
         let (earliest, latest) = self.horizon.window(network_node(node));
-        let world = |time: Rational| self.world(&time);
+        let world = |time: Rational| self.to_world_time(&time);
         (earliest.map(world), latest.map(world))
     }
 
     /// Converts a time from the world's clock to the plan's clock.
-    pub(crate) fn local(&self, time: &Rational) -> Rational {
+    pub(crate) fn to_plan_time(&self, time: &Rational) -> Rational {
         time - &self.origin
     }
 
     /// Converts a time from the plan's clock to the world's clock.
-    pub(crate) fn world(&self, time: &Rational) -> Rational {
+    pub(crate) fn to_world_time(&self, time: &Rational) -> Rational {
         time + &self.origin
     }
 
@@ -454,22 +460,22 @@ fn durations(plan: &StnPlan, bounds: &dyn Fn(&Constraint) -> Bounds) -> Vec<Boun
     for constraint in &plan.constraints {
         if let Some(id) = plan.duration_of(constraint) {
             let known: &mut Bounds = &mut durations[id.index()];
-            *known = both(std::mem::take(known), bounds(constraint));
+            *known = intersection(std::mem::take(known), bounds(constraint));
         }
     }
     durations
 }
 
-fn bounds_of(reading: Reading) -> Bounds {
+fn bounds_of(reading: ConstraintRole) -> Bounds {
     match reading {
-        Reading::Requirement { lower, upper } => (lower, upper),
-        Reading::Contingent { lower, upper } => (Some(lower), upper),
-        Reading::Impossible => (None, None),
+        ConstraintRole::Requirement { lower, upper } => (lower, upper),
+        ConstraintRole::Contingent { lower, upper } => (Some(lower), upper),
+        ConstraintRole::Impossible => (None, None),
     }
 }
 
 /// Returns the intersection of both.
-fn both(one: Bounds, other: Bounds) -> Bounds {
+fn intersection(one: Bounds, other: Bounds) -> Bounds {
     let lower = one.0.into_iter().chain(other.0).max();
     (lower, one.1.into_iter().chain(other.1).min())
 }
@@ -520,7 +526,7 @@ fn network(
 }
 
 /// Returns the bounds of a constraint without parameters.
-pub(crate) fn given(constraint: &Constraint) -> Bounds {
+pub(crate) fn constant_bounds(constraint: &Constraint) -> Bounds {
     let value = |bound: &Bound| match bound {
         Bound::Finite(value) => Some(value.clone()),
         Bound::Infinite | Bound::Parameter(_) => None,

@@ -11,9 +11,9 @@ use elbowroom_num::Rational;
 /// Numbers are never reused, so a late report on an earlier plan cannot be mistaken for one on the
 /// present plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Ticket(pub u64);
+pub struct ActionHandle(pub u64);
 
-impl fmt::Display for Ticket {
+impl fmt::Display for ActionHandle {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "#{}", self.0)
     }
@@ -25,7 +25,7 @@ pub enum Command {
     /// Start an action now.
     Start {
         /// The identifier for reports of the world.
-        ticket: Ticket,
+        ticket: ActionHandle,
         /// The action.
         action: Arc<Action>,
         /// The planned duration; `None` for an instantaneous action.
@@ -34,7 +34,7 @@ pub enum Command {
     /// Cancel an action. Its start effects remain; its end effects do not happen.
     Cancel {
         /// The ticket of its start.
-        ticket: Ticket,
+        ticket: ActionHandle,
     },
 }
 
@@ -53,14 +53,14 @@ pub enum Event {
     /// An action has started.
     Started {
         /// The ticket of its start.
-        ticket: Ticket,
+        ticket: ActionHandle,
         /// Measured changes of fluents by its start.
         measured: Vec<Measured>,
     },
     /// An action has ended.
     Ended {
         /// The ticket of its start.
-        ticket: Ticket,
+        ticket: ActionHandle,
         /// The outcome.
         ending: Ending,
         /// Measured changes of fluents by its end.
@@ -69,7 +69,7 @@ pub enum Event {
     /// A running action reports its completion. If it has grown, the time-out counts from then on.
     Feedback {
         /// The ticket of its start.
-        ticket: Ticket,
+        ticket: ActionHandle,
         /// The completed part, from 0 to 1, if it is known.
         completion: Option<Rational>,
         /// A note from the world as text; may be empty.
@@ -125,7 +125,7 @@ pub enum Request {
     /// Cancel a running action. The plan is checked when the world reports the end of the action.
     CancelAction {
         /// The ticket of its start.
-        ticket: Ticket,
+        ticket: ActionHandle,
     },
     /// Stop dispatching; running actions continue.
     Pause,

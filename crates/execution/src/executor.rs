@@ -8,14 +8,14 @@ use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, InstanceId, ParametrizedPlan, PartialOrderPlan, Schedule};
 
-use crate::event::{Ending, Measured, Ticket};
-use crate::forms::Forms;
-use crate::progression::Progression;
+use crate::belief_state::BeliefState;
+use crate::dispatchable_cache::DispatchableCache;
+use crate::event::{ActionHandle, Ending, Measured};
 use crate::reason::Reason;
 
 /// The form of a plan that an executor requires, from the least to the most preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Need {
+pub enum PlanForm {
     /// The orderings that facts require. There are no open parameters, and numeric conditions are
     /// not guaranteed. This is the information of `ROSPlan`'s dispatcher.
     Orderings,
@@ -54,17 +54,17 @@ impl StepId {
 /// randomness: the same history leads to the same decisions.
 pub trait Executor: Send {
     /// Returns the form of a plan that it requires.
-    fn need(&self) -> Need;
+    fn need(&self) -> PlanForm;
 
     /// Adopts a plan, and forgets the previous one.
     ///
     /// # Errors
     /// The reason for which the plan cannot be executed (any more).
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>>;
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>>;
 
     /// Returns the next decision. The run calls this again until the decision is
     /// [`Decision::Wait`]. Each news item is passed only once.
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided;
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided;
 
     /// Returns `true` if the plan that it last abandoned ([`Decision::Replan`]) has a fair chance
     /// to work, so that it is better to [carry on](Executor::carry_on) than to cancel overdue
@@ -87,7 +87,7 @@ pub trait Executor: Send {
     }
 
     /// Returns `true` if this plan is better than the rest of the present one.
-    fn prefers(&self, _mission: &Mission, _now: &Rational) -> bool {
+    fn prefers_plan(&self, _mission: &PreparedPlan, _now: &Rational) -> bool {
         false
     }
 
@@ -113,7 +113,7 @@ pub trait Executor: Send {
 /// `true` if runs may use a real clock. In the module for browsers it is `false`, which
 /// keeps the module small: plans are not made in the background there, and the slack of running
 /// actions is not monitored.
-pub(crate) const CAN_HAVE_A_CLOCK: bool = !cfg!(target_family = "wasm");
+pub(crate) const SUPPORTS_REAL_CLOCK: bool = !cfg!(target_family = "wasm");
 
 /// The time window of a happening.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -126,7 +126,7 @@ pub struct Planned {
 
 /// A plan prepared for execution.
 #[derive(Clone, Debug)]
-pub struct Mission {
+pub struct PreparedPlan {
     /// The remaining task, with its own clock.
     pub task: Arc<Task>,
     /// The time on the world's clock when the task's clock reads 0.
@@ -144,31 +144,31 @@ pub struct Mission {
     /// The values of the open parameters for which the plan is guaranteed to work.
     pub envelope: Option<DecoupledEnvelope>,
     /// Cache of the dispatchable forms of the plan's networks.
-    pub forms: Forms,
+    pub dispatchable_cache: DispatchableCache,
     /// The partial order of the plan's happenings, for executors that need it
     /// ([`Need::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
     /// The running actions, which continue in the plan: see [`StepId`].
-    pub running: BTreeMap<StepId, Ticket>,
+    pub running: BTreeMap<StepId, ActionHandle>,
     /// Other steps of the plan that have begun between the plan's start time and its adoption.
     /// Their starts and ends are reported to the executor as news.
-    pub begun: BTreeMap<StepId, Ticket>,
+    pub begun: BTreeMap<StepId, ActionHandle>,
 }
 
 /// Input of a decision.
 #[derive(Clone, Copy, Debug)]
-pub struct Moment<'a> {
+pub struct DecisionContext<'a> {
     /// The present time, by the world's clock.
     pub now: &'a Rational,
     /// The observations since the last decision.
-    pub news: &'a [News],
+    pub plan_events: &'a [PlanEvent],
     /// The believed state.
-    pub belief: &'a Progression,
+    pub belief: &'a BeliefState,
 }
 
 /// Checked observation that concerns the present plan. Each start and end is reported once.
 #[derive(Clone, Debug, PartialEq)]
-pub enum News {
+pub enum PlanEvent {
     /// An action has started.
     Started {
         /// The step of the plan.
@@ -199,7 +199,7 @@ pub enum News {
         action: String,
     },
     /// An action has timed out.
-    Silence {
+    TimedOut {
         /// The action.
         action: String,
         /// The time at which it should have ended.
@@ -207,9 +207,9 @@ pub enum News {
     },
 }
 
-impl News {
+impl PlanEvent {
     /// Returns a change as news.
-    pub(crate) fn of_change(change: &Change) -> Self {
+    pub(crate) fn from_change(change: &Change) -> Self {
         match change {
             Change::Add(fact) | Change::Delete(fact) => Self::Fact(*fact),
             Change::Update { fluent, .. } => Self::Value(*fluent),

@@ -5,14 +5,14 @@
 //! generated from that list.
 
 mod adaptable;
-mod chooser;
 mod esterel;
 mod fixed;
+mod guarantee_status;
 mod guarded;
+mod happening_choice;
 mod live;
 mod lookahead;
 mod policy;
-mod promise;
 mod stn;
 
 use std::fmt;
@@ -22,23 +22,23 @@ use std::sync::Arc;
 use elbowroom_num::Rational;
 use elbowroom_probability::Likelihoods;
 
-pub use adaptable::Orders;
-pub use lookahead::Foresight;
+pub use adaptable::OrderCache;
+pub use lookahead::PolicyTableCache;
 
-use crate::executor::Need;
+use crate::action_values::ActionValues;
+use crate::executor::PlanForm;
 use crate::executor::{Decided, Decision, Executor};
-use crate::odds::Odds;
-use crate::outlook::Outlook;
-use crate::preparation::Region;
-use crate::reason::{About, Cause, Reason};
-use crate::rehearsal::Rehearsal;
+use crate::plan_comparison::PlanComparator;
+use crate::preparation::RegionOracle;
+use crate::reason::{Cause, Reason, Subject};
+use crate::rollout::RolloutEvaluator;
 
 /// The default executor. It abandons a plan only if the remaining plan fails even when executed
 /// nominally; `docs/executors.md` compares it with the baselines.
 pub const DEFAULT_EXECUTOR: &str = live::REGISTERED.name;
 
 /// All executors, in the order used by help and reports.
-pub const EXECUTORS: &[Registered] = &[
+pub const EXECUTORS: &[ExecutorEntry] = &[
     fixed::REGISTERED,
     stn::REGISTERED,
     guarded::REGISTERED,
@@ -51,7 +51,7 @@ pub const EXECUTORS: &[Registered] = &[
 
 /// The registry entry of an executor: name, documentation and constructor.
 #[derive(Clone, Copy, Debug)]
-pub struct Registered {
+pub struct ExecutorEntry {
     /// Its name.
     pub name: &'static str,
     /// The meaning of the argument, the number after the name and a colon, if it takes one.
@@ -63,51 +63,54 @@ pub struct Registered {
     /// The paper on which it is based.
     pub paper: &'static str,
     /// The form of a plan that it requires.
-    pub need: Need,
+    pub need: PlanForm,
     /// Constructor.
-    make: fn(Option<Rational>, Means) -> Box<dyn Executor>,
+    make: fn(Option<Rational>, ExecutorServices) -> Box<dyn Executor>,
 }
 
 /// The services that an executor may use while it executes a plan.
-pub struct Means {
+pub struct ExecutorServices {
     /// The whole envelope.
-    pub region: Box<dyn Region>,
+    pub region: Box<dyn RegionOracle>,
     /// The likelihoods of failures and spontaneous changes.
     pub likelihoods: Arc<Likelihoods>,
     /// For executors that search for more likely plans ([`ExecutorSpec::asks_odds`]). Without it,
     /// they do not search.
-    pub odds: Option<Box<dyn Odds>>,
+    pub comparator: Option<Box<dyn PlanComparator>>,
     /// For `lookahead`: results for the same problem and likelihoods from other runs.
-    pub foresight: Foresight,
+    pub policy_cache: PolicyTableCache,
     /// For `adaptable`: results for the same plans from other samples of the same scene.
-    pub orders: Option<Orders>,
+    pub order_cache: Option<OrderCache>,
     /// For executors that evaluate each move ([`ExecutorSpec::asks_outlook`]). Without it, they
     /// follow their plan.
-    pub outlook: Option<Arc<dyn Outlook>>,
+    pub action_values: Option<Arc<dyn ActionValues>>,
     /// For executors that evaluate each move, if there is no [`Outlook`]: simulates the possible
     /// moves.
-    pub rehearsal: Option<Box<dyn Rehearsal>>,
+    pub rollout: Option<Box<dyn RolloutEvaluator>>,
 }
 
-impl Means {
+impl ExecutorServices {
     /// Sets the odds.
     #[must_use]
-    pub fn with_odds(self, odds: Option<Box<dyn Odds>>) -> Self {
-        Self { odds, ..self }
+    pub fn with_comparator(self, odds: Option<Box<dyn PlanComparator>>) -> Self {
+        Self {
+            comparator: odds,
+            ..self
+        }
     }
 }
 
-impl<R: Region + 'static> From<Box<R>> for Means {
+impl<R: RegionOracle + 'static> From<Box<R>> for ExecutorServices {
     /// Creates means with certain outcomes, and without comparison of plans.
     fn from(region: Box<R>) -> Self {
         Self {
             region,
             likelihoods: Arc::new(Likelihoods::certain()),
-            odds: None,
-            foresight: Foresight::default(),
-            orders: None,
-            outlook: None,
-            rehearsal: None,
+            comparator: None,
+            policy_cache: PolicyTableCache::default(),
+            order_cache: None,
+            action_values: None,
+            rollout: None,
         }
     }
 }
@@ -116,7 +119,7 @@ impl<R: Region + 'static> From<Box<R>> for Means {
 #[derive(Clone)]
 pub struct ExecutorSpec {
     /// The executor.
-    pub registered: &'static Registered,
+    pub registered: &'static ExecutorEntry,
     /// The number after the colon.
     pub argument: Option<Rational>,
 }
@@ -143,23 +146,23 @@ pub enum UnknownExecutor {
 }
 
 impl ExecutorSpec {
-    /// Creates the executor, from the envelope alone or from all [`Means`].
-    pub fn build(&self, means: impl Into<Means>) -> Box<dyn Executor> {
+    /// Creates the executor, from the envelope alone or from all [`ExecutorServices`].
+    pub fn build(&self, means: impl Into<ExecutorServices>) -> Box<dyn Executor> {
         (self.registered.make)(self.argument.clone(), means.into())
     }
 
     /// Returns `true` if the executor searches for plans that are more likely to succeed.
-    pub fn asks_odds(&self) -> bool {
-        self.asks_outlook() || (self.registered.is_optional && self.argument.is_some())
+    pub fn needs_comparator(&self) -> bool {
+        self.needs_action_values() || (self.registered.is_optional && self.argument.is_some())
     }
 
     /// Returns `true` if the executor chooses the most likely order of a plan's actions.
-    pub fn reorders(&self) -> bool {
+    pub fn chooses_order(&self) -> bool {
         [adaptable::REGISTERED.name, lookahead::REGISTERED.name].contains(&self.registered.name)
     }
 
     /// Returns `true` if the executor evaluates each move with an [`Outlook`], where there is one.
-    pub fn asks_outlook(&self) -> bool {
+    pub fn needs_action_values(&self) -> bool {
         self.registered.name == policy::REGISTERED.name
     }
 }
@@ -209,7 +212,7 @@ impl FromStr for ExecutorSpec {
         };
         let registered = EXECUTORS.iter().find(|known| known.name == name.trim());
         let Some(registered) = registered else {
-            let known: Vec<String> = EXECUTORS.iter().map(Registered::usage).collect();
+            let known: Vec<String> = EXECUTORS.iter().map(ExecutorEntry::usage).collect();
             return Err(UnknownExecutor::Name {
                 name: name.to_owned(),
                 known: known.join(", "),
@@ -245,7 +248,7 @@ impl FromStr for ExecutorSpec {
     }
 }
 
-impl Registered {
+impl ExecutorEntry {
     /// Returns its syntax in specifications: `guarded`, `fixed:X`, `live[:X]`.
     pub fn usage(&self) -> String {
         match self.argument {
@@ -268,7 +271,7 @@ impl Registered {
 fn without_plan() -> Decided {
     Decided {
         decision: Decision::Replan,
-        reason: Reason::new(Cause::PlanDone).about(About::NoPlan),
+        reason: Reason::new(Cause::PlanDone).about(Subject::NoPlan),
     }
 }
 
@@ -277,7 +280,7 @@ mod tests {
     use super::{EXECUTORS, ExecutorSpec};
 
     #[test]
-    fn names_are_read_as_they_are_written() {
+    fn executor_names_round_trip() {
         for text in [
             "fixed:0",
             "fixed:30",
@@ -301,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_name_is_told_the_right_ones() {
+    fn unknown_name_error_lists_known_names() {
         let error = "gaurded".parse::<ExecutorSpec>().unwrap_err().to_string();
         for known in EXECUTORS {
             assert!(error.contains(&known.usage()), "{error}");

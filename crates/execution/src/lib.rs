@@ -7,7 +7,7 @@
 //!
 //! - [`Executor`]: a dispatch policy. [`executors::EXECUTORS`] lists them all.
 //! - [`run::Run`]: the execution loop: decide, wait, take in observations, replan.
-//! - [`Progression`]: the believed state, progressed through time and observations.
+//! - [`BeliefState`]: the believed state, progressed through time and observations.
 //! - [`Recorder`]: records a run.
 //!
 //! External services are ports, that is, traits of this crate: [`World`] (a simulation, a robot),
@@ -26,38 +26,46 @@
 //! # Ok::<(), elbowroom_execution::executors::UnknownExecutor>(())
 //! ```
 
+mod action_values;
+mod belief_state;
 mod dispatch;
+mod dispatchable_cache;
 mod event;
 mod executor;
 pub mod executors;
-mod forms;
-mod horizon;
-mod odds;
-mod outlook;
+mod measured_amounts;
+mod plan_comparison;
 mod planning;
 mod preparation;
-mod progression;
-mod quantities;
 mod reason;
 mod record;
-mod rehearsal;
 mod request;
+mod rollout;
 pub mod run;
 mod separation;
+mod window_propagation;
 mod world;
 
-pub use event::{Command, Ending, Event, GoalTerms, Measured, Observation, Request, Ticket};
-pub use executor::{
-    Decided, Decision, Executor, Mission, Moment, Need, News, Order, Planned, StepId,
+pub use action_values::{ActionValues, DecisionState, Move, RankedMoves};
+pub use belief_state::{
+    BeliefState, BeliefStateParts, Doubt, EvaluationError, Guards, RunningActionParts,
+    RunningActionState,
 };
-pub use forms::Forms;
-pub use odds::{Compared, Odds, Remainder};
-pub use outlook::{Move, Outlook, Standing, Weighed};
+pub use dispatchable_cache::DispatchableCache;
+pub use event::{ActionHandle, Command, Ending, Event, GoalTerms, Measured, Observation, Request};
+pub use executor::{
+    Decided, Decision, DecisionContext, Executor, Order, PlanEvent, PlanForm, Planned,
+    PreparedPlan, StepId,
+};
+pub use plan_comparison::{PlanComparator, RemainingPlan, SuccessRates};
 pub use planning::{Lateness, NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner, Shortfall};
-pub use preparation::{PrepareError, Prepared, Preparer, Region, Wanted};
-pub use progression::{Doubt, Guards, Parts, Progression, Underway, UnderwayParts, Unreadable};
-pub use reason::{About, Behind, Cause, Changed, Promise, Reason};
+pub use preparation::{
+    PreparationRequest, PreparationResult, PrepareError, Preparer, RegionOracle,
+};
+pub use reason::{Cause, Evidence, GuaranteeLevel, Reason, Subject, TimedChange};
 pub use record::{Entry, GoalChange, NoRecord, Recorder, WarningCause};
-pub use rehearsal::{Rehearsal, Rehearsed, Rehearsing, Scene, SeenChange, Tells};
 pub use request::{Answer, PlanRequest, PortWorkers, PrepareRequest, RequestId, Urgency, Workers};
-pub use world::{Passage, World, WorldError};
+pub use rollout::{
+    DecisionPoint, Informativeness, ObservedChange, RolloutChoice, RolloutEvaluator, RolloutResult,
+};
+pub use world::{TimeAdvance, World, WorldError};

@@ -106,7 +106,7 @@ pub struct Planned {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Shortfall {
     /// The deadlines that cannot be met, or for which no plan was found.
-    pub late: Vec<Lateness>,
+    pub missed_deadlines: Vec<Lateness>,
     /// Conjuncts of the goal that exclude each other, as a certificate proves. None of them is
     /// known to be redundant.
     pub conflict: Vec<String>,
@@ -116,11 +116,11 @@ pub struct Shortfall {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lateness {
     /// Index of the deadline in [`Task::deadlines`].
-    pub place: usize,
+    pub deadline_index: usize,
     /// The time at which the earliest plan found without deadlines reaches the goal.
-    pub reached: Option<Rational>,
+    pub achieved_at: Option<Rational>,
     /// A time before which no plan reaches the goal, as a certificate proves.
-    pub least: Option<Rational>,
+    pub proven_lower_bound: Option<Rational>,
 }
 
 impl Lateness {
@@ -128,7 +128,7 @@ impl Lateness {
     pub fn in_words(&self, deadline: &Rational) -> Option<String> {
         let by = |time: &Rational| (time - deadline).to_decimal(3);
         let at = |time: &Rational| time.to_decimal(3);
-        match (&self.reached, &self.least) {
+        match (&self.achieved_at, &self.proven_lower_bound) {
             (Some(reached), Some(least)) if reached == least => Some(format!(
                 "{} s late: it cannot be reached before {}",
                 by(reached),
@@ -190,7 +190,7 @@ pub enum PlanAnswer {
 
 impl PlanAnswer {
     /// Returns the reason for which there is no plan, in words.
-    pub fn why_not(&self) -> Option<&str> {
+    pub fn failure_reason(&self) -> Option<&str> {
         match self {
             Self::Plan(_) => None,
             Self::Unsolvable => Some("no plan reaches the goal from here"),

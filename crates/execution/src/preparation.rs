@@ -15,13 +15,13 @@ use elbowroom_plan::{
     Valuation,
 };
 
-use crate::event::Ticket;
-use crate::executor::{Mission, Need, StepId};
-use crate::forms::Forms;
+use crate::dispatchable_cache::DispatchableCache;
+use crate::event::ActionHandle;
+use crate::executor::{PlanForm, PreparedPlan, StepId};
 
 /// A plan prepared for execution.
 #[derive(Clone, Debug)]
-pub struct Prepared {
+pub struct PreparationResult {
     /// The deordered plan, with open parameters.
     pub plan: ParametrizedPlan,
     /// For each step of the given plan, its instance.
@@ -31,7 +31,7 @@ pub struct Prepared {
     /// The values for which it is guaranteed to work, if they were requested.
     pub envelope: Option<DecoupledEnvelope>,
     /// Cache of the dispatchable forms of the plan's networks.
-    pub forms: Forms,
+    pub forms: DispatchableCache,
     /// The partial order of its happenings, if it was requested ([`Need::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
 }
@@ -55,7 +55,7 @@ pub enum PrepareError {
     NoGuarantee,
     /// The analysis cannot decide about this plan: the reason.
     #[error("{0}")]
-    Beyond(String),
+    Unsupported(String),
 }
 
 /// Prepares plans for execution.
@@ -68,14 +68,14 @@ pub trait Preparer: Send {
         &mut self,
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
-        need: Need,
-    ) -> Result<Prepared, PrepareError>;
+        need: PlanForm,
+    ) -> Result<PreparationResult, PrepareError>;
 
     /// Begins to prepare a plan in the background, and replaces any preparation begun before.
     /// Returns `false` if the preparer cannot do that. When the plan is prepared, the driver of the
     /// run reports [`Event::PlanReady`](crate::Event::PlanReady), and the run
     /// [collects](Preparer::collect) it.
-    fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {
+    fn begin(&mut self, _wanted: &PreparationRequest<'_>) -> bool {
         false
     }
 
@@ -84,8 +84,8 @@ pub trait Preparer: Send {
     ///
     /// # Errors
     /// If the plan does not work.
-    fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
-        wanted.mission(self)
+    fn collect(&mut self, wanted: &PreparationRequest<'_>) -> Result<PreparedPlan, PrepareError> {
+        wanted.prepare_now(self)
     }
 
     /// Cancels the preparation that was begun.
@@ -94,7 +94,7 @@ pub trait Preparer: Send {
 
 /// A plan to be prepared, with its initial situation.
 #[derive(Clone, Copy, Debug)]
-pub struct Wanted<'a> {
+pub struct PreparationRequest<'a> {
     /// The task, with the goals of the plan.
     pub task: &'a Task,
     /// The plan, on the world's clock.
@@ -102,25 +102,28 @@ pub struct Wanted<'a> {
     /// The initial situation of the plan.
     pub situation: &'a Situation,
     /// The tickets of the actions that are running there, in its order.
-    pub running: &'a [Ticket],
+    pub running: &'a [ActionHandle],
     /// The present time; the plan does not begin earlier.
     pub now: &'a Rational,
     /// The requested form.
-    pub need: Need,
+    pub need: PlanForm,
 }
 
-impl Wanted<'_> {
+impl PreparationRequest<'_> {
     /// Prepares the plan with this preparer, in the foreground.
     ///
     /// # Errors
     /// If the plan does not work.
-    pub fn mission<P: Preparer + ?Sized>(&self, preparer: &mut P) -> Result<Mission, PrepareError> {
-        let task = Arc::new(self.situation.rest_of_task(self.task));
+    pub fn prepare_now<P: Preparer + ?Sized>(
+        &self,
+        preparer: &mut P,
+    ) -> Result<PreparedPlan, PrepareError> {
+        let task = Arc::new(self.situation.remaining_task(self.task));
         // The running actions come first in it.
-        let plan = self.situation.rest_of_plan(self.plan);
+        let plan = self.situation.remaining_plan(self.plan);
         let ready = preparer.prepare(&task, &plan, self.need)?;
         let steps = ready.instances.iter().copied().map(StepId::from);
-        Ok(Mission {
+        Ok(PreparedPlan {
             running: steps.zip(self.running.iter().copied()).collect(),
             begun: BTreeMap::new(),
             task,
@@ -131,7 +134,7 @@ impl Wanted<'_> {
             instances: ready.instances,
             nominal: ready.nominal,
             envelope: ready.envelope,
-            forms: ready.forms,
+            dispatchable_cache: ready.forms,
             order: ready.order,
         })
     }
@@ -142,16 +145,16 @@ impl<P: Preparer + ?Sized> Preparer for &mut P {
         &mut self,
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
-        need: Need,
-    ) -> Result<Prepared, PrepareError> {
+        need: PlanForm,
+    ) -> Result<PreparationResult, PrepareError> {
         (**self).prepare(task, plan, need)
     }
 
-    fn begin(&mut self, wanted: &Wanted<'_>) -> bool {
+    fn begin(&mut self, wanted: &PreparationRequest<'_>) -> bool {
         (**self).begin(wanted)
     }
 
-    fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
+    fn collect(&mut self, wanted: &PreparationRequest<'_>) -> Result<PreparedPlan, PrepareError> {
         (**self).collect(wanted)
     }
 
@@ -161,10 +164,10 @@ impl<P: Preparer + ?Sized> Preparer for &mut P {
 }
 
 /// Decides for which parameter values a plan is guaranteed to work.
-pub trait Region: Send {
+pub trait RegionOracle: Send {
     /// Returns the reason for which the plan is not guaranteed to work for these values; `None` if
     /// it is.
-    fn objection(
+    fn find_violation(
         &mut self,
         task: &Arc<Task>,
         plan: &ParametrizedPlan,
@@ -183,7 +186,7 @@ pub trait Region: Send {
         plan: &ParametrizedPlan,
         values: &Valuation,
     ) -> Result<DecoupledEnvelope, String> {
-        match self.objection(task, plan, values) {
+        match self.find_violation(task, plan, values) {
             None => Ok(DecoupledEnvelope::point(values)),
             Some(why) => Err(why),
         }
@@ -211,12 +214,12 @@ pub trait Region: Send {
         let mut tried = values.clone();
         Box::new(move |value| {
             tried[parameter].clone_from(value);
-            self.objection(task, plan, &tried).is_none()
+            self.find_violation(task, plan, &tried).is_none()
         })
     }
 
     /// Returns a copy; `None` if it cannot be copied.
-    fn fork(&self) -> Option<Box<dyn Region>> {
+    fn fork(&self) -> Option<Box<dyn RegionOracle>> {
         None
     }
 }
@@ -226,16 +229,16 @@ impl<P: Preparer + ?Sized> Preparer for Box<P> {
         &mut self,
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
-        need: Need,
-    ) -> Result<Prepared, PrepareError> {
+        need: PlanForm,
+    ) -> Result<PreparationResult, PrepareError> {
         (**self).prepare(task, plan, need)
     }
 
-    fn begin(&mut self, wanted: &Wanted<'_>) -> bool {
+    fn begin(&mut self, wanted: &PreparationRequest<'_>) -> bool {
         (**self).begin(wanted)
     }
 
-    fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
+    fn collect(&mut self, wanted: &PreparationRequest<'_>) -> Result<PreparedPlan, PrepareError> {
         (**self).collect(wanted)
     }
 

@@ -1,14 +1,14 @@
 //! Reasons for the decisions of executors.
 
-mod about;
-mod behind;
+mod evidence;
+mod subject;
 
 use std::fmt;
 
 use elbowroom_num::{Interval, Rational};
 
-pub use about::About;
-pub use behind::{Behind, Changed};
+pub use evidence::{Evidence, TimedChange};
+pub use subject::Subject;
 
 /// The reason for a decision of an executor: the observation, the allowed values, the constraints
 /// and events that caused it, the amount of the violation, and the time since when it holds. Times
@@ -20,24 +20,24 @@ pub struct Reason {
     /// The action it is about.
     pub action: Option<String>,
     /// The quantity, condition, moment or state of affairs that it is about.
-    pub about: Option<About>,
+    pub about: Option<Subject>,
     /// The observed value: a duration, an amount, or the time of a happening.
     pub observed: Option<Rational>,
     /// The interval that is allowed.
     pub allowed: Option<Interval>,
     /// The constraints or events that caused it, the origin of the chain first.
-    pub behind: Vec<Behind>,
+    pub evidence: Vec<Evidence>,
     /// The amount of the violation.
     pub by: Option<Rational>,
     /// The time since when it holds.
     pub since: Option<Rational>,
     /// The promise for the remaining plan, if the executor makes promises.
-    pub promise: Option<Promise>,
+    pub guarantee: Option<GuaranteeLevel>,
 }
 
 /// Guarantee for the remaining plan, the strongest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Promise {
+pub enum GuaranteeLevel {
     /// The remaining plan works for all deviations within the envelope.
     Envelope,
     /// The remaining plan works for all deviations within a part of the envelope around the planned
@@ -50,7 +50,7 @@ pub enum Promise {
     Luck,
 }
 
-impl Promise {
+impl GuaranteeLevel {
     /// All of them, with their names in traces.
     pub const NAMES: &[(Self, &str)] = &[
         (Self::Envelope, "envelope"),
@@ -158,23 +158,23 @@ impl Reason {
             about: None,
             observed: None,
             allowed: None,
-            behind: Vec::new(),
+            evidence: Vec::new(),
             by: None,
             since: None,
-            promise: None,
+            guarantee: None,
         }
     }
 
     /// Sets the action.
     #[must_use]
-    pub fn of(mut self, action: &str) -> Self {
+    pub fn for_action(mut self, action: &str) -> Self {
         self.action = Some(action.to_owned());
         self
     }
 
     /// Sets the subject.
     #[must_use]
-    pub fn about(mut self, about: About) -> Self {
+    pub fn about(mut self, about: Subject) -> Self {
         self.about = Some(about);
         self
     }
@@ -189,12 +189,12 @@ impl Reason {
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.statement())?;
+        f.write_str(&self.text_without_numbers())?;
         if let Some(observed) = &self.observed {
             write!(f, "; observed {}", observed.to_decimal(3))?;
         }
         if let Some(allowed) = &self.allowed {
-            write!(f, ", allowed {}", short(allowed))?;
+            write!(f, ", allowed {}", format_interval(allowed))?;
         }
         if let Some(by) = &self.by {
             let digits = by.to_decimal(3);
@@ -210,7 +210,7 @@ impl fmt::Display for Reason {
         }
         // The subject of the reason is not repeated as its explanation.
         let about = self.about.as_ref().map(ToString::to_string);
-        let behind = self.behind.iter().map(ToString::to_string);
+        let behind = self.evidence.iter().map(ToString::to_string);
         let behind: Vec<String> = behind.filter(|it| about.as_ref() != Some(it)).collect();
         if !behind.is_empty() {
             write!(f, " (behind it: {})", behind.join("; "))?;
@@ -221,7 +221,7 @@ impl fmt::Display for Reason {
 
 impl Reason {
     /// Returns the text without numbers.
-    fn statement(&self) -> String {
+    fn text_without_numbers(&self) -> String {
         let action = self.action.as_deref().unwrap_or("the plan");
         let known = self.about.as_ref().map(ToString::to_string);
         let about = known.as_deref().unwrap_or("something");
@@ -273,7 +273,7 @@ impl Reason {
 }
 
 /// Formats an interval with three digits.
-fn short(interval: &Interval) -> String {
+fn format_interval(interval: &Interval) -> String {
     let end = |value: Option<&Rational>, infinity: &str| match value {
         Some(value) => value.to_decimal(3),
         None => infinity.to_owned(),
@@ -289,32 +289,32 @@ fn short(interval: &Interval) -> String {
 mod tests {
     use elbowroom_num::{Interval, Rational};
 
-    use super::{About, Cause, Reason};
+    use super::{Cause, Reason, Subject};
 
-    fn missed(about: About, by: Rational) -> String {
+    fn missed_by(about: Subject, by: Rational) -> String {
         let reason = Reason {
             observed: Some(Rational::ZERO),
             allowed: Some(Interval::closed(Rational::ZERO, Rational::ONE)),
             by: Some(by),
             ..Reason::new(Cause::OutsideInterval)
-                .of("(mill b m1)")
+                .for_action("(mill b m1)")
                 .about(about)
         };
         reason.to_string()
     }
 
     #[test]
-    fn what_was_left_of_a_duration_is_a_quantity_in_a_sentence() {
+    fn remaining_duration_is_named_in_sentence() {
         assert_eq!(
-            missed(About::RestOfDuration, Rational::ONE),
+            missed_by(Subject::RemainingDuration, Rational::ONE),
             "the remaining duration of (mill b m1) is not in its interval; observed 0, allowed \
              [0, 1], missed by 1"
         );
     }
 
     #[test]
-    fn what_is_missed_by_little_is_not_missed_by_nothing() {
-        let said = missed(About::Duration, Rational::new(1, 10_000));
+    fn small_delay_is_not_rounded_to_zero() {
+        let said = missed_by(Subject::Duration, Rational::new(1, 10_000));
         assert!(said.ends_with("missed by less than 0.001"), "{said}");
     }
 }

@@ -3,11 +3,11 @@
 use elbowroom_model::{Situation, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use crate::event::{Command, Observation, Ticket};
-use crate::executor::{Decided, Mission, Planned};
+use crate::event::{ActionHandle, Command, Observation};
+use crate::executor::{Decided, Planned, PreparedPlan};
 use crate::planning::Shortfall;
 use crate::reason::Reason;
-use crate::run::{Report, Stand, Verdict};
+use crate::run::{Report, RunSnapshot, Verdict};
 
 /// A change of a goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +51,7 @@ pub trait Recorder: Send {
     /// Offers to rotate the record. It is called when an executive adopts a plan, before that is
     /// recorded, and while it is idle with no running action. The run can then be resumed from
     /// `stand` alone, without the earlier record. Returns `true` if the recorder has rotated.
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         let _ = stand;
         false
     }
@@ -66,7 +66,7 @@ impl<R: Recorder + ?Sized> Recorder for &mut R {
         (**self).commit();
     }
 
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         (**self).begin_anew(stand)
     }
 }
@@ -80,7 +80,7 @@ impl<R: Recorder + ?Sized> Recorder for Box<R> {
         (**self).commit();
     }
 
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         (**self).begin_anew(stand)
     }
 }
@@ -97,7 +97,7 @@ impl Recorder for NoRecord {
 #[derive(Clone, Copy, Debug)]
 pub enum Entry<'a> {
     /// A plan is adopted; its times are relative to [`Mission::origin`].
-    Mission(&'a Mission),
+    PlanAdopted(&'a PreparedPlan),
     /// A decision of the executor.
     Decided {
         /// The time.
@@ -176,7 +176,7 @@ pub enum Entry<'a> {
         /// The time.
         now: &'a Rational,
         /// The ticket of its start.
-        ticket: Ticket,
+        ticket: ActionHandle,
         /// Its name.
         action: &'a str,
         /// The time at which a new plan is needed, or at which the action times out, unless it ends

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use crate::event::{Event, Ticket};
-use crate::executor::{Mission, Need};
+use crate::event::{ActionHandle, Event};
+use crate::executor::{PlanForm, PreparedPlan};
 use crate::planning::{Planned, Planner};
-use crate::preparation::{PrepareError, Preparer, Wanted};
-use crate::world::{Passage, World, WorldError};
+use crate::preparation::{PreparationRequest, PrepareError, Preparer};
+use crate::world::{TimeAdvance, World, WorldError};
 
 /// Identifies a request within its run. Later requests have greater identifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -24,7 +24,7 @@ pub enum Urgency {
     Background,
     /// The run expects to make the same request later, and ignores answers to this one. A worker
     /// that plans in the background can begin now.
-    Foreseen,
+    Anticipated,
 }
 
 /// Request for a plan. Two requests are equal if their identifiers are.
@@ -58,19 +58,19 @@ pub struct PrepareRequest {
     /// The initial situation of the plan.
     pub situation: Situation,
     /// The tickets of the actions that are running there, in its order.
-    pub running: Vec<Ticket>,
+    pub running: Vec<ActionHandle>,
     /// The present time. The plan begins no earlier.
     pub now: Rational,
     /// The form that the executor needs.
-    pub need: Need,
+    pub need: PlanForm,
     /// When the answer is needed: [`Urgency::Awaited`] or [`Urgency::Background`].
     pub urgency: Urgency,
 }
 
 impl PrepareRequest {
     /// Borrows the parameters of the preparation.
-    pub fn wanted(&self) -> Wanted<'_> {
-        Wanted {
+    pub fn preparation_request(&self) -> PreparationRequest<'_> {
+        PreparationRequest {
             task: &self.task,
             plan: &self.plan,
             situation: &self.situation,
@@ -93,7 +93,7 @@ pub enum Answer {
     /// To a [`PlanRequest`].
     Planned(RequestId, Planned),
     /// To a [`PrepareRequest`].
-    Prepared(RequestId, Result<Mission, PrepareError>),
+    Prepared(RequestId, Result<PreparedPlan, PrepareError>),
 }
 
 /// Answers the requests of a run: at once, or later, while the run continues.
@@ -104,7 +104,7 @@ pub trait Workers: Send {
 
     /// Returns the answer, or `None` if it is among the later [answers](Workers::answers). An awaited request is
     /// answered at once.
-    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<Mission, PrepareError>>;
+    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<PreparedPlan, PrepareError>>;
 
     /// Abandons a background request. Its answer is not needed any more.
     fn abandon(&mut self, _id: RequestId) {}
@@ -113,7 +113,7 @@ pub trait Workers: Send {
     ///
     /// # Errors
     /// When the world fails.
-    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<TimeAdvance, WorldError> {
         world.wait(until)
     }
 
@@ -128,7 +128,7 @@ impl<W: Workers + ?Sized> Workers for &mut W {
         (**self).plan(request)
     }
 
-    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<Mission, PrepareError>> {
+    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<PreparedPlan, PrepareError>> {
         (**self).prepare(request)
     }
 
@@ -136,7 +136,7 @@ impl<W: Workers + ?Sized> Workers for &mut W {
         (**self).abandon(id);
     }
 
-    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<TimeAdvance, WorldError> {
         (**self).wait(world, until)
     }
 
@@ -150,7 +150,7 @@ impl<W: Workers + ?Sized> Workers for Box<W> {
         (**self).plan(request)
     }
 
-    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<Mission, PrepareError>> {
+    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<PreparedPlan, PrepareError>> {
         (**self).prepare(request)
     }
 
@@ -158,7 +158,7 @@ impl<W: Workers + ?Sized> Workers for Box<W> {
         (**self).abandon(id);
     }
 
-    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<TimeAdvance, WorldError> {
         (**self).wait(world, until)
     }
 
@@ -199,7 +199,7 @@ impl<'a> PortWorkers<'a> {
                 Answer::Planned(it.id, made)
             })),
             Event::PlanReady => self.answers.extend(self.preparing.take().map(|it| {
-                let ready = self.preparer.collect(&it.wanted());
+                let ready = self.preparer.collect(&it.preparation_request());
                 Answer::Prepared(it.id, ready)
             })),
             _ => {}
@@ -219,22 +219,24 @@ impl Workers for PortWorkers<'_> {
                 None
             }
             Urgency::Background => Some(self.planner.collect(task, situation)),
-            Urgency::Foreseen => {
+            Urgency::Anticipated => {
                 self.planner.expect(task, situation);
                 None
             }
         }
     }
 
-    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<Mission, PrepareError>> {
-        let wanted = request.wanted();
+    fn prepare(&mut self, request: &PrepareRequest) -> Option<Result<PreparedPlan, PrepareError>> {
+        let wanted = request.preparation_request();
         match request.urgency {
             Urgency::Background if self.preparer.begin(&wanted) => {
                 self.preparing = Some(request.clone());
                 None
             }
             Urgency::Background => Some(self.preparer.collect(&wanted)),
-            Urgency::Awaited | Urgency::Foreseen => Some(wanted.mission(&mut *self.preparer)),
+            Urgency::Awaited | Urgency::Anticipated => {
+                Some(wanted.prepare_now(&mut *self.preparer))
+            }
         }
     }
 
@@ -247,7 +249,7 @@ impl Workers for PortWorkers<'_> {
         }
     }
 
-    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, world: &mut dyn World, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let mut passage = world.wait(until)?;
         passage.observations.retain(|it| {
             self.collect(&it.event);

@@ -19,7 +19,7 @@
 //! | a success after a cancellation | the success counts: the action ended before the cancellation |
 //! | a report with a time in the future, or before the action's start | its time is replaced by the nearest possible one |
 //! | a late report | its own time counts for durations, its arrival for the state |
-//! | repeated refusals, and nothing else | background plans are requested at growing intervals ([`Refusals`]) |
+//! | repeated refusals, and nothing else | background plans are requested at growing intervals ([`RefusalBackoff`]) |
 //! | feedback | if the completion has grown, the time-out counts from then on |
 //! | a report that cannot be read, or names an object that the problem does not have | recorded and ignored |
 //! | endless answers while the clock stands still or hardly advances | the world is broken ([`Verdict::WorldFailed`]) |
@@ -75,36 +75,36 @@
 //! initial that affects the goal has happened, and the world has had the chance to look
 //! ([`World::look`]).
 
-mod account;
-mod agenda;
-mod amid;
-mod beginning;
-mod better;
-mod carrying_on;
-mod choosing;
+mod abandoned_plan;
+mod action_log;
+mod anticipated_replan;
+mod background_search;
+mod better_plan;
+mod clock_watchdog;
 mod dead_end;
 mod doubts;
-mod drive;
-mod expectation;
-mod farewell;
-mod foresight;
+mod goal_selection;
 mod goals;
-mod handover;
-pub mod here;
-mod intake;
-mod lasting;
-mod oblivion;
+mod history_pruning;
+mod mid_execution;
+mod observations;
 mod pending;
-mod progress;
-mod refusals;
-mod room;
-mod search;
+mod persistent;
+mod plan_start;
+mod prediction;
+mod refusal_backoff;
+mod replanning;
 mod selection;
 mod settings;
 mod shortfall;
-mod stand;
+mod shutdown;
+pub mod situation;
+mod slack_monitor;
+mod snapshot;
+mod start_dependencies;
+mod step;
 mod timeout;
-mod waits;
+mod work_queue;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -112,34 +112,34 @@ use std::sync::Arc;
 use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 
-pub use account::{Account, ExecutedStep, KnownStart};
-pub use amid::{Amid, Beginning};
-pub use drive::{Next, NotAsked};
-pub use farewell::FAREWELL;
-pub use intake::is_correction;
-pub use lasting::{FIRST_GOAL, GoalReader};
-pub use refusals::Refusals;
+pub use action_log::{ActionLog, ExecutedStep, KnownStart};
+pub use mid_execution::{EntryPoint, MidExecutionStart};
+pub use observations::is_correction;
+pub use persistent::{GoalReader, PROBLEM_GOAL_NAME};
+pub use refusal_backoff::RefusalBackoff;
 pub use settings::{
     MissingPlan, PlanningTime, Report, RunSettings, RunningRule, UnknownSetting, Verdict,
 };
-pub use stand::{Doing, GivenGoal, Goals, Stand, TakesUp};
+pub use shutdown::SHUTDOWN_GRACE;
+pub use snapshot::{GivenGoal, Goals, PlanAdoption, RunPhase, RunSnapshot};
+pub use step::{Next, UnexpectedAnswer};
 pub use timeout::TimeoutRule;
 
-use crate::event::{Command, Ticket};
-use crate::executor::{Decided, Decision, Executor, Moment, News, Order, Planned};
-use crate::progression::{Outlook, Progression};
-use crate::reason::{About, Cause, Reason};
+use crate::belief_state::{BeliefState, GoalStatus};
+use crate::event::{ActionHandle, Command};
+use crate::executor::{Decided, Decision, DecisionContext, Executor, Order, PlanEvent, Planned};
+use crate::reason::{Cause, Reason, Subject};
 use crate::record::{Entry, Recorder};
 use crate::request::Workers;
 use crate::world::{World, WorldError};
-use agenda::Todo;
-use dead_end::Happened;
-use farewell::Closing;
-use foresight::Foreseen;
-use lasting::Lasting;
-use pending::Pending;
-use progress::Progress;
-use search::{Lost, Search};
+use anticipated_replan::AnticipatedReplan;
+use background_search::{BackgroundSearch, SearchResults};
+use clock_watchdog::ClockWatchdog;
+use dead_end::BelievedEvent;
+use pending::AwaitedAnswer;
+use persistent::GoalManager;
+use shutdown::Shutdown;
+use work_queue::PendingStep;
 
 /// Work units ([`elbowroom_num::work`]) of a decision, and of each step of the plan in it.
 const DECISION_WORK: u64 = 10_000;
@@ -159,63 +159,63 @@ pub struct Run<'a> {
     ports: Ports<'a>,
     settings: RunSettings,
     now: Rational,
-    progress: Progress,
-    belief: Progression,
+    clock_watchdog: ClockWatchdog,
+    belief: BeliefState,
     /// The starts, and their outcomes.
-    account: Account,
+    action_log: ActionLog,
     /// Number of steps of the present plan.
     steps: usize,
-    news: Vec<News>,
+    plan_events: Vec<PlanEvent>,
     replans: usize,
     reasons: Vec<Reason>,
     /// The expected planning time.
-    allowance: Rational,
+    expected_planning_time: Rational,
     /// The task with its goals, the situation and the guess of the last awaited request whose
     /// answer was a plan.
-    planned_for: Option<(Arc<Task>, Situation, here::Guess)>,
+    planned_for: Option<(Arc<Task>, Situation, situation::OverrunEstimate)>,
     /// All believed observations, in order.
-    history: Vec<Happened>,
+    history: Vec<BelievedEvent>,
     /// Returns `true` if the run is to end.
-    is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
+    stop_check: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
     /// The situation of the next plan if a late action does not end, as reported to the planner.
-    foreseen: Option<Foreseen>,
+    anticipated_replan: Option<AnticipatedReplan>,
     /// The belief before the first event of the history.
-    beginning: Progression,
+    initial_belief: BeliefState,
     /// Receives the belief whenever reports were processed.
-    listener: Box<dyn FnMut(&Progression) + Send + 'a>,
+    listener: Box<dyn FnMut(&BeliefState) + Send + 'a>,
     /// State of an executive, or of an attended run.
-    lasting: Option<Lasting<'a>>,
+    goal_manager: Option<GoalManager<'a>>,
     /// The tasks before the next decision; the last one is next.
-    agenda: Vec<Todo>,
+    work_queue: Vec<PendingStep>,
     /// The open question to the driver.
-    asked: Option<Next>,
+    open_request: Option<Next>,
     /// Requests for the driver without an awaited answer.
     outbox: VecDeque<Next>,
     /// Number of requests for plans and prepared plans so far.
     requests: u64,
     /// Continuation of the run when the awaited answer arrives.
-    pending: Option<Pending>,
+    pending: Option<AwaitedAnswer>,
     /// The background search for a plan.
-    search: Option<Search>,
+    search: Option<BackgroundSearch>,
     /// The task with the goals of the present plan, with background planning.
     plan_task: Option<Arc<Task>>,
     /// Results of earlier background searches.
-    lost: Lost,
+    search_results: SearchResults,
     /// Actions refused by the world since the last other event.
-    refusals: Refusals,
+    refusal_backoff: RefusalBackoff,
     /// The end of the run, while running actions are being cancelled.
-    closing: Option<Closing>,
+    shutdown: Option<Shutdown>,
     /// The report, once the run is over.
     report: Option<Report>,
     /// Number of times that the run continues after it was over.
-    reopenings: usize,
+    restarts_left: usize,
 }
 
 /// Reason to stop following the plan.
 enum Stop {
-    Over(Verdict),
-    World(WorldError),
+    Ended(Verdict),
+    WorldFailed(WorldError),
 }
 
 /// Executes a plan in a world. Without a plan, makes one first.
@@ -230,7 +230,7 @@ pub fn run(
     workers: &mut dyn Workers,
     world: &mut dyn World,
 ) -> Report {
-    Run::new(task, first.cloned(), settings.clone(), ports).go(world, workers)
+    Run::new(task, first.cloned(), settings.clone(), ports).run_to_end(world, workers)
 }
 
 impl<'a> Run<'a> {
@@ -245,40 +245,40 @@ impl<'a> Run<'a> {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             PlanningTime::Measured => Rational::ZERO,
         };
-        let belief = Progression::new(Arc::clone(&task));
+        let belief = BeliefState::new(Arc::clone(&task));
         Self {
-            beginning: belief.clone(),
+            initial_belief: belief.clone(),
             listener: Box::new(|_| {}),
-            lasting: None,
-            foreseen: None,
+            goal_manager: None,
+            anticipated_replan: None,
             belief,
-            account: Account::default(),
+            action_log: ActionLog::default(),
             steps: 0,
             task,
             ports,
             settings,
             now: Rational::ZERO,
-            progress: Progress::default(),
-            news: Vec::new(),
+            clock_watchdog: ClockWatchdog::default(),
+            plan_events: Vec::new(),
             replans: 0,
             reasons: Vec::new(),
-            allowance,
+            expected_planning_time: allowance,
             planned_for: None,
             history: Vec::new(),
-            is_to_end: Box::new(|| false),
+            stop_check: Box::new(|| false),
             is_explaining: false,
-            agenda: vec![Todo::Begin(first)],
-            asked: None,
+            work_queue: vec![PendingStep::Begin(first)],
+            open_request: None,
             outbox: VecDeque::new(),
             requests: 0,
             pending: None,
             search: None,
             plan_task: None,
-            lost: Lost::default(),
-            refusals: Refusals::default(),
-            closing: None,
+            search_results: SearchResults::default(),
+            refusal_backoff: RefusalBackoff::default(),
+            shutdown: None,
             report: None,
-            reopenings: 0,
+            restarts_left: 0,
         }
     }
 
@@ -286,8 +286,8 @@ impl<'a> Run<'a> {
     /// the report is complete. It is called before each decision, and after each answer of the
     /// world and of the planner.
     #[must_use]
-    pub fn ending_when(mut self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
-        self.is_to_end = Box::new(is_to_end);
+    pub fn with_stop_check(mut self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
+        self.stop_check = Box::new(is_to_end);
         self
     }
 
@@ -295,7 +295,7 @@ impl<'a> Run<'a> {
     /// never become true again, and since when ([`Report::dead_end`]). That takes several
     /// groundings by reachability, each about as long as the embedded planner's.
     #[must_use]
-    pub fn explaining(mut self) -> Self {
+    pub fn with_explanations(mut self) -> Self {
         self.is_explaining = true;
         self
     }
@@ -303,7 +303,7 @@ impl<'a> Run<'a> {
     /// Passes the belief to `listener`, at the beginning and whenever reports of the world were
     /// processed. Decisions wait for the listener.
     #[must_use]
-    pub fn told_to(mut self, mut listener: impl FnMut(&Progression) + Send + 'a) -> Self {
+    pub fn on_belief(mut self, mut listener: impl FnMut(&BeliefState) + Send + 'a) -> Self {
         listener(&self.belief);
         self.listener = Box::new(listener);
         self
@@ -311,11 +311,11 @@ impl<'a> Run<'a> {
 
     fn decide(&mut self) -> Decided {
         work::spend(DECISION_WORK + STEP_WORK.saturating_mul(self.steps as u64));
-        let news = std::mem::take(&mut self.news);
+        let news = std::mem::take(&mut self.plan_events);
         let as_planned = self.belief_of_the_plan();
-        let decided = self.ports.executor.decide(&Moment {
+        let decided = self.ports.executor.decide(&DecisionContext {
             now: &self.now,
-            news: &news,
+            plan_events: &news,
             belief: as_planned.as_ref().unwrap_or(&self.belief),
         });
         self.ports.recorder.record(&Entry::Decided {
@@ -326,11 +326,11 @@ impl<'a> Run<'a> {
     }
 
     /// Makes a decision, and adds its consequences to the agenda.
-    fn decide_and_follow(&mut self) -> Result<(), Stop> {
-        self.heed()?;
+    fn decide_and_enqueue(&mut self) -> Result<(), Stop> {
+        self.check_stop_request()?;
         self.close_momentary_goals();
         self.close_achieved_goals();
-        if self.tend_search()? || self.attend()? {
+        if self.poll_planner()? || self.handle_requests()? {
             return Ok(());
         }
         let decided = self.decide();
@@ -339,34 +339,34 @@ impl<'a> Run<'a> {
             decision => *decision == Decision::GoalReached,
         };
         if is_hindered {
-            self.give_up_optional_search();
+            self.cancel_optional_search();
         }
         match decided.decision {
             // The plan that is being prepared could not continue these actions.
-            Decision::Start(orders) if !self.may_start(&orders) => self.let_go_of_plan(),
+            Decision::Start(orders) if !self.may_start(&orders) => self.abandon_plan(),
             Decision::Start(orders) => {
                 // Immediate starts are reported at once, and must be known before the next
                 // decision.
-                self.agenda.push(Todo::Pass(self.now.clone()));
+                self.work_queue.push(PendingStep::Wait(self.now.clone()));
                 self.start(orders);
             }
             Decision::Cancel(steps) => {
                 let tickets = steps.iter();
-                let tickets = tickets.filter_map(|step| self.account.ticket(*step));
+                let tickets = tickets.filter_map(|step| self.action_log.ticket(*step));
                 self.cancel(tickets.collect());
             }
             Decision::Wait { .. } if self.seek_better_plan() => {}
             Decision::Wait { until } => self.wait(until)?,
             Decision::Replan => {
-                self.give_up_search();
+                self.cancel_search();
                 self.note_abandoned(&decided.reason);
                 self.replan(&decided.reason)?;
             }
             // The plan has reached its goals, and another one is being made.
-            Decision::GoalReached if self.search.is_some() => self.let_go_of_plan(),
-            Decision::GoalReached => match self.belief.outlook() {
-                Outlook::Awaited(time) => self.wait(Some(self.moment_until(time)))?,
-                Outlook::Reached | Outlook::Unmet => self.goal_reached(),
+            Decision::GoalReached if self.search.is_some() => self.abandon_plan(),
+            Decision::GoalReached => match self.belief.goal_status() {
+                GoalStatus::Awaited(time) => self.wait(Some(self.next_goal_timed_initial(time)))?,
+                GoalStatus::Reached | GoalStatus::Unmet => self.request_goal_look(),
             },
         }
         Ok(())
@@ -376,7 +376,7 @@ impl<'a> Run<'a> {
     fn start(&mut self, orders: Vec<Order>) {
         let mut commands = Vec::with_capacity(orders.len());
         for order in orders {
-            let ticket = self.account.open(&order, &self.now);
+            let ticket = self.action_log.open(&order, &self.now);
             let planned = order.duration.clone().unwrap_or_default();
             let timeout = self.settings.timeout.of(&order.action.name, &planned);
             let command = Command::Start {
@@ -397,7 +397,7 @@ impl<'a> Run<'a> {
 
     /// Records the cancellation of actions. The world receives the commands before anything else is
     /// done.
-    pub(crate) fn cancel(&mut self, tickets: Vec<Ticket>) {
+    pub(crate) fn cancel(&mut self, tickets: Vec<ActionHandle>) {
         let mut commands = Vec::with_capacity(tickets.len());
         for ticket in tickets {
             let command = Command::Cancel { ticket };
@@ -407,7 +407,7 @@ impl<'a> Run<'a> {
                 planned: &Planned::default(),
                 timeout: None,
             });
-            self.account.note_cancel(ticket, &self.now);
+            self.action_log.note_cancel(ticket, &self.now);
             commands.push(command);
         }
         self.send(commands);
@@ -416,55 +416,55 @@ impl<'a> Run<'a> {
     /// Sends recorded commands to the world.
     fn send(&mut self, commands: Vec<Command>) {
         self.ports.recorder.commit();
-        self.agenda
-            .extend(commands.into_iter().rev().map(Todo::Send));
+        self.work_queue
+            .extend(commands.into_iter().rev().map(PendingStep::Send));
     }
 
     /// Waits until the executor's next decision time, or until a warning or a time-out is due.
     fn wait(&mut self, until: Option<Rational>) -> Result<(), Stop> {
         let timeout = self.next_timeout();
         // More reports on the present moment may arrive; if none do, a condition has failed.
-        let breaking = self.belief.is_breaking();
+        let breaking = self.belief.is_over_all_failing();
         let breaking = breaking.then(|| &self.now + self.task.epsilon());
-        let warning = self.warn();
-        let doubt = self.tend_foresight();
+        let warning = self.warn_of_late_actions();
+        let doubt = self.update_forecast();
         let until = until.into_iter().chain(timeout).chain(breaking);
-        let taking_over = self.next_of_search();
+        let taking_over = self.next_search_decision();
         let until = until.chain(warning).chain(doubt).chain(taking_over).min();
         let Some(until) = until.map(|until| until.max(self.now.clone())) else {
             // Nothing is running, nothing is due, and the plan is not done.
-            return self.replan(&Reason::new(Cause::Late).about(About::Nothing));
+            return self.replan(&Reason::new(Cause::Late).about(Subject::Nothing));
         };
-        self.agenda.push(Todo::CheckTimeouts);
-        self.agenda.push(Todo::Pass(until));
+        self.work_queue.push(PendingStep::CheckTimeouts);
+        self.work_queue.push(PendingStep::Wait(until));
         Ok(())
     }
 
     /// Requests a look at the goal, which the executor considers reached. The world's answer
     /// decides.
-    fn goal_reached(&mut self) {
+    fn request_goal_look(&mut self) {
         let task = self.belief.task();
         let mut footprint = Footprint::of_condition(task, task.goal());
-        self.asked = Some(Next::Look {
+        self.open_request = Some(Next::Look {
             facts: std::mem::take(&mut footprint.reads).into_iter().collect(),
             fluents: footprint.reads_fluents.into_iter().collect(),
         });
     }
 
     fn is_goal_certain(&self) -> bool {
-        self.needs_no_plan() == Some(Outlook::Reached)
+        self.goal_status_without_plan() == Some(GoalStatus::Reached)
     }
 
     /// Returns the outlook if the goal holds, or will hold, without further actions.
-    fn needs_no_plan(&self) -> Option<Outlook> {
-        let is_idle = self.account.open_tickets().next().is_none();
-        let outlook = is_idle.then(|| self.belief.outlook());
-        outlook.filter(|outlook| *outlook != Outlook::Unmet)
+    fn goal_status_without_plan(&self) -> Option<GoalStatus> {
+        let is_idle = self.action_log.open_tickets().next().is_none();
+        let outlook = is_idle.then(|| self.belief.goal_status());
+        outlook.filter(|outlook| *outlook != GoalStatus::Unmet)
     }
 
     /// Returns the next time at which timed initials may achieve a goal. If all goals must stay
     /// true, that is `time`; a goal with a deadline may already be achieved for a moment before.
-    fn moment_until(&self, time: Rational) -> Rational {
+    fn next_goal_timed_initial(&self, time: Rational) -> Rational {
         let next = self.belief.next_timed().cloned();
         let next = next.filter(|_| self.next_deadline_of_a_goal().is_some());
         next.unwrap_or(time)
@@ -472,52 +472,54 @@ impl<'a> Run<'a> {
 
     /// If no plan is needed, accepts the goal as reached, or waits for the timed initials that it
     /// depends on and then checks again. Returns `false` if a plan is needed.
-    fn go_without_plan(&mut self, reason: &Reason) -> bool {
-        match self.needs_no_plan() {
-            None | Some(Outlook::Unmet) => return false,
-            Some(Outlook::Reached) => self.goal_reached(),
-            Some(Outlook::Awaited(time)) => {
-                let until = self.moment_until(time);
-                self.agenda.push(Todo::Replan(reason.clone()));
-                self.agenda.push(Todo::Pass(until));
+    fn finish_if_goal_holds(&mut self, reason: &Reason) -> bool {
+        match self.goal_status_without_plan() {
+            None | Some(GoalStatus::Unmet) => return false,
+            Some(GoalStatus::Reached) => self.request_goal_look(),
+            Some(GoalStatus::Awaited(time)) => {
+                let until = self.next_goal_timed_initial(time);
+                self.work_queue.push(PendingStep::Replan(reason.clone()));
+                self.work_queue.push(PendingStep::Wait(until));
             }
         }
-        self.news.clear();
+        self.plan_events.clear();
         true
     }
 
     /// Requests a plan from the present situation; see [`RunningRule`] for the running actions.
     fn replan(&mut self, reason: &Reason) -> Result<(), Stop> {
         // The deviation may have been the end of the last step.
-        if self.go_without_plan(reason) || self.has_patience(reason) {
+        if self.finish_if_goal_holds(reason) || self.wait_after_refusal(reason) {
             return Ok(());
         }
         if reason.cause != Cause::NewPlan {
             self.reasons.push(reason.clone());
             self.replans += 1;
-            if self.replans > self.settings.most_replans {
+            if self.replans > self.settings.max_replans {
                 self.replans -= 1;
                 let overdue = self.longer_than_planned();
-                if overdue.is_empty() || self.settings.most_replans == 0 {
-                    return self.carry_on_or_stop(Verdict::ReplanLimit);
+                if overdue.is_empty() || self.settings.max_replans == 0 {
+                    return self.continue_abandoned_plan_or_stop(Verdict::ReplanLimit);
                 }
                 // Their ends may achieve the goal.
                 self.reasons.pop();
-                self.agenda.push(Todo::Replan(reason.clone()));
+                self.work_queue.push(PendingStep::Replan(reason.clone()));
                 let doubts = self.belief.doubt_count();
-                self.agenda.push(Todo::Linger(overdue, doubts));
+                self.work_queue
+                    .push(PendingStep::WaitForActions(overdue, doubts));
                 return Ok(());
             }
         }
-        self.lost.plan = true;
-        self.agenda.push(Todo::Plan(reason.clone()));
-        if self.replans == self.settings.most_replans {
+        self.search_results.is_plan_infeasible = true;
+        self.work_queue.push(PendingStep::Plan(reason.clone()));
+        if self.replans == self.settings.max_replans {
             // The last permitted plan is not requested while overdue actions are running.
             let overdue = self.longer_than_planned();
             let doubts = self.belief.doubt_count();
-            self.agenda.push(Todo::Linger(overdue, doubts));
+            self.work_queue
+                .push(PendingStep::WaitForActions(overdue, doubts));
         }
-        self.settle();
+        self.settle_running_actions();
         Ok(())
     }
 }

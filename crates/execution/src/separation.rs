@@ -72,12 +72,17 @@ impl Separation {
     ) {
         self.note(Footprint::of_start(task, action), time);
         if let Some(duration) = duration {
-            self.expect(number, (task, action), time + duration);
+            self.expect_end(number, (task, action), time + duration);
         }
     }
 
     /// Records that a running action is expected to end at `end`.
-    pub(crate) fn expect(&mut self, number: u32, (task, action): (&Task, &Action), end: Rational) {
+    pub(crate) fn expect_end(
+        &mut self,
+        number: u32,
+        (task, action): (&Task, &Action),
+        end: Rational,
+    ) {
         let expected = Expected {
             time: end,
             successful: Footprint::of_end(task, action),
@@ -118,10 +123,12 @@ impl Separation {
         let recent = self.recent.iter();
         let recent = recent.filter(|(change, _)| change.interferes_with(&start));
         let recent = recent.map(|(_, separated)| separated.clone());
-        let soon = self.near(&start, now).filter(|time| time > now);
+        let soon = self
+            .separated_times_near(&start, now)
+            .filter(|time| time > now);
         let ends = duration.into_iter().flat_map(|duration| {
             let end = self.possible_end(task, action);
-            let times: Vec<Rational> = self.near(&end, &(now + duration)).collect();
+            let times: Vec<Rational> = self.separated_times_near(&end, &(now + duration)).collect();
             times.into_iter().map(move |time| time - duration)
         });
         recent.chain(soon).chain(ends).max()
@@ -129,7 +136,7 @@ impl Separation {
 
     /// Returns, for each interfering happening less than ε from `time`, the first time that is
     /// separated from it.
-    fn near<'s>(
+    fn separated_times_near<'s>(
         &'s self,
         footprint: &'s Footprint,
         time: &'s Rational,

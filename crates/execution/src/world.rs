@@ -31,7 +31,7 @@ pub trait World: Send {
     ///
     /// # Errors
     /// If the world is gone, or its answer cannot be read.
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError>;
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError>;
 
     /// Looks at facts and fluents, before the goal is accepted as reached. A world that cannot look
     /// returns no observations.
@@ -49,7 +49,7 @@ pub trait World: Send {
 
 /// Answer to a wait.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Passage {
+pub struct TimeAdvance {
     /// The present time.
     pub now: Rational,
     /// The observations since the last call, in the order of their reports.

@@ -9,7 +9,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
-use elbowroom::execution::run::FIRST_GOAL;
+use elbowroom::execution::run::PROBLEM_GOAL_NAME;
 use elbowroom::executive::documents::{GoalNow, NewGoal};
 use elbowroom_executive::{Executive, ExecutiveSettings};
 
@@ -49,7 +49,7 @@ fn first_run(journal: &Path) -> Result<(), Box<dyn Error>> {
     let executive = Executive::new(spec, settings)?;
     std::thread::scope(|scope| {
         scope.spawn(|| executive.run());
-        wait_for(&executive, FIRST_GOAL);
+        wait_for(&executive, PROBLEM_GOAL_NAME);
         let home = NewGoal {
             name: Some(HOME.to_owned()),
             goal: "(at rover depot)".to_owned(),

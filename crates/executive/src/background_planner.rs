@@ -36,7 +36,7 @@ pub struct BackgroundSettings {
     /// Signals completion.
     pub signal: CompletionSignal,
     /// Limit on the memory of planning, in bytes above the memory of the process at its start.
-    pub most_memory: Option<u64>,
+    pub memory_limit: Option<u64>,
 }
 
 /// Planning in progress. The answer is `None` if it was cancelled.
@@ -85,7 +85,7 @@ impl<'a> BackgroundPlanner<'a> {
     /// Starts a thread that makes a plan.
     fn spawn(&self, task: &Task, situation: &Situation) -> Option<Work> {
         let (spec, run_stop) = (Arc::clone(&self.spec), self.settings.stop.clone());
-        let most_memory = self.settings.most_memory;
+        let most_memory = self.settings.memory_limit;
         let (own, from) = (task.with_own_table(), situation.clone());
         let signal = &self.settings.signal;
         let answer = BackgroundTask::spawn("planner", signal, move |cancel| {
@@ -139,7 +139,7 @@ impl Planner for BackgroundPlanner<'_> {
     fn expect(&mut self, task: &Task, situation: &Situation) {
         self.job = None;
         // A planner that compares probabilities keeps its results between plans.
-        if !self.spec.executor.asks_odds() {
+        if !self.spec.executor.needs_comparator() {
             self.job = self.spawn(task, situation);
         }
     }

@@ -3,9 +3,11 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom::execute::{Analyst, RunSpec, SpecError, WholeRegion};
+use elbowroom::execute::{ExactRegion, PlanPreparer, RunSpec, SpecError};
 use elbowroom::execution::executors::ExecutorSpec;
-use elbowroom::execution::{Mission, Need, PrepareError, Prepared, Preparer, Wanted};
+use elbowroom::execution::{
+    PlanForm, PreparationRequest, PreparationResult, PrepareError, PreparedPlan, Preparer,
+};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 
 use crate::background_task::BackgroundTask;
@@ -17,14 +19,14 @@ use crate::completion_signal::{Completion, CompletionSignal};
 /// preparation adds facts to that table, their numbers are unknown to the run; the plan is then prepared again when it
 /// is collected.
 pub struct BackgroundPreparer {
-    analyst: Analyst,
+    analyst: PlanPreparer,
     executor: ExecutorSpec,
     signal: CompletionSignal,
     work: Option<Work>,
 }
 
 /// Preparation in progress. The result is `None` if it has added facts to the table of its thread.
-type Work = BackgroundTask<Option<Result<Mission, PrepareError>>>;
+type Work = BackgroundTask<Option<Result<PreparedPlan, PrepareError>>>;
 
 impl BackgroundPreparer {
     /// Creates a preparer for runs of `spec`, with the completion signal of the run.
@@ -41,14 +43,14 @@ impl BackgroundPreparer {
     }
 
     /// Starts a thread that prepares a plan and its dispatchable networks.
-    fn spawn(&self, wanted: &Wanted<'_>) -> Option<Work> {
+    fn spawn(&self, wanted: &PreparationRequest<'_>) -> Option<Work> {
         let own = wanted.task.with_own_table();
         let (plan, situation) = (wanted.plan.clone(), wanted.situation.clone());
         let (running, now, need) = (wanted.running.to_vec(), wanted.now.clone(), wanted.need);
         let (analyst, executor) = (self.analyst.clone(), self.executor.clone());
         let work = BackgroundTask::spawn("preparer", &self.signal, move |cancel| {
             let cancel = cancel.clone();
-            let mut analyst = analyst.until(move || {
+            let mut analyst = analyst.with_limit(move || {
                 if cancel.is_requested() {
                     ControlFlow::Break(())
                 } else {
@@ -56,7 +58,7 @@ impl BackgroundPreparer {
                 }
             });
             let before = size(&own);
-            let mission = Wanted {
+            let mission = PreparationRequest {
                 task: &own,
                 plan: &plan,
                 situation: &situation,
@@ -64,13 +66,13 @@ impl BackgroundPreparer {
                 now: &now,
                 need,
             }
-            .mission(&mut analyst);
+            .prepare_now(&mut analyst);
             if let Ok(mission) = &mission
-                && need != Need::PartialOrder
-                && !executor.asks_odds()
+                && need != PlanForm::PartialOrder
+                && !executor.needs_comparator()
             {
                 // Fills the cache of dispatchable networks.
-                let _ = executor.build(Box::new(WholeRegion)).adopt(mission);
+                let _ = executor.build(Box::new(ExactRegion)).adopt(mission);
             }
             (size(&own) == before).then_some(mission)
         });
@@ -92,12 +94,12 @@ impl Preparer for BackgroundPreparer {
         &mut self,
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
-        need: Need,
-    ) -> Result<Prepared, PrepareError> {
+        need: PlanForm,
+    ) -> Result<PreparationResult, PrepareError> {
         self.analyst.prepare(task, plan, need)
     }
 
-    fn begin(&mut self, wanted: &Wanted<'_>) -> bool {
+    fn begin(&mut self, wanted: &PreparationRequest<'_>) -> bool {
         self.give_up();
         self.work = self.spawn(wanted);
         if self.work.is_none() {
@@ -110,18 +112,18 @@ impl Preparer for BackgroundPreparer {
         true
     }
 
-    fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
+    fn collect(&mut self, wanted: &PreparationRequest<'_>) -> Result<PreparedPlan, PrepareError> {
         self.signal.disarm();
         let made = self.work.take().and_then(|work| work.join()?);
         match made {
-            Some(Ok(mission)) => Ok(Mission {
+            Some(Ok(mission)) => Ok(PreparedPlan {
                 // With the run's own table.
-                task: Arc::new(wanted.situation.rest_of_task(wanted.task)),
+                task: Arc::new(wanted.situation.remaining_task(wanted.task)),
                 now: wanted.now.clone(),
                 ..mission
             }),
             Some(Err(error)) => Err(error),
-            None => wanted.mission(&mut self.analyst),
+            None => wanted.prepare_now(&mut self.analyst),
         }
     }
 

@@ -29,11 +29,11 @@ impl<T: Send + 'static> BackgroundTask<T> {
         let cancel = Stop::default();
         let cancelled = cancel.clone();
         let (guard, is_done) = signal.guard();
-        let run_stop = Stop::of_this_thread();
+        let run_stop = Stop::current();
         let thread = thread::Builder::new().name(name.to_owned());
         let thread = thread.spawn(move || {
             let _notifies = guard;
-            run_stop.iter().for_each(Stop::obey);
+            run_stop.iter().for_each(Stop::install_for_thread);
             work(&cancelled)
         });
         Some(Self {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom::execution::Progression;
+use elbowroom::execution::BeliefState;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -37,7 +37,7 @@ struct InitialBelief {
 
 impl BeliefUpdates {
     /// Returns a callback that records the belief state, to be called from the start of the run on.
-    pub fn listener(&self) -> impl FnMut(&Progression) + Send + use<> {
+    pub fn listener(&self) -> impl FnMut(&BeliefState) + Send + use<> {
         let updates = self.clone();
         let mut has_begun = false;
         move |belief| {
@@ -67,7 +67,7 @@ impl BeliefUpdates {
 }
 
 impl Pending {
-    fn note(&mut self, belief: &Progression, has_begun: bool) {
+    fn note(&mut self, belief: &BeliefState, has_begun: bool) {
         let task = belief.task();
         self.now.clone_from(belief.time());
         let facts = (0..).map(FactId).take(task.fact_count());

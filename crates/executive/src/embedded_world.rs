@@ -1,6 +1,6 @@
 //! World in the process of its executive.
 
-use elbowroom::execution::{Passage, Ticket, World, WorldError};
+use elbowroom::execution::{ActionHandle, TimeAdvance, World, WorldError};
 use elbowroom::num::Rational;
 
 /// World that is an object in the process of its executive, instead of a simulation or a process of
@@ -22,7 +22,7 @@ pub trait EmbeddedWorld: World {
         &mut self,
         now: &Rational,
         running: &[StartedAction],
-    ) -> Result<Option<Passage>, WorldError> {
+    ) -> Result<Option<TimeAdvance>, WorldError> {
         let _ = (now, running);
         Ok(None)
     }
@@ -32,7 +32,7 @@ pub trait EmbeddedWorld: World {
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartedAction {
     /// Ticket of its start.
-    pub ticket: Ticket,
+    pub ticket: ActionHandle,
     /// The action in PDDL: `(drive rover depot shelf)`.
     pub action: String,
     /// Planned duration; `None` for an instantaneous action.

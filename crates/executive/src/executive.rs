@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use elbowroom::answers::{Halt, Watcher};
+use elbowroom::answers::{Observer, StopRequest};
 use elbowroom::execute::RunSpec;
 use elbowroom::execution::run::PlanningTime;
 use elbowroom::executive::Status;
@@ -25,7 +25,7 @@ use crate::error::{Error, WarningSink};
 use crate::goal_request::GoalNames;
 use crate::journal::{JournalFile, Segments};
 use crate::learning::{Learner, Learning};
-use crate::messages::plain;
+use crate::messages::io_error_message;
 use crate::operator::OperatorInterface;
 use crate::process_world::ProcessLimits;
 use crate::request_check::{check, check_target};
@@ -142,14 +142,18 @@ impl Executive {
     pub fn resume(journal: &Path, mut settings: ExecutiveSettings) -> Result<Self, RunError> {
         settings.journal = Some(journal.to_owned());
         let cannot = |error: &std::io::Error| {
-            let message = format!("cannot read {}: {}", journal.display(), plain(error));
+            let message = format!(
+                "cannot read {}: {}",
+                journal.display(),
+                io_error_message(error)
+            );
             Error::new(message, "check the path of the journal")
         };
         let text = fs::read_to_string(journal).map_err(|error| cannot(&error))?;
         match InterruptedRun::read(journal, &text, text.len() as u64)? {
             JournaledRun::Interrupted(run) => {
                 let names = GoalNames::after(run.goal_names());
-                let (spec, run) = (run.spec().clone(), Box::new(run.reserved()?));
+                let (spec, run) = (run.spec().clone(), Box::new(run.open_exclusively()?));
                 Self::with_start(spec, settings, Start::Resumed(run), names)
             }
             JournaledRun::Achieved(_) => {
@@ -286,7 +290,7 @@ impl Executive {
         let start = start.unwrap_or_else(PoisonError::into_inner).take();
         let start = start
             .ok_or_else(|| Error::new("the run was started before", "create another executive"))?;
-        self.stop.obey();
+        self.stop.install_for_thread();
         let outcome = self.execute(start, world);
         self.queue.close();
         self.buffer.close();
@@ -298,7 +302,7 @@ impl Executive {
         start: Start,
         embedded: Option<&mut dyn EmbeddedWorld>,
     ) -> Result<JournaledOutcome, RunError> {
-        let embedded = embedded.map(shortened);
+        let embedded = embedded.map(with_shorter_lifetime);
         let mut watcher = StopWatcher {
             clock: Clock::start(),
             stop: self.stop.clone(),
@@ -306,7 +310,7 @@ impl Executive {
         let background = BackgroundSettings {
             stop: self.stop.clone(),
             signal: CompletionSignal::default(),
-            most_memory: self.settings.planner_memory,
+            memory_limit: self.settings.planner_memory,
         };
         let limits = self.settings.limits.clone();
         let operator = self.operator_interface();
@@ -324,7 +328,7 @@ impl Executive {
                     warnings,
                 };
                 let outcome = run.resume(settings, self, &mut watcher);
-                return concluded(learning, outcome);
+                return finish_learning(learning, outcome);
             }
             Start::New(journal) => journal,
         };
@@ -343,7 +347,7 @@ impl Executive {
         match journal {
             Some(file) => {
                 let outcome = inputs.execute_journaled(file, self, &mut watcher);
-                concluded(learning, outcome)
+                finish_learning(learning, outcome)
             }
             None => Ok(JournaledOutcome {
                 outcome: inputs.execute(&mut |_| {}, self, &mut watcher)?,
@@ -368,7 +372,7 @@ impl Executive {
 }
 
 /// Learns from the whole run after its end.
-fn concluded<T>(learning: Option<Learning>, outcome: T) -> T {
+fn finish_learning<T>(learning: Option<Learning>, outcome: T) -> T {
     if let Some(learning) = learning {
         learning.finish();
     }
@@ -377,7 +381,7 @@ fn concluded<T>(learning: Option<Learning>, outcome: T) -> T {
 
 impl RunHost for Executive {
     fn operator(&self, spec: &RunSpec, _: &Arc<Task>) -> Result<OperatorInterface, Error> {
-        if !spec.is_lasting {
+        if !spec.is_persistent {
             return Err(Error::new(
                 "this is the journal of a run that ends with its goal",
                 "resume it with `elbowroom run --resume`",
@@ -393,13 +397,15 @@ impl RunHost for Executive {
 
 /// Makes the run of a specification persistent: it waits for further goals, and plans in the background.
 pub fn make_persistent(spec: &mut RunSpec) {
-    spec.is_lasting = true;
-    spec.plans_aside = spec.can_plan_aside();
+    spec.is_persistent = true;
+    spec.plans_aside = spec.can_plan_in_background();
     spec.readies_aside = spec.plans_aside;
 }
 
 /// Returns the world with a shorter lifetime.
-fn shortened<'a>(world: &'a mut (dyn EmbeddedWorld + '_)) -> &'a mut (dyn EmbeddedWorld + 'a) {
+fn with_shorter_lifetime<'a>(
+    world: &'a mut (dyn EmbeddedWorld + '_),
+) -> &'a mut (dyn EmbeddedWorld + 'a) {
     world
 }
 
@@ -409,14 +415,14 @@ struct StopWatcher {
     stop: Stop,
 }
 
-impl Watcher for StopWatcher {
+impl Observer for StopWatcher {
     fn elapsed(&mut self) -> Duration {
         self.clock.elapsed()
     }
 
-    fn flow(&mut self) -> ControlFlow<Halt> {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         if self.stop.is_requested() {
-            ControlFlow::Break(Halt::Cancelled)
+            ControlFlow::Break(StopRequest::Cancelled)
         } else {
             ControlFlow::Continue(())
         }

@@ -15,14 +15,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::error::{Error, WarningSink};
-use crate::messages::plain;
+use crate::messages::io_error_message;
 
 pub use segments::Segments;
 pub(crate) use segments::segments_of;
 pub use wall_time::{Reading, WallTime};
 
 /// Length of the checksum and the space before a line, in bytes.
-const HEAD: usize = 9;
+const CHECKSUM_PREFIX_LENGTH: usize = 9;
 
 /// Checksum that precedes the first record.
 const INITIAL_CHECKSUM: &str = "00000000";
@@ -190,7 +190,7 @@ impl JournalFile {
 
     /// Returns the reason of the first failed write, or `None` if all records are written.
     pub fn failure(&self) -> Option<String> {
-        self.error.as_ref().map(plain)
+        self.error.as_ref().map(io_error_message)
     }
 }
 
@@ -234,7 +234,7 @@ fn cannot_write(path: &Path, error: &io::Error) -> Error {
         format!(
             "cannot write the journal {}: {}",
             path.display(),
-            plain(error)
+            io_error_message(error)
         ),
         "choose a file in a folder that exists and that you may write to",
     )
@@ -242,9 +242,12 @@ fn cannot_write(path: &Path, error: &io::Error) -> Error {
 
 /// Returns `true` for the text of a journal, `false` for a trace without checksums.
 pub fn is_journal(text: &str) -> bool {
-    let head = text.as_bytes().get(..HEAD + 1);
+    let head = text.as_bytes().get(..CHECKSUM_PREFIX_LENGTH + 1);
     head.is_some_and(|head| {
-        head[..HEAD - 1].iter().all(u8::is_ascii_hexdigit) && &head[HEAD - 1..] == b" {"
+        head[..CHECKSUM_PREFIX_LENGTH - 1]
+            .iter()
+            .all(u8::is_ascii_hexdigit)
+            && &head[CHECKSUM_PREFIX_LENGTH - 1..] == b" {"
     })
 }
 
@@ -265,7 +268,7 @@ impl Journal {
         let mut before = None::<&str>;
         for (index, record) in text.split_inclusive('\n').enumerate() {
             let parts = record.strip_suffix('\n').and_then(|record| {
-                let (sum, line) = record.split_at_checked(HEAD)?;
+                let (sum, line) = record.split_at_checked(CHECKSUM_PREFIX_LENGTH)?;
                 Some((sum.strip_suffix(' ')?, line))
             });
             match parts {

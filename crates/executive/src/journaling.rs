@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use elbowroom::execution::run::Stand;
+use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{
-    Command, Ending, Entry, Event, Observation, Passage, Recorder, World, WorldError,
+    Command, Ending, Entry, Event, Observation, Recorder, TimeAdvance, World, WorldError,
 };
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
@@ -91,7 +91,7 @@ impl Recorder for JournalWriter<'_> {
         }
     }
 
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         self.file.needs_rotation()
             && SnapshotLine::of(&self.task, &stand())
                 .is_some_and(|snapshot| self.file.rotate(&snapshot_text(&snapshot)))
@@ -142,7 +142,7 @@ impl<W: World> World for JournaledWorld<W> {
         }
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let mut passage = self.inner.wait(until)?;
         passage.observations.append(&mut self.refused);
         Ok(passage)

@@ -11,21 +11,21 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use elbowroom::answers::Unwatched;
-use elbowroom::answers::learn::{ActionLearnt, LearnRequest, Log, Settings, learn};
+use elbowroom::answers::NoObserver;
+use elbowroom::answers::learn::{LearnRequest, LearntAction, Log, Settings, learn};
 use elbowroom::execution::Entry;
 use elbowroom::text::Source;
 
 use crate::clock::Clock;
 use crate::error::{Error, WarningSink};
 use crate::journal::{Journal, for_owner, is_journal, segments_of};
-use crate::messages::plain;
+use crate::messages::io_error_message;
 
 /// Name of the model in the folder.
 pub const MODEL: &str = "world.toml";
 
 /// Shortest pause between two updates.
-const LEAST_PAUSE: Duration = Duration::from_secs(10);
+const MIN_UPDATE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// File name extension of the logs in the folder.
 const LOG: &str = "journal";
@@ -50,7 +50,7 @@ impl Learner {
                 format!(
                     "cannot write to the folder {}: {}",
                     folder.display(),
-                    plain(error)
+                    io_error_message(error)
                 ),
                 "choose another folder for --learn",
             )
@@ -80,10 +80,10 @@ impl Learner {
         let request = LearnRequest {
             logs,
             settings: Settings::default(),
-            inside: None,
+            conformal_box: None,
             expected: None,
         };
-        let answer = match learn(&request, &mut Unwatched) {
+        let answer = match learn(&request, &mut NoObserver) {
             Ok(answer) => answer,
             Err(error) => {
                 self.warn(&error.to_string());
@@ -164,7 +164,7 @@ impl Learner {
         other != path && other.exists()
     }
 
-    fn report_drift(&mut self, action: &ActionLearnt) {
+    fn report_drift(&mut self, action: &LearntAction) {
         let durations = action.drift.as_ref().map(|drift| (drift, "durations"));
         let failures = (&action.failure_drift, "failures");
         for (drift, what) in durations.into_iter().chain([failures]) {
@@ -208,7 +208,7 @@ fn name_of_copy(journal: &Journal) -> Option<String> {
 }
 
 fn read_log(path: &Path) -> Result<StoredLog, String> {
-    let text = fs::read_to_string(path).map_err(|error| plain(&error))?;
+    let text = fs::read_to_string(path).map_err(|error| io_error_message(&error))?;
     let (text, copy) = if is_journal(&text) {
         let journal = Journal::read(&text)?;
         let copy = name_of_copy(&journal);
@@ -218,7 +218,10 @@ fn read_log(path: &Path) -> Result<StoredLog, String> {
     };
     let source = Source::new(path.display().to_string(), text);
     let log = Log::read(&source).map_err(|error| error.to_string())?;
-    let domain = log.course.as_ref().map(|course| course.domain().to_owned());
+    let domain = log
+        .fact_history
+        .as_ref()
+        .map(|course| course.domain().to_owned());
     Ok(StoredLog { log, domain, copy })
 }
 
@@ -272,7 +275,7 @@ fn updates(mut learner: Learner, ended: &Receiver<()>) {
     while is_due || ended.recv().is_ok() {
         let begun = Clock::start();
         update(&mut learner);
-        let pause = (begun.elapsed() * 10).max(LEAST_PAUSE);
+        let pause = (begun.elapsed() * 10).max(MIN_UPDATE_INTERVAL);
         let begun = Clock::start();
         let mut has_ended = false;
         while let Some(left) = pause.checked_sub(begun.elapsed()) {
@@ -288,6 +291,10 @@ fn updates(mut learner: Learner, ended: &Receiver<()>) {
 
 fn update(learner: &mut Learner) {
     if let Err(error) = learner.update() {
-        learner.warn(&format!("{}: {}", learner.folder.display(), plain(&error)));
+        learner.warn(&format!(
+            "{}: {}",
+            learner.folder.display(),
+            io_error_message(&error)
+        ));
     }
 }

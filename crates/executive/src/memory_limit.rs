@@ -13,8 +13,8 @@ const QUERY_INTERVAL: Duration = Duration::from_millis(5);
 /// Effective on Linux (`/proc`); never exceeded elsewhere.
 pub struct MemoryLimit {
     /// Limit on the resident memory of the process, in bytes.
-    most: u64,
-    asked: Clock,
+    max_bytes: u64,
+    since_query: Clock,
     is_exceeded: bool,
 }
 
@@ -22,17 +22,17 @@ impl MemoryLimit {
     /// Creates a limit of `more` bytes above the present memory.
     pub fn of(more: u64) -> Self {
         Self {
-            most: resident().unwrap_or(0).saturating_add(more),
-            asked: Clock::start(),
+            max_bytes: resident().unwrap_or(0).saturating_add(more),
+            since_query: Clock::start(),
             is_exceeded: false,
         }
     }
 
     /// Returns `true` if the limit is exceeded, or was at an earlier call.
     pub fn is_exceeded(&mut self) -> bool {
-        if !self.is_exceeded && self.asked.elapsed() >= QUERY_INTERVAL {
-            self.asked = Clock::start();
-            self.is_exceeded = resident().is_some_and(|resident| resident > self.most);
+        if !self.is_exceeded && self.since_query.elapsed() >= QUERY_INTERVAL {
+            self.since_query = Clock::start();
+            self.is_exceeded = resident().is_some_and(|resident| resident > self.max_bytes);
         }
         self.is_exceeded
     }

@@ -3,13 +3,13 @@
 use std::io;
 
 /// Returns a count with its noun: `1 check`, `2 checks`.
-pub fn counted(count: usize, what: &str) -> String {
+pub fn count_with_noun(count: usize, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {what}{plural}")
 }
 
 /// Returns the message of an I/O error in lower case, without the error number of the operating system.
-pub fn plain(error: &io::Error) -> String {
+pub fn io_error_message(error: &io::Error) -> String {
     let text = error.to_string();
     match text.find(" (os error") {
         Some(at) => text[..at].to_lowercase(),
@@ -18,12 +18,12 @@ pub fn plain(error: &io::Error) -> String {
 }
 
 /// Limit on a quotation, in characters.
-const LONGEST_EXCERPT: usize = 200;
+const MAX_EXCERPT_LENGTH: usize = 200;
 
 /// Returns foreign text for quotation in a message: control characters escaped, at most 200 characters.
 pub fn excerpt(text: &str) -> String {
     let mut characters = text.chars();
-    let start: String = characters.by_ref().take(LONGEST_EXCERPT).collect();
+    let start: String = characters.by_ref().take(MAX_EXCERPT_LENGTH).collect();
     let more = if characters.next().is_some() {
         "…"
     } else {

@@ -8,7 +8,7 @@ mod throttle;
 
 use std::sync::Arc;
 
-use elbowroom::execution::run::Stand;
+use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{Entry, Recorder};
 use elbowroom::executive::Status;
 use elbowroom::model::Task;
@@ -70,11 +70,11 @@ impl OperatorInterface {
 
     /// Returns a callback that publishes the belief state of the run after each answer of the world, and then
     /// acknowledges the requests that were part of the answer.
-    pub fn listener(&self) -> impl FnMut(&elbowroom::execution::Progression) + Send + use<> {
+    pub fn listener(&self) -> impl FnMut(&elbowroom::execution::BeliefState) + Send + use<> {
         let channels = self.0.clone();
         move |belief| {
             let Some(channels) = &channels else { return };
-            channels.status.believe(belief);
+            channels.status.set_belief(belief);
             if let Some(queue) = &channels.queue {
                 queue.acknowledge();
             }
@@ -125,7 +125,7 @@ impl<R: Recorder> Recorder for TeeRecorder<R> {
         self.inner.commit();
     }
 
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         self.inner.begin_anew(stand)
     }
 }

@@ -4,7 +4,7 @@ use std::process::Child;
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::execution::{Command, Event, Observation, Passage, World, WorldError};
+use elbowroom::execution::{Command, Event, Observation, TimeAdvance, World, WorldError};
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -17,8 +17,8 @@ use crate::clock::Clock;
 use crate::error::Error;
 use crate::messages::excerpt;
 use crate::world_protocol::{
-    Capability, LONGEST_ANSWER, LONGEST_LINE, LineReader, LineWriter, Message, MessageParser,
-    ReadResult, WriteResult, find_program, hello, is_time, launch, wait_for_exit,
+    Capability, LineReader, LineWriter, MAX_ANSWER, MAX_LINE, Message, MessageParser, ReadResult,
+    WriteResult, find_program, hello, is_time, launch, wait_for_exit,
 };
 
 /// Time limit for a program to exit after the run.
@@ -53,13 +53,13 @@ pub struct ProcessWorld {
     limits: ProcessLimits,
     stop: Stop,
     /// Runs since a wait was ended by a request to stop the run.
-    hurried: Option<Clock>,
+    since_stop_request: Option<Clock>,
     /// `true` while an answer is outstanding.
-    is_asked: bool,
+    has_open_question: bool,
     /// Last reported time.
     now: Rational,
     /// `true` if the program cannot receive further messages.
-    is_deaf: bool,
+    is_input_closed: bool,
     task: Arc<Task>,
     parser: MessageParser,
     /// Changes of the belief state, if they are sent.
@@ -106,7 +106,7 @@ impl ProcessWorld {
     ///
     /// # Errors
     /// When the program does not answer.
-    pub fn recall(&mut self, tickets: &[u64]) -> Result<(Passage, bool), WorldError> {
+    pub fn recall(&mut self, tickets: &[u64]) -> Result<(TimeAdvance, bool), WorldError> {
         let question = json!({ "type": "look", "facts": [], "fluents": [], "tickets": tickets });
         let passage = self.ask(question)?;
         let knows = self.parser.greeting().is_some() && self.parser.can(Capability::Resume);
@@ -130,10 +130,10 @@ impl ProcessWorld {
                 .unwrap_or(Duration::MAX),
             limits,
             stop,
-            hurried: None,
-            is_asked: false,
+            since_stop_request: None,
+            has_open_question: false,
             now: Rational::ZERO,
-            is_deaf: false,
+            is_input_closed: false,
             task: Arc::clone(task),
             parser: MessageParser::new(task),
             beliefs: None,
@@ -167,10 +167,10 @@ impl ProcessWorld {
 
     /// Sends `stop`, and kills the program if it does not exit within one second.
     pub fn stop(mut self) {
-        if !self.is_deaf {
+        if !self.is_input_closed {
             let _ = self.send_beliefs();
         }
-        if !self.is_deaf {
+        if !self.is_input_closed {
             let _ = self.send_within(&json!({ "type": "stop" }), EXIT_TIMEOUT);
         }
         // Closes its standard input.
@@ -189,19 +189,19 @@ impl ProcessWorld {
                  wait",
                 self.answer_timeout.as_secs_f64()
             ))),
-            WriteResult::Closed => Err(self.gone()),
+            WriteResult::Closed => Err(self.closed_pipe_error()),
         }
     }
 
     fn send_within(&mut self, message: &Value, timeout: Duration) -> WriteResult {
         let result = self.writer.write(format!("{message}\n"), timeout);
-        self.is_deaf = !matches!(result, WriteResult::Written);
+        self.is_input_closed = !matches!(result, WriteResult::Written);
         result
     }
 
     /// Returns the time limit for a step that begins now.
     fn time_limit(&self) -> Duration {
-        match self.hurried {
+        match self.since_stop_request {
             Some(since) => self
                 .answer_timeout
                 .min(STOP_TIMEOUT.saturating_sub(since.elapsed())),
@@ -210,18 +210,18 @@ impl ProcessWorld {
     }
 
     /// Sends a question, unless one is pending, and reads the answer.
-    fn ask(&mut self, mut question: Value) -> Result<Passage, WorldError> {
-        if !self.is_asked {
+    fn ask(&mut self, mut question: Value) -> Result<TimeAdvance, WorldError> {
+        if !self.has_open_question {
             self.send_beliefs()?;
             question["question"] = self.parser.next_question().into();
             self.send(&question)?;
-            self.is_asked = true;
+            self.has_open_question = true;
         }
         self.read_answer()
     }
 
     /// Reads observations up to the message `time`.
-    fn read_answer(&mut self) -> Result<Passage, WorldError> {
+    fn read_answer(&mut self) -> Result<TimeAdvance, WorldError> {
         let (clock, timeout) = (Clock::start(), self.time_limit());
         let mut observations = Vec::new();
         let mut said = 0;
@@ -231,12 +231,14 @@ impl ProcessWorld {
             let left = timeout.saturating_sub(clock.elapsed());
             let line = match self.reader.read(left.min(POLL_INTERVAL)) {
                 ReadResult::Line(line) => line,
-                ReadResult::EndlessLine => return Err(endless_line()),
-                ReadResult::TooMuch => return Err(too_long(invalid.as_deref())),
-                ReadResult::Timeout if self.hurried.is_none() && self.stop.is_requested() => {
-                    self.hurried = Some(Clock::start());
+                ReadResult::LineTooLong => return Err(endless_line()),
+                ReadResult::AnswerTooLong => return Err(too_long(invalid.as_deref())),
+                ReadResult::Timeout
+                    if self.since_stop_request.is_none() && self.stop.is_requested() =>
+                {
+                    self.since_stop_request = Some(Clock::start());
                     let now = self.now.clone();
-                    return Ok(Passage { now, observations });
+                    return Ok(TimeAdvance { now, observations });
                 }
                 ReadResult::Timeout if left > POLL_INTERVAL => continue,
                 ReadResult::Timeout => {
@@ -247,10 +249,10 @@ impl ProcessWorld {
                         invalid.unwrap_or_default()
                     )));
                 }
-                ReadResult::Closed => return Err(self.gone()),
+                ReadResult::Closed => return Err(self.closed_pipe_error()),
             };
             said += line.len();
-            if said > LONGEST_ANSWER {
+            if said > MAX_ANSWER {
                 return Err(too_long(invalid.as_deref()));
             }
             let line = line.trim();
@@ -260,9 +262,9 @@ impl ProcessWorld {
             match self.parser.parse(line) {
                 Ok(Message::Greeting | Message::Clock | Message::Unknown) => {}
                 Ok(Message::Time(now)) => {
-                    self.is_asked = false;
+                    self.has_open_question = false;
                     self.now.clone_from(&now);
-                    return Ok(Passage { now, observations });
+                    return Ok(TimeAdvance { now, observations });
                 }
                 Ok(Message::Observation(observation)) => observations.push(observation),
                 Err(why) => {
@@ -277,9 +279,9 @@ impl ProcessWorld {
                     });
                     if is_time(line) {
                         // The malformed message still ends the answer.
-                        self.is_asked = false;
+                        self.has_open_question = false;
                         let now = self.now.clone();
-                        return Ok(Passage { now, observations });
+                        return Ok(TimeAdvance { now, observations });
                     }
                 }
             }
@@ -287,15 +289,15 @@ impl ProcessWorld {
     }
 
     /// Returns the error for a program that has closed a pipe.
-    fn gone(&mut self) -> WorldError {
-        self.is_deaf = true;
+    fn closed_pipe_error(&mut self) -> WorldError {
+        self.is_input_closed = true;
         let ending = wait_for_exit(&mut self.child, EXIT_TIMEOUT);
         // A program that exceeds a limit is no longer read, which ends most programs.
         loop {
             match self.reader.read(Duration::ZERO) {
                 ReadResult::Line(_) => {}
-                ReadResult::EndlessLine => return endless_line(),
-                ReadResult::TooMuch => return too_long(None),
+                ReadResult::LineTooLong => return endless_line(),
+                ReadResult::AnswerTooLong => return too_long(None),
                 ReadResult::Timeout | ReadResult::Closed => break,
             }
         }
@@ -330,7 +332,7 @@ fn cannot_start(command: &str, why: &str) -> Error {
 fn endless_line() -> WorldError {
     WorldError::new(format!(
         "it said more than {} MB without a line feed; write one message a line",
-        LONGEST_LINE >> 20
+        MAX_LINE >> 20
     ))
 }
 
@@ -338,7 +340,7 @@ fn endless_line() -> WorldError {
 fn too_long(last: Option<&str>) -> WorldError {
     WorldError::new(format!(
         "it said more than {} MB without ending its answer with `time`{}",
-        LONGEST_ANSWER >> 20,
+        MAX_ANSWER >> 20,
         last.unwrap_or_default()
     ))
 }
@@ -356,7 +358,7 @@ impl World for ProcessWorld {
         self.send(&message)
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let mut passage = self.ask(json!({ "type": "wait", "until": wire::number(until) }))?;
         // The program may use floating-point numbers.
         if passage.now.to_f64().total_cmp(&until.to_f64()).is_eq() {

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use elbowroom::execution::run::PlanningTime;
 use elbowroom::execution::{
-    Command, Observation, Passage, Planner, PlannerAnswer, World, WorldError,
+    Command, Observation, Planner, PlannerAnswer, TimeAdvance, World, WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::model::{Situation, Task};
@@ -57,12 +57,12 @@ impl ScaledClock {
     }
 
     /// Returns the wall-clock time until the world's clock reads `time`.
-    fn left(&self, time: &Rational) -> Duration {
-        on_the_wall(time, &self.factor).saturating_sub(self.passed())
+    fn remaining_wall_time(&self, time: &Rational) -> Duration {
+        to_wall_time(time, &self.factor).saturating_sub(self.passed())
     }
 
     /// Returns the reading of the world's clock after this wall-clock time, rounded down to a millisecond.
-    fn after(&self, while_on_the_wall: Duration) -> Rational {
+    fn time_after(&self, while_on_the_wall: Duration) -> Rational {
         let millis = (self.passed() + while_on_the_wall).as_millis();
         let seconds = Rational::new(i64::try_from(millis).unwrap_or(i64::MAX), 1000);
         seconds * &self.factor
@@ -74,13 +74,13 @@ impl ScaledClock {
         if !self.has_begun() {
             return;
         }
-        let excess = spent.saturating_sub(on_the_wall(allowed, &self.factor));
+        let excess = spent.saturating_sub(to_wall_time(allowed, &self.factor));
         *self.stopped.lock().unwrap_or_else(PoisonError::into_inner) += excess;
     }
 }
 
 /// Converts a time of the world to wall-clock time.
-fn on_the_wall(time: &Rational, factor: &Rational) -> Duration {
+fn to_wall_time(time: &Rational, factor: &Rational) -> Duration {
     let seconds = time.to_f64() / factor.to_f64();
     if seconds > 0.0 {
         Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
@@ -108,12 +108,12 @@ impl World for Realtime<'_> {
         self.inner.command(now, command)
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         self.clock.begin();
         loop {
-            let soon = self.clock.after(POLL_INTERVAL);
+            let soon = self.clock.time_after(POLL_INTERVAL);
             let passage = self.inner.wait(until.min(&soon))?;
-            std::thread::sleep(self.clock.left(&passage.now));
+            std::thread::sleep(self.clock.remaining_wall_time(&passage.now));
             let is_over = !passage.observations.is_empty() || passage.now >= *until;
             if is_over || self.stop.is_requested() {
                 return Ok(passage);
@@ -174,18 +174,18 @@ impl Planner for TimedPlanner<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{ScaledClock, on_the_wall};
+    use super::{ScaledClock, to_wall_time};
     use elbowroom::num::Rational;
     use std::time::Duration;
 
     #[test]
     fn extreme_times_are_converted() {
         let tiny = Rational::new(1, 1_000_000_000_000) * Rational::new(1, 1_000_000_000_000);
-        assert_eq!(on_the_wall(&Rational::ONE, &tiny), Duration::MAX);
-        assert_eq!(on_the_wall(&Rational::from(-1), &tiny), Duration::ZERO);
+        assert_eq!(to_wall_time(&Rational::ONE, &tiny), Duration::MAX);
+        assert_eq!(to_wall_time(&Rational::from(-1), &tiny), Duration::ZERO);
         let ten = Rational::from(10);
         assert_eq!(
-            on_the_wall(&Rational::from(5), &ten),
+            to_wall_time(&Rational::from(5), &ten),
             Duration::from_millis(500)
         );
     }

@@ -1,7 +1,7 @@
 //! Checks of operators' requests against the problem of a run, before the run receives them.
 
-use elbowroom::execute::{misfit, obstacle_to_deadline, read_goal};
-use elbowroom::execution::{Request, Ticket};
+use elbowroom::execute::{ill_typed_part, obstacle_to_deadline, read_goal};
+use elbowroom::execution::{ActionHandle, Request};
 use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::request_queue::{ExternalRequest, RequestQueue};
 
 /// Limit on the name of a goal, in bytes.
-const LONGEST_NAME: usize = 64;
+const MAX_NAME_LENGTH: usize = 64;
 
 /// Checks a request. Reading a goal or a fact can add facts to the table of `task`, so that it must not be the table
 /// of the run.
@@ -80,7 +80,7 @@ fn check_open_goal(name: &str, status: &Status) -> Result<(), Error> {
     Err(Error::new("no goal of that name is open", help))
 }
 
-fn check_ticket(ticket: Ticket, status: &Status) -> Result<(), Error> {
+fn check_ticket(ticket: ActionHandle, status: &Status) -> Result<(), Error> {
     let running = status.state().running;
     if running.iter().any(|it| it.ticket == ticket.0) {
         return Ok(());
@@ -107,7 +107,7 @@ fn check_goal(goal: &str, has_deadline: bool, task: &Task) -> Result<(), Error> 
     if read.is_trivial() {
         return Err(Error::new("the goal is empty", help));
     }
-    if let Some(why) = misfit(task.problem(), &read) {
+    if let Some(why) = ill_typed_part(task.problem(), &read) {
         return Err(Error::new(why, help));
     }
     let obstacle = has_deadline.then(|| obstacle_to_deadline(task, &read));
@@ -121,7 +121,7 @@ fn check_goal(goal: &str, has_deadline: bool, task: &Task) -> Result<(), Error> 
 fn check_name(name: &str) -> Result<(), Error> {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
     let is_path = [".", ".."].contains(&name);
-    if name.is_empty() || is_path || name.len() > LONGEST_NAME || !name.bytes().all(is_plain) {
+    if name.is_empty() || is_path || name.len() > MAX_NAME_LENGTH || !name.bytes().all(is_plain) {
         return Err(Error::new(
             "this is no name for a goal",
             "use up to 64 letters, digits, and `-`, `_` or `.`, not dots alone",

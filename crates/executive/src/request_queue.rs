@@ -4,14 +4,14 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use elbowroom::execution::{Ending, Event, GoalTerms, Observation, Request, Ticket};
+use elbowroom::execution::{ActionHandle, Ending, Event, GoalTerms, Observation, Request};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 
 use crate::clock::Clock;
 
 /// Limit on pending requests.
-const MOST_PENDING: usize = 1000;
+const MAX_PENDING: usize = 1000;
 
 /// Answer time of the world after which the state reports it as unanswered.
 const SILENCE_THRESHOLD: Duration = Duration::from_secs(1);
@@ -43,7 +43,7 @@ pub enum ExternalRequest {
     /// Outcome of a running action that an operator has observed.
     Outcome {
         /// The ticket of its start.
-        ticket: Ticket,
+        ticket: ActionHandle,
         /// `true` if it has succeeded.
         succeeded: bool,
     },
@@ -83,16 +83,16 @@ pub enum RequestStatus {
 struct State {
     waiting: VecDeque<ExternalRequest>,
     /// Numbers of requests that were submitted, drained, recorded and accepted.
-    given: u64,
+    submitted: u64,
     fetched: u64,
     recorded: u64,
-    taken: u64,
+    accepted: u64,
     /// The journal cannot be written.
-    is_lost: bool,
+    has_journal_failed: bool,
     /// The run has ended.
-    is_over: bool,
+    has_run_ended: bool,
     /// Runs since the pending question to the world, if there is one.
-    asked: Option<Clock>,
+    since_question: Option<Clock>,
 }
 
 impl RequestQueue {
@@ -106,42 +106,44 @@ impl RequestQueue {
     /// is full.
     pub fn submit(&self, requests: Vec<ExternalRequest>) -> Option<u64> {
         let mut state = self.lock();
-        if state.waiting.len() >= MOST_PENDING {
+        if state.waiting.len() >= MAX_PENDING {
             return None;
         }
-        state.given += requests.len() as u64;
+        state.submitted += requests.len() as u64;
         state.waiting.extend(requests);
-        Some(state.given)
+        Some(state.submitted)
     }
 
     /// Waits until the run has accepted request `number` or can no longer accept it, for at most `timeout`.
     pub fn wait_until_accepted(&self, number: u64, timeout: Duration) -> RequestStatus {
         let state = self.lock();
-        let waits = |state: &mut State| state.taken < number && !state.is_lost && !state.is_over;
+        let waits = |state: &mut State| {
+            state.accepted < number && !state.has_journal_failed && !state.has_run_ended
+        };
         let waited = self.0.changed.wait_timeout_while(state, timeout, waits);
         let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         match () {
-            () if state.taken >= number => RequestStatus::Accepted,
-            () if state.is_lost => RequestStatus::JournalFailed,
-            () if state.is_over => RequestStatus::RunEnded,
+            () if state.accepted >= number => RequestStatus::Accepted,
+            () if state.has_journal_failed => RequestStatus::JournalFailed,
+            () if state.has_run_ended => RequestStatus::RunEnded,
             () => RequestStatus::Pending,
         }
     }
 
     /// Records that the journal cannot be written. Pending requests are not accepted then.
     pub fn fail_journal(&self) {
-        self.lock().is_lost = true;
+        self.lock().has_journal_failed = true;
         self.0.changed.notify_all();
     }
 
     /// Returns `true` if the journal cannot be written.
     pub fn has_journal_failed(&self) -> bool {
-        self.lock().is_lost
+        self.lock().has_journal_failed
     }
 
     /// Records the end of the run. Pending requests are not accepted then.
     pub fn close(&self) {
-        self.lock().is_over = true;
+        self.lock().has_run_ended = true;
         self.0.changed.notify_all();
     }
 
@@ -153,7 +155,7 @@ impl RequestQueue {
     /// Returns `true` if the run has accepted all submitted requests.
     pub fn is_idle(&self) -> bool {
         let state = self.lock();
-        state.taken == state.given
+        state.accepted == state.submitted
     }
 
     /// Removes all pending requests and returns them as observations at `now`. Unknown facts and fluents are
@@ -161,7 +163,7 @@ impl RequestQueue {
     pub fn drain(&self, now: &Rational, task: &Task) -> Vec<Observation> {
         let requests = {
             let mut state = self.lock();
-            state.fetched = state.given;
+            state.fetched = state.submitted;
             std::mem::take(&mut state.waiting)
         };
         let events = requests.into_iter().filter_map(|request| match request {
@@ -221,17 +223,17 @@ impl RequestQueue {
 
     /// Records that the run sends a question or a command to the world.
     pub fn note_question(&self) {
-        self.lock().asked = Some(Clock::start());
+        self.lock().since_question = Some(Clock::start());
     }
 
     /// Records that the world has answered.
     pub fn note_answer(&self) {
-        self.lock().asked = None;
+        self.lock().since_question = None;
     }
 
     /// Returns the time since the pending question to the world, or `None` if there is none.
     pub fn unanswered(&self) -> Option<Duration> {
-        self.lock().asked.map(Clock::elapsed)
+        self.lock().since_question.map(Clock::elapsed)
     }
 
     /// Returns the time in seconds for which the world has not answered, if that is more than one second. An interactive
@@ -244,7 +246,7 @@ impl RequestQueue {
     /// Records that the run has processed the recorded requests, and that its published status includes them.
     pub fn acknowledge(&self) {
         let mut state = self.lock();
-        state.taken = state.recorded;
+        state.accepted = state.recorded;
         drop(state);
         self.0.changed.notify_all();
     }
@@ -252,7 +254,7 @@ impl RequestQueue {
 
 #[cfg(test)]
 mod tests {
-    use super::{ExternalRequest, MOST_PENDING, RequestQueue, RequestStatus};
+    use super::{ExternalRequest, MAX_PENDING, RequestQueue, RequestStatus};
     use elbowroom::execution::Request;
     use std::time::Duration;
 
@@ -320,8 +322,8 @@ mod tests {
     #[test]
     fn queue_has_a_limit() {
         let queue = RequestQueue::default();
-        let taken = (0..2 * MOST_PENDING)
+        let taken = (0..2 * MAX_PENDING)
             .filter_map(|_| queue.submit(vec![ExternalRequest::Request(Request::Pause)]));
-        assert_eq!(taken.count(), MOST_PENDING);
+        assert_eq!(taken.count(), MAX_PENDING);
     }
 }

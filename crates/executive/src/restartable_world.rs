@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use elbowroom::execution::{
-    Command, Ending, Event, Observation, Passage, Ticket, World, WorldError,
+    ActionHandle, Command, Ending, Event, Observation, TimeAdvance, World, WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -18,10 +18,10 @@ use crate::running_actions::RunningActions;
 use crate::world_connection::{Launch, WorldConnection, WorldSource};
 
 /// Delay before the first restart. Each further one in a row takes twice as long.
-const FIRST_DELAY: Duration = Duration::from_millis(500);
+const INITIAL_DELAY: Duration = Duration::from_millis(500);
 
 /// Longest delay before a restart.
-const LONGEST_DELAY: Duration = Duration::from_secs(30);
+const MAX_DELAY: Duration = Duration::from_secs(30);
 
 /// Time without a failure after which the count of restarts returns to 0.
 const RELIABLE_AFTER: Duration = Duration::from_secs(600);
@@ -61,7 +61,7 @@ impl<'a> RestartableWorld<'a> {
     pub(crate) fn start(mut launch: Launch<'a>, beliefs: BeliefUpdates) -> Result<Self, Error> {
         let connection = WorldConnection::start(&mut launch, &beliefs)?;
         let running = RunningActions::default();
-        let mut world = Self::later(launch, running, Rational::ZERO, beliefs);
+        let mut world = Self::unconnected(launch, running, Rational::ZERO, beliefs);
         world.world = Some(connection);
         Ok(world)
     }
@@ -76,11 +76,11 @@ impl<'a> RestartableWorld<'a> {
     ) -> Self {
         Self {
             elapsed: Some(elapsed),
-            ..Self::later(launch, running, last, beliefs)
+            ..Self::unconnected(launch, running, last, beliefs)
         }
     }
 
-    fn later(
+    fn unconnected(
         launch: Launch<'a>,
         running: RunningActions,
         last: Rational,
@@ -170,12 +170,12 @@ impl<'a> RestartableWorld<'a> {
                         "it was running when the world ended, and the world does not know its outcome"
                     }
                 };
-                news.push(failed(Ticket(ticket), &self.last, why));
+                news.push(failed(ActionHandle(ticket), &self.last, why));
             }
             // The world may have received the cancellation already. An action that it does not know may still run,
             // but not in a new object.
             if (is_cancelled || !is_told) && (knows || world.is_program()) {
-                let ticket = Ticket(ticket);
+                let ticket = ActionHandle(ticket);
                 let told = (&self.last - &self.shift).max(Rational::ZERO);
                 world.command(&told, &Command::Cancel { ticket })?;
             }
@@ -201,13 +201,13 @@ impl<'a> RestartableWorld<'a> {
             if let Some(world) = self.world.take() {
                 world.stop();
             }
-            let delay = FIRST_DELAY.saturating_mul(1 << self.restarts.min(16));
+            let delay = INITIAL_DELAY.saturating_mul(1 << self.restarts.min(16));
             self.restarts += 1;
             self.launch.warnings.warn(&format!(
                 "{}; the world is started again (restart {} of {})",
                 failure.message, self.restarts, self.launch.limits.restarts
             ));
-            self.pause(delay.min(LONGEST_DELAY));
+            self.pause(delay.min(MAX_DELAY));
             match self.world() {
                 Ok(_) => return Ok(()),
                 Err(error) => failure = error,
@@ -244,10 +244,10 @@ impl<'a> RestartableWorld<'a> {
     }
 
     /// Returns what became known at a restart, with the time.
-    fn take_news(&mut self) -> Option<Passage> {
+    fn take_recalled(&mut self) -> Option<TimeAdvance> {
         let observations = self.news.take()?;
         let now = self.last.clone();
-        Some(Passage { now, observations })
+        Some(TimeAdvance { now, observations })
     }
 }
 
@@ -258,7 +258,7 @@ fn is_about(event: &Event, about: u64) -> bool {
     }
 }
 
-fn failed(ticket: Ticket, time: &Rational, why: &str) -> Observation {
+fn failed(ticket: ActionHandle, time: &Rational, why: &str) -> Observation {
     Observation {
         time: time.clone(),
         event: Event::Ended {
@@ -294,22 +294,22 @@ impl World for RestartableWorld<'_> {
         self.ask(|world| world.command(&told, command)).map(drop)
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         if self.world.is_none() {
             self.ask(|_| Ok(()))?;
         }
-        if let Some(news) = self.take_news() {
+        if let Some(news) = self.take_recalled() {
             return Ok(news);
         }
         let local = until - &self.shift;
         let Some(passage) = self.ask(|world| world.wait(&local))? else {
             let now = self.last.clone();
-            return Ok(self.take_news().unwrap_or(Passage {
+            return Ok(self.take_recalled().unwrap_or(TimeAdvance {
                 now,
                 observations: Vec::new(),
             }));
         };
-        let passage = Passage {
+        let passage = TimeAdvance {
             now: &passage.now + &self.shift,
             observations: shifted(passage.observations, &self.shift),
         };

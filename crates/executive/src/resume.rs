@@ -12,16 +12,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use elbowroom::answers::run::run as execute;
-use elbowroom::answers::{RunRequest, Watcher};
+use elbowroom::answers::{Observer, RunRequest};
 use elbowroom::execute::RunSpec;
 use elbowroom::execute::SpecError;
 use elbowroom::execution::run::Verdict;
-use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::execution::{Command, Observation, TimeAdvance, World, WorldError};
 use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
-use elbowroom::report::trace::line::ObservationLine;
+use elbowroom::report::trace::schema::ObservationLine;
 use elbowroom::report::trace::{Line, ReplayWorld, Stored};
 use serde_json::Value;
 
@@ -91,8 +91,8 @@ impl InterruptedRun {
                 "`elbowroom run --journal` writes them; a trace can be played back with --replay",
             ));
         }
-        let mut journal =
-            Journal::read(text).map_err(|why| unreadable(&name, &why, DAMAGE_ADVICE))?;
+        let mut journal = Journal::read(text)
+            .map_err(|why| unreadable_journal_error(&name, &why, DAMAGE_ADVICE))?;
         if journal.text.is_empty() {
             let is_cut_off = !text.contains('\n');
             let (why, advice) = if is_cut_off {
@@ -102,11 +102,11 @@ impl InterruptedRun {
             } else {
                 ("its first record is damaged", DAMAGE_ADVICE)
             };
-            return Err(unreadable(&name, why, advice));
+            return Err(unreadable_journal_error(&name, why, advice));
         }
         let read = |journal: &Journal| {
             let stored = Stored::read(&journal.text);
-            stored.map_err(|error| unreadable(&name, &error.to_string(), OTHER_VERSION))
+            stored.map_err(|error| other_version_error(&name, &error))
         };
         let mut stored = read(&journal)?;
         if let Some(end) = end_by_world(&stored.lines) {
@@ -129,7 +129,11 @@ impl InterruptedRun {
         let spec: RunSpec =
             spec.map_err(|error| Error::new(format!("{name}, {error}"), OTHER_VERSION))?;
         if spec.world_process.is_none() {
-            return Err(unreadable(&name, "its world was no process", OTHER_VERSION));
+            return Err(unreadable_journal_error(
+                &name,
+                "its world was no process",
+                OTHER_VERSION,
+            ));
         }
         Ok(JournaledRun::Interrupted(Box::new(Self {
             path: path.to_owned(),
@@ -163,7 +167,7 @@ impl InterruptedRun {
     ///
     /// # Errors
     /// When the journal cannot be written, or is written by another program.
-    pub fn reserved(mut self) -> Result<Self, Error> {
+    pub fn open_exclusively(mut self) -> Result<Self, Error> {
         self.file = Some(JournalFile::reopen(&self.path, &self.journal, self.length)?);
         Ok(self)
     }
@@ -184,7 +188,7 @@ impl InterruptedRun {
         self,
         settings: ResumeSettings<'_>,
         host: &dyn RunHost,
-        watcher: &mut (dyn Watcher + Send),
+        watcher: &mut (dyn Observer + Send),
     ) -> Result<JournaledOutcome, RunError> {
         let Self {
             path,
@@ -204,10 +208,10 @@ impl InterruptedRun {
         } = settings;
         let name = path.display().to_string();
         let source = WorldSource::of(&spec, embedded)?;
-        let wrong = |error: &dyn fmt::Display| unreadable(&name, &error.to_string(), OTHER_VERSION);
+        let wrong = |error: &dyn fmt::Display| other_version_error(&name, error);
         // Before any other fact is mentioned: the table of facts has to be as it was.
         let snapshot = stored.snapshot().map_err(|error| wrong(&error))?;
-        let stand = snapshot.as_ref().map(|it| it.stand(task)).transpose();
+        let stand = snapshot.as_ref().map(|it| it.restored(task)).transpose();
         let stand = stand.map_err(|why| wrong(&format!("line 2: {why}")))?;
         let now = snapshot.as_ref().map(|it| it.now().clone());
         let first = spec.has_plan.then(|| stored.first_plan(task));
@@ -241,11 +245,11 @@ impl InterruptedRun {
             let planner = Box::new(BackgroundPlanner::new(planner, &spec, &background));
             let request = RunRequest::new(&spec, task)
                 .beginning_with(first)
-                .standing(stand)
-                .reopened(stored.reopened() + usize::from(stored.is_complete()))
-                .planned_by(ResumedPlanner::new(&stored, planner))
-                .prepared_by(BackgroundPreparer::new(&spec, task, &background.signal)?)
-                .told_to(both(operator.listener(), beliefs.listener()))
+                .resume_from(stand)
+                .with_restarts(stored.restart_count() + usize::from(stored.is_complete()))
+                .with_planner(ResumedPlanner::new(&stored, planner))
+                .with_preparer(BackgroundPreparer::new(&spec, task, &background.signal)?)
+                .on_belief(both(operator.listener(), beliefs.listener()))
                 .recorded_by(ViewedRecorder::new(recorder, task, buffer, observer));
             let elapsed = Elapsed::of(&journal, &stored, snapshot.as_ref());
             let launch = Launch {
@@ -281,7 +285,7 @@ impl InterruptedRun {
             outcome?
         };
         if let Some(line) = replay.difference() {
-            return Err(RunError::Failed(deviates(&name, line)));
+            return Err(RunError::Failed(deviation_error(&name, line)));
         }
         Ok(JournaledOutcome {
             outcome,
@@ -294,13 +298,18 @@ impl InterruptedRun {
 const OTHER_VERSION: &str = "it may be of another version of this program: go on with that one, or begin a new \
                              run with another journal";
 
+/// Error of a journal that another version has written.
+fn other_version_error(name: &str, error: &dyn fmt::Display) -> Error {
+    unreadable_journal_error(name, &error.to_string(), OTHER_VERSION)
+}
+
 /// Returns the error for a journal that cannot be resumed.
-fn unreadable(name: &str, message: &str, advice: &str) -> Error {
+fn unreadable_journal_error(name: &str, message: &str, advice: &str) -> Error {
     Error::new(format!("the journal {name}: {message}"), advice)
 }
 
 /// Returns the error for a replay that deviates from the journal.
-fn deviates(name: &str, line: usize) -> Error {
+fn deviation_error(name: &str, line: usize) -> Error {
     Error::new(
         format!(
             "the journal {name} does not lead to the same decisions, from line {line} on; nothing was \
@@ -366,7 +375,7 @@ impl World for ResumedWorld<'_> {
         self.world()?.command(now, command)
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let Some(left) = self.left.checked_sub(1) else {
             return self.world()?.wait(until);
         };

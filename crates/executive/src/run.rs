@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom::answers::run::{RunOutcome, run as execute};
-use elbowroom::answers::{Event, Halt, RunRequest, Watcher};
+use elbowroom::answers::{Event, Observer, RunRequest, StopRequest};
 use elbowroom::execute::{RunSpec, SpecError};
-use elbowroom::execution::run::Stand;
-use elbowroom::execution::{Entry, Planner, Progression, Recorder, World};
+use elbowroom::execution::run::RunSnapshot;
+use elbowroom::execution::{BeliefState, Entry, Planner, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, TraceWriter};
@@ -149,7 +149,7 @@ impl<'a> RunInputs<'a> {
         mut self,
         trace: &mut (dyn FnMut(&str) + Send),
         host: &dyn RunHost,
-        watcher: &mut (dyn Watcher + Send),
+        watcher: &mut (dyn Observer + Send),
     ) -> Result<RunOutcome, RunError> {
         let task = self.task;
         let buffer = host.open_viewers(self.spec, task, self.operator)?;
@@ -178,7 +178,7 @@ impl<'a> RunInputs<'a> {
         mut self,
         mut file: JournalFile,
         host: &dyn RunHost,
-        watcher: &mut (dyn Watcher + Send),
+        watcher: &mut (dyn Observer + Send),
     ) -> Result<JournaledOutcome, RunError> {
         let (spec, task) = (self.spec, self.task);
         let mut is_written = false;
@@ -187,7 +187,7 @@ impl<'a> RunInputs<'a> {
         let written = header.header(spec);
         written.map_err(|error| Error::new(format!("cannot write the journal: {error}"), ""))?;
         // A client that submits the problem is notified that it is on the disk. Other runs can be started again.
-        if !is_written || (spec.is_lasting && !file.sync()) {
+        if !is_written || (spec.is_persistent && !file.sync()) {
             let why = file.failure().unwrap_or_default();
             return Err(RunError::Failed(Error::new(
                 format!("cannot write the journal {}: {why}", file.path().display()),
@@ -239,8 +239,8 @@ impl<'a> RunInputs<'a> {
         self,
         world: &mut dyn World,
         recorder: &mut dyn Recorder,
-        mut listener: impl FnMut(&Progression) + Send,
-        watcher: &mut (dyn Watcher + Send),
+        mut listener: impl FnMut(&BeliefState) + Send,
+        watcher: &mut (dyn Observer + Send),
     ) -> Result<RunOutcome, SpecError> {
         let begun = Clock::start();
         let clock = || begun.seconds();
@@ -253,9 +253,9 @@ impl<'a> RunInputs<'a> {
         let signal = &self.background.signal;
         let request = RunRequest::new(self.spec, self.task)
             .beginning_with(self.first_plan)
-            .planned_by(BackgroundPlanner::new(planner, self.spec, &self.background))
-            .prepared_by(BackgroundPreparer::new(self.spec, self.task, signal)?)
-            .told_to(both(self.operator.listener(), &mut listener))
+            .with_planner(BackgroundPlanner::new(planner, self.spec, &self.background))
+            .with_preparer(BackgroundPreparer::new(self.spec, self.task, signal)?)
+            .on_belief(both(self.operator.listener(), &mut listener))
             .recorded_by(recorder);
         execute(request, world, watcher)
     }
@@ -265,7 +265,7 @@ impl<'a> RunInputs<'a> {
         self,
         recorder: &mut dyn Recorder,
         host: &dyn RunHost,
-        watcher: &mut (dyn Watcher + Send),
+        watcher: &mut (dyn Observer + Send),
     ) -> Result<RunOutcome, SpecError> {
         let (spec, task) = (self.spec, self.task);
         let model = spec.simulation(task.problem()).map_err(SpecError::World)?;
@@ -274,7 +274,7 @@ impl<'a> RunInputs<'a> {
         let mut world = spec.world(&model, task, self.first_plan.as_ref())?;
         host.started();
         let Some(factor) = &spec.realtime else {
-            return self.run(world.as_mut(), recorder, |_: &Progression| {}, watcher);
+            return self.run(world.as_mut(), recorder, |_: &BeliefState| {}, watcher);
         };
         let world_clock = ScaledClock::new(factor, self.since);
         let begun = Clock::start();
@@ -292,9 +292,9 @@ impl<'a> RunInputs<'a> {
         let signal = &self.background.signal;
         let request = RunRequest::new(spec, task)
             .beginning_with(self.first_plan)
-            .told_to(self.operator.listener())
-            .prepared_by(BackgroundPreparer::new(spec, task, signal)?)
-            .planned_by(TimedPlanner {
+            .on_belief(self.operator.listener())
+            .with_preparer(BackgroundPreparer::new(spec, task, signal)?)
+            .with_planner(TimedPlanner {
                 inner: planner,
                 clock: &world_clock,
                 planning_time: &spec.planning_time,
@@ -306,9 +306,9 @@ impl<'a> RunInputs<'a> {
 
 /// Returns a callback that passes the belief state to both callbacks.
 pub(crate) fn both(
-    mut one: impl FnMut(&Progression) + Send,
-    mut other: impl FnMut(&Progression) + Send,
-) -> impl FnMut(&Progression) + Send {
+    mut one: impl FnMut(&BeliefState) + Send,
+    mut other: impl FnMut(&BeliefState) + Send,
+) -> impl FnMut(&BeliefState) + Send {
     move |belief| {
         one(belief);
         other(belief);
@@ -354,25 +354,25 @@ impl<R: Recorder> Recorder for ViewedRecorder<'_, R> {
         self.inner.commit();
     }
 
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         self.inner.begin_anew(stand)
     }
 }
 
 /// Watcher that also ends a run after a failure of its journal.
 struct JournalWatcher<'w> {
-    inner: &'w mut (dyn Watcher + Send),
+    inner: &'w mut (dyn Observer + Send),
     health: JournalHealth,
 }
 
-impl Watcher for JournalWatcher<'_> {
+impl Observer for JournalWatcher<'_> {
     fn elapsed(&mut self) -> Duration {
         self.inner.elapsed()
     }
 
-    fn flow(&mut self) -> ControlFlow<Halt> {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         if self.health.has_failed() {
-            return ControlFlow::Break(Halt::Cancelled);
+            return ControlFlow::Break(StopRequest::Cancelled);
         }
         self.inner.flow()
     }

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom::execution::{Command, Event, Ticket};
+use elbowroom::execution::{ActionHandle, Command, Event};
 use elbowroom::num::Rational;
-use elbowroom::report::trace::line::{GivenLine, ObservationLine};
+use elbowroom::report::trace::schema::{IssuedCommandLine, ObservationLine};
 use elbowroom::report::trace::{Line, SnapshotLine, Stored};
 use elbowroom::report::wire;
 use serde_json::{Value, json};
@@ -16,7 +16,7 @@ use crate::embedded_world::StartedAction;
 pub(crate) struct RunningActions {
     open: BTreeMap<u64, Open>,
     /// Tickets below this one were issued.
-    given: u64,
+    next_ticket: u64,
 }
 
 /// Action without an end.
@@ -51,7 +51,7 @@ impl RunningActions {
             (it.ticket, open)
         });
         let mut running = Self {
-            given: before.map_or(0, |it| it.started as u64),
+            next_ticket: before.map_or(0, |it| it.started as u64),
             open: open.collect(),
         };
         for line in &stored.lines {
@@ -65,14 +65,14 @@ impl RunningActions {
         running
     }
 
-    fn note_line(&mut self, now: &Rational, command: &GivenLine) {
+    fn note_line(&mut self, now: &Rational, command: &IssuedCommandLine) {
         match command {
-            GivenLine::Start {
+            IssuedCommandLine::Start {
                 ticket,
                 action,
                 duration,
             } => self.start(now, *ticket, action, duration.as_ref().map(|it| &it.0)),
-            GivenLine::Cancel { ticket } => self.cancel(*ticket),
+            IssuedCommandLine::Cancel { ticket } => self.cancel(*ticket),
         }
     }
 
@@ -95,7 +95,7 @@ impl RunningActions {
         action: &str,
         duration: Option<&Rational>,
     ) {
-        self.given = self.given.max(ticket + 1);
+        self.next_ticket = self.next_ticket.max(ticket + 1);
         let open = Open {
             action: action.to_owned(),
             duration: duration.cloned(),
@@ -153,14 +153,14 @@ impl RunningActions {
     }
 
     /// Tickets below this one were issued.
-    pub(crate) fn given(&self) -> u64 {
-        self.given
+    pub(crate) fn next_ticket(&self) -> u64 {
+        self.next_ticket
     }
 
     /// Returns the actions, for a world in this process.
     pub(crate) fn actions(&self) -> Vec<StartedAction> {
         let open = self.open.iter().map(|(ticket, open)| StartedAction {
-            ticket: Ticket(*ticket),
+            ticket: ActionHandle(*ticket),
             action: open.action.clone(),
             duration: open.duration.clone(),
             ordered: open.ordered.clone(),

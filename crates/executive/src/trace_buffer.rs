@@ -17,14 +17,14 @@ const POLL_INTERVAL: Duration = Duration::from_millis(250);
 /// Client that receives new lines.
 pub trait Subscriber: Write {
     /// Returns `true` if the client has closed its connection.
-    fn has_left(&mut self) -> bool;
+    fn has_disconnected(&mut self) -> bool;
 }
 
 /// Name of the trace on its page.
 pub const TRACE_NAME: &str = "the run";
 
 /// Limit on the trace that is kept of a persistent run, in bytes.
-const MOST_KEPT: usize = 4_000_000;
+const MAX_KEPT_BYTES: usize = 4_000_000;
 
 /// Trace of a run so far, or its last part if the buffer is bounded. Clones share the same buffer.
 #[derive(Clone, Default)]
@@ -40,7 +40,7 @@ pub struct NewLines {
     /// Number of the last line.
     pub last: usize,
     /// `true` if the run has ended: no further lines follow.
-    pub is_over: bool,
+    pub is_finished: bool,
 }
 
 #[derive(Default)]
@@ -50,7 +50,7 @@ struct Shared {
     /// Cached document of the page, with the number of lines that it covers.
     document: Mutex<Option<(usize, Arc<str>)>>,
     /// Limit on the kept lines, in bytes.
-    most: Option<usize>,
+    max_bytes: Option<usize>,
 }
 
 #[derive(Default)]
@@ -62,15 +62,15 @@ struct State {
     /// Length of the kept lines in bytes.
     bytes: usize,
     /// Number of omitted lines between the header and the kept ones.
-    left_out: usize,
-    is_over: bool,
+    omitted: usize,
+    is_finished: bool,
     /// Number of clients that read the stream.
     listeners: usize,
 }
 
 impl State {
     fn lines(&self) -> usize {
-        usize::from(self.header.is_some()) + self.left_out + self.kept.len()
+        usize::from(self.header.is_some()) + self.omitted + self.kept.len()
     }
 
     fn add(&mut self, line: &str) {
@@ -100,15 +100,15 @@ impl State {
         }
         for line in self.kept.drain(..cut) {
             self.bytes -= line.len();
-            self.left_out += 1;
+            self.omitted += 1;
         }
     }
 
     /// Returns the kept lines after line `sent`, and the number of omitted lines after it.
     fn after(&self, sent: usize) -> (Vec<Arc<str>>, usize) {
         let header = self.header.iter().filter(|_| sent == 0).cloned();
-        let of_kept = sent.saturating_sub(1 + self.left_out);
-        let missed = (1 + self.left_out).saturating_sub(sent.max(1));
+        let of_kept = sent.saturating_sub(1 + self.omitted);
+        let missed = (1 + self.omitted).saturating_sub(sent.max(1));
         let news = header.chain(self.kept.iter().skip(of_kept).cloned());
         (news.collect(), missed)
     }
@@ -122,12 +122,12 @@ impl State {
 impl TraceBuffer {
     /// Creates a buffer for a persistent run: it keeps the last 4 MB of the trace.
     pub fn bounded() -> Self {
-        Self::with_limit(MOST_KEPT)
+        Self::with_limit(MAX_KEPT_BYTES)
     }
 
     fn with_limit(most: usize) -> Self {
         Self(Arc::new(Shared {
-            most: Some(most),
+            max_bytes: Some(most),
             ..Shared::default()
         }))
     }
@@ -136,7 +136,7 @@ impl TraceBuffer {
     pub fn add(&self, line: &str) {
         let mut state = self.lock();
         state.add(line);
-        if let Some(most) = self.0.most
+        if let Some(most) = self.0.max_bytes
             && state.bytes > most
         {
             state.shorten(most / 2);
@@ -153,14 +153,14 @@ impl TraceBuffer {
     /// Returns the number of the last omitted line, or `None` if the trace is complete. The header is line 1 and is
     /// always kept.
     pub fn last_omitted_line(&self) -> Option<usize> {
-        let left_out = self.lock().left_out;
+        let left_out = self.lock().omitted;
         (left_out > 0).then_some(left_out + 1)
     }
 
     /// Marks the run as finished, and waits up to two seconds for clients to read its end.
     pub fn close(&self) {
         let mut state = self.lock();
-        state.is_over = true;
+        state.is_finished = true;
         self.0.changed.notify_all();
         let waits = |state: &mut State| state.listeners > 0;
         state = self
@@ -192,7 +192,7 @@ impl TraceBuffer {
             {
                 return Ok(Arc::clone(document));
             }
-            (state.lines(), state.left_out, state.trace())
+            (state.lines(), state.omitted, state.trace())
         };
         let document = elbowroom_page::live_document(TRACE_NAME, &trace, left_out)
             .map_err(|error| error.to_string())?;
@@ -209,7 +209,7 @@ impl TraceBuffer {
     pub fn page(&self) -> Result<String, String> {
         let (trace, left_out) = {
             let state = self.lock();
-            (state.trace(), state.left_out)
+            (state.trace(), state.omitted)
         };
         elbowroom_page::live_page(TRACE_NAME, &trace, left_out).map_err(|error| error.to_string())
     }
@@ -217,7 +217,7 @@ impl TraceBuffer {
     /// Returns the lines after line `sent`, without their line feeds. Waits for at most `timeout` if there are none and
     /// the run continues.
     pub fn lines_after(&self, sent: usize, timeout: Duration) -> NewLines {
-        let waits = |state: &mut State| state.lines() <= sent && !state.is_over;
+        let waits = |state: &mut State| state.lines() <= sent && !state.is_finished;
         let waited = self
             .0
             .changed
@@ -231,7 +231,7 @@ impl TraceBuffer {
                 .collect(),
             missed,
             last: state.lines(),
-            is_over: state.is_over,
+            is_finished: state.is_finished,
         }
     }
 
@@ -240,7 +240,7 @@ impl TraceBuffer {
     /// # Errors
     /// When the client cannot be written to.
     pub fn stream_changes(&self, client: &mut dyn Subscriber) -> io::Result<()> {
-        self.counted(|| self.stream_all_changes(client))
+        self.with_listener_count(|| self.stream_all_changes(client))
     }
 
     /// Sends each line of the trace after line `after`, or each new line, until the run ends or the client
@@ -253,10 +253,10 @@ impl TraceBuffer {
         after: Option<usize>,
         client: &mut dyn Subscriber,
     ) -> io::Result<()> {
-        self.counted(|| self.stream_all_lines(after, client))
+        self.with_listener_count(|| self.stream_all_lines(after, client))
     }
 
-    fn counted(&self, stream: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+    fn with_listener_count(&self, stream: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
         self.lock().listeners += 1;
         let streamed = stream();
         self.lock().listeners -= 1;
@@ -273,7 +273,7 @@ impl TraceBuffer {
         sent: usize,
         client: &mut dyn Subscriber,
     ) -> io::Result<MutexGuard<'_, State>> {
-        let waits = |state: &mut State| state.lines() <= sent && !state.is_over;
+        let waits = |state: &mut State| state.lines() <= sent && !state.is_finished;
         let mut waited = Duration::ZERO;
         loop {
             let changed = &self.0.changed;
@@ -284,7 +284,7 @@ impl TraceBuffer {
                 return Ok(state);
             }
             drop(state);
-            if client.has_left() {
+            if client.has_disconnected() {
                 return Err(io::ErrorKind::ConnectionAborted.into());
             }
         }
@@ -295,7 +295,7 @@ impl TraceBuffer {
         loop {
             let (lines, is_over) = {
                 let state = self.await_lines(sent, client)?;
-                (state.lines(), state.is_over)
+                (state.lines(), state.is_finished)
             };
             if is_over {
                 let document = self.document().map_err(io::Error::other)?;
@@ -323,7 +323,7 @@ impl TraceBuffer {
                 let state = self.await_lines(sent, client)?;
                 sent = sent.min(state.lines());
                 let (news, missed) = state.after(sent);
-                (news, missed, state.lines(), state.is_over)
+                (news, missed, state.lines(), state.is_finished)
             };
             if missed > 0 {
                 // The client reads too slowly: report the number of omitted lines.
@@ -353,7 +353,7 @@ mod tests {
     use super::{Subscriber, TraceBuffer};
 
     impl Subscriber for Vec<u8> {
-        fn has_left(&mut self) -> bool {
+        fn has_disconnected(&mut self) -> bool {
             false
         }
     }
@@ -377,7 +377,7 @@ mod tests {
 
     fn streamed(buffer: &TraceBuffer, after: Option<usize>) -> String {
         let mut bytes = Vec::new();
-        buffer.lock().is_over = true;
+        buffer.lock().is_finished = true;
         buffer.stream_lines(after, &mut bytes).expect("to memory");
         String::from_utf8(bytes).expect("text")
     }
@@ -432,9 +432,9 @@ mod tests {
         let last = buffer.lines_after(599, short);
         assert_eq!(last.lines, [line(600).trim_end()]);
         assert_eq!(buffer.lines_after(600, short).lines, [""; 0]);
-        assert!(!last.is_over);
+        assert!(!last.is_finished);
         buffer.close();
-        assert!(buffer.lines_after(600, Duration::MAX).is_over);
+        assert!(buffer.lines_after(600, Duration::MAX).is_finished);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom::execute::RunSpec;
-use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::execution::{Command, Observation, TimeAdvance, World, WorldError};
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -85,7 +85,7 @@ impl<'a> WorldConnection<'a> {
     ) -> Result<Self, Error> {
         Self::connect(launch, beliefs, |launch, command| {
             let limits = launch.limits.clone();
-            let resumed = (&running.message(now), running.given());
+            let resumed = (&running.message(now), running.next_ticket());
             ProcessWorld::resume(command, launch.task, limits, launch.stop.clone(), resumed)
         })
     }
@@ -114,7 +114,7 @@ impl<'a> WorldConnection<'a> {
         &mut self,
         running: &RunningActions,
         now: &Rational,
-    ) -> Result<(Passage, bool), WorldError> {
+    ) -> Result<(TimeAdvance, bool), WorldError> {
         match self {
             Self::Process(world) => world.recall(&running.tickets()),
             Self::Embedded(world) => match world.recall(now, &running.actions())? {
@@ -147,7 +147,7 @@ impl World for WorldConnection<'_> {
         }
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         match self {
             Self::Process(world) => world.wait(until),
             Self::Embedded(world) => world.wait(until),

@@ -7,7 +7,7 @@ mod pipe_io;
 
 pub use belief_message::belief_message;
 pub use message_parser::{Capability, Greeting, Message, MessageParser, hello, is_time};
-pub use pipe_io::{LONGEST_ANSWER, LONGEST_LINE, LineReader, LineWriter, ReadResult, WriteResult};
+pub use pipe_io::{LineReader, LineWriter, MAX_ANSWER, MAX_LINE, ReadResult, WriteResult};
 
 use std::io;
 use std::path::Path;
@@ -15,7 +15,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use crate::clock::Clock;
-use crate::messages::plain;
+use crate::messages::io_error_message;
 
 /// Starts a program and connects to its standard input and output. The words of `command` are the program and its
 /// arguments.
@@ -88,7 +88,7 @@ fn no_program(name: &str, error: &io::Error) -> String {
         io::ErrorKind::PermissionDenied if path.is_file() => {
             format!("you may not execute `{name}`; `chmod +x` makes a script a program")
         }
-        _ => plain(error),
+        _ => io_error_message(error),
     }
 }
 

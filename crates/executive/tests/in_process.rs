@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::execution::{
-    Command as WorldCommand, Ending, Event, GoalTerms, Observation, Passage, Request, Ticket,
-    World, WorldError,
+    ActionHandle, Command as WorldCommand, Ending, Event, GoalTerms, Observation, Request,
+    TimeAdvance, World, WorldError,
 };
 use elbowroom::executive::documents::{Activity, GoalNow, NewGoal};
 use elbowroom::model::ground::{FactId, FluentId};
@@ -129,11 +129,11 @@ impl Robot {
         self.coming.push(Observation { time, event });
     }
 
-    fn take(&mut self, now: Rational) -> Passage {
+    fn take(&mut self, now: Rational) -> TimeAdvance {
         let is_due = |it: &mut Observation| it.time <= now;
         let observations = self.coming.extract_if(.., is_due).collect();
         self.now.clone_from(&now);
-        Passage { now, observations }
+        TimeAdvance { now, observations }
     }
 }
 
@@ -159,7 +159,7 @@ impl World for Robot {
         Ok(())
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let next = self.coming.iter().map(|it| &it.time).min();
         let now = next.map_or(until, |next| next.min(until));
         let now = now.clone().max(self.now.clone());
@@ -176,7 +176,7 @@ impl EmbeddedWorld for Robot {
         &mut self,
         now: &Rational,
         running: &[StartedAction],
-    ) -> Result<Option<Passage>, WorldError> {
+    ) -> Result<Option<TimeAdvance>, WorldError> {
         self.recalled = running.to_vec();
         for action in running {
             self.report(now.clone(), succeeded(action.ticket));
@@ -185,7 +185,7 @@ impl EmbeddedWorld for Robot {
     }
 }
 
-fn succeeded(ticket: Ticket) -> Event {
+fn succeeded(ticket: ActionHandle) -> Event {
     let (ending, measured) = (Ending::Succeeded, Vec::new());
     Event::Ended {
         ticket,

@@ -50,7 +50,7 @@ pub enum CommandError {
 
 /// The values of the placeholders.
 #[derive(Clone, Debug)]
-pub(super) struct Filling {
+pub(super) struct PlaceholderValues {
     pub(super) domain: PathBuf,
     pub(super) problem: PathBuf,
     pub(super) plan: PathBuf,
@@ -86,7 +86,7 @@ impl Command {
 
     /// Returns the arguments with all placeholders replaced. Other arguments that are relative
     /// paths of existing files become absolute, because the planner runs in its own folder.
-    pub(super) fn filled(&self, filling: &Filling) -> Vec<OsString> {
+    pub(super) fn substitute(&self, filling: &PlaceholderValues) -> Vec<OsString> {
         let fill = |argument: &String| {
             if !argument.contains('{') {
                 let path = Path::new(argument);
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_taken_apart_as_a_shell_would() {
+    fn command_line_is_split_like_in_a_shell() {
         let command = Command::parse("'my planner' -x \"a b\" c\\ d '' {domain} -f={problem}");
         let command = command.unwrap();
         assert_eq!(command.program, Path::new("my planner"));
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn it_must_say_where_the_files_go() {
+    fn command_requires_file_placeholders() {
         let mistake = |line| Command::parse(line).unwrap_err().to_string();
         assert!(mistake("popf {domain}").contains("where the problem file goes"));
         assert!(mistake("popf d.pddl p.pddl").contains("where the domain file goes"));
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_that_is_not_there_is_not_found() {
+    fn missing_program_is_not_found() {
         assert!(find_program(Path::new("sh")).is_some_and(|path| path.is_absolute()));
         assert_eq!(find_program(Path::new("no-such-planner")), None);
         assert_eq!(find_program(Path::new("./no-such-planner")), None);

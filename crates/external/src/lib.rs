@@ -43,12 +43,12 @@
     )
 )]
 
+mod channel;
 mod clock;
 mod command;
-mod judge;
-mod log;
-mod mailbox;
 mod outcome;
+mod output_parser;
+mod plan_check;
 #[cfg(target_os = "linux")]
 mod processes;
 mod reader;
@@ -61,9 +61,9 @@ mod supervise;
 mod workspace;
 
 pub use command::{Command, CommandError};
-pub use judge::Repair;
 pub use outcome::{Event, Found, Outcome, Report, Statistics};
-pub use registry::{Habits, Kind, Planner, PlannerError, REGISTRY, Registered};
+pub use plan_check::Repair;
+pub use registry::{ExitPhrases, Kind, Planner, PlannerError, REGISTRY, Registered};
 pub use request::{Question, Request};
 pub use run::plan;
 pub use settings::Settings;

@@ -49,7 +49,7 @@ pub(super) struct Processes {
     page: u64,
     ticks_per_second: u64,
     members: BTreeSet<Identity>,
-    strangers: BTreeSet<Identity>,
+    unrelated: BTreeSet<Identity>,
 }
 
 impl Processes {
@@ -63,7 +63,7 @@ impl Processes {
             page: rustix::param::page_size() as u64,
             ticks_per_second: rustix::param::clock_ticks_per_second().max(1),
             members: BTreeSet::new(),
-            strangers: BTreeSet::new(),
+            unrelated: BTreeSet::new(),
         }
     }
 
@@ -109,12 +109,12 @@ impl Processes {
                 || status.group == self.leader
                 || is_child
                 || self.members.contains(&identity)
-                || (!self.strangers.contains(&identity) && self.is_marked(pid));
+                || (!self.unrelated.contains(&identity) && self.is_marked(pid));
             if is_member {
                 self.members.insert(identity);
                 found.push((identity, status));
             } else {
-                self.strangers.insert(identity);
+                self.unrelated.insert(identity);
             }
         }
         found

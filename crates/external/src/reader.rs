@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use super::log::{Log, Sayings};
-use super::mailbox::Mailbox;
+use super::channel::PlanQueue;
+use super::output_parser::{FoundPhrases, OutputParser};
 use super::registry::Planner;
 use super::supervise::{Ending, Stream, Watcher};
 use super::workspace::Workspace;
@@ -11,7 +11,7 @@ use super::workspace::Workspace;
 /// The state shared by the reading and the validating thread.
 #[derive(Default)]
 pub(super) struct Shared {
-    pub(super) mailbox: Mailbox,
+    pub(super) mailbox: PlanQueue,
     /// Set by the validating thread, to end the run.
     pub(super) stop: AtomicBool,
     /// The last measured memory use, in bytes.
@@ -20,8 +20,8 @@ pub(super) struct Shared {
 
 /// State of the reading thread.
 pub(super) struct Reader<'s> {
-    output: Log,
-    error: Log,
+    output: OutputParser,
+    error: OutputParser,
     workspace: Workspace,
     shared: &'s Shared,
     is_even: bool,
@@ -30,8 +30,8 @@ pub(super) struct Reader<'s> {
 impl<'s> Reader<'s> {
     pub(super) fn new(planner: &Planner, workspace: Workspace, shared: &'s Shared) -> Self {
         Self {
-            output: Log::new(planner.habits),
-            error: Log::new(planner.habits),
+            output: OutputParser::new(planner.exit_phrases),
+            error: OutputParser::new(planner.exit_phrases),
             workspace,
             shared,
             is_even: false,
@@ -44,26 +44,26 @@ impl<'s> Reader<'s> {
     }
 
     /// Reads the rest after the end of the process.
-    pub(super) fn end(&mut self, ending: Option<Ending>) {
+    pub(super) fn finish(&mut self, ending: Option<Ending>) {
         let by_itself = matches!(ending, Some(Ending::Exited(_) | Ending::Signalled(_)));
-        let mut put = |text| self.shared.mailbox.put(text);
-        self.output.end(by_itself, &mut put);
-        self.error.end(by_itself, &mut put);
+        let mut put = |text| self.shared.mailbox.push(text);
+        self.output.finish(by_itself, &mut put);
+        self.error.finish(by_itself, &mut put);
         for text in self.workspace.new_plans(true) {
-            self.shared.mailbox.put(text);
+            self.shared.mailbox.push(text);
         }
         self.shared.mailbox.close();
     }
 
     /// Returns the known phrases in the output; the more informative one if both streams have one
     /// of a kind.
-    pub(super) fn sayings(&self) -> Sayings {
-        let (output, error) = (&self.output.sayings, &self.error.sayings);
+    pub(super) fn phrases(&self) -> FoundPhrases {
+        let (output, error) = (&self.output.phrases, &self.error.phrases);
         let more = |output: &Option<String>, error: &Option<String>| {
             let said = output.iter().chain(error);
             said.max_by_key(|line| line.len()).cloned()
         };
-        Sayings {
+        FoundPhrases {
             unsolvable: more(&output.unsolvable, &error.unsolvable),
             gave_up: more(&output.gave_up, &error.gave_up),
             unsupported: more(&output.unsupported, &error.unsupported),
@@ -85,7 +85,7 @@ impl<'s> Reader<'s> {
 
 impl Watcher for Reader<'_> {
     fn printed(&mut self, stream: Stream, bytes: &[u8]) {
-        let mut put = |text| self.shared.mailbox.put(text);
+        let mut put = |text| self.shared.mailbox.push(text);
         match stream {
             Stream::Output => self.output.feed(bytes, &mut put),
             Stream::Error => self.error.feed(bytes, &mut put),
@@ -97,7 +97,7 @@ impl Watcher for Reader<'_> {
         self.is_even = !self.is_even;
         if self.is_even {
             for text in self.workspace.new_plans(false) {
-                self.shared.mailbox.put(text);
+                self.shared.mailbox.push(text);
             }
         }
     }

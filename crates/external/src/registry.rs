@@ -19,14 +19,14 @@ pub struct Registered {
     /// Its arguments, with the placeholders of [`Command`].
     pub arguments: &'static [&'static str],
     /// Advice on how to get it.
-    pub how_to_get: &'static str,
+    pub install_hint: &'static str,
     /// The phrases it prints.
-    pub habits: Habits,
+    pub exit_phrases: ExitPhrases,
 }
 
 /// Phrases, in lower case, that planners print when they end without a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Habits {
+pub struct ExitPhrases {
     /// There is no plan. This claim of the planner is not verified.
     pub unsolvable: &'static [&'static str],
     /// The search was abandoned, or reached a limit of the planner's own.
@@ -46,9 +46,9 @@ pub const REGISTRY: &[Registered] = &[
         variable: "ELBOWROOM_POPF",
         programs: &["popf", "popf3-clp", "popf2"],
         arguments: &["{domain}", "{problem}"],
-        how_to_get: "build it from its source (ROSPlan and PlanSys2 bring one), and put `popf` \
+        install_hint: "build it from its source (ROSPlan and PlanSys2 bring one), and put `popf` \
                      into PATH or its path into ELBOWROOM_POPF",
-        habits: COLIN_FAMILY,
+        exit_phrases: COLIN_FAMILY,
     },
     Registered {
         name: "optic",
@@ -57,9 +57,9 @@ pub const REGISTRY: &[Registered] = &[
         variable: "ELBOWROOM_OPTIC",
         programs: &["optic-clp", "optic", "optic-cplex"],
         arguments: &["{domain}", "{problem}"],
-        how_to_get: "build it from its source, and put `optic-clp` into PATH or its path into \
+        install_hint: "build it from its source, and put `optic-clp` into PATH or its path into \
                      ELBOWROOM_OPTIC",
-        habits: COLIN_FAMILY,
+        exit_phrases: COLIN_FAMILY,
     },
     Registered {
         name: "tfd",
@@ -68,9 +68,9 @@ pub const REGISTRY: &[Registered] = &[
         variable: "ELBOWROOM_TFD",
         programs: &["tfd"],
         arguments: &["{domain}", "{problem}", "{plan}"],
-        how_to_get: "build it from its source, and put the path of its script `plan` into \
+        install_hint: "build it from its source, and put the path of its script `plan` into \
                      ELBOWROOM_TFD",
-        habits: Habits {
+        exit_phrases: ExitPhrases {
             unsolvable: &[
                 "completely explored state space -- no solution",
                 "initial state is a dead end",
@@ -102,9 +102,9 @@ pub const REGISTRY: &[Registered] = &[
             "-cputime",
             "{time}",
         ],
-        how_to_get: "`pip install up-lpg` brings the program `up_lpg/lpg`; put its path into \
+        install_hint: "`pip install up-lpg` brings the program `up_lpg/lpg`; put its path into \
                      ELBOWROOM_LPG",
-        habits: Habits {
+        exit_phrases: ExitPhrases {
             unsolvable: &[
                 "the problem is unsolvable",
                 "no plan will solve it",
@@ -118,7 +118,7 @@ pub const REGISTRY: &[Registered] = &[
 ];
 
 /// The phrases of POPF and its relatives.
-const COLIN_FAMILY: Habits = Habits {
+const COLIN_FAMILY: ExitPhrases = ExitPhrases {
     unsolvable: &[
         ";; problem unsolvable!",
         "cannot be found either in the initial state",
@@ -134,7 +134,7 @@ const COLIN_FAMILY: Habits = Habits {
 };
 
 /// The phrases of the shim for unified-planning.
-const UNIFIED_PLANNING: Habits = Habits {
+const UNIFIED_PLANNING: ExitPhrases = ExitPhrases {
     unsolvable: &["elbowroom: unsolvable"],
     gave_up: &["elbowroom: gave up"],
     unsupported: &["elbowroom: unsupported", "not supported"],
@@ -142,7 +142,7 @@ const UNIFIED_PLANNING: Habits = Habits {
 };
 
 /// Phrases of planners outside the registry.
-const ANYONE: Habits = Habits {
+const COMMON_PHRASES: ExitPhrases = ExitPhrases {
     unsolvable: &[
         "problem unsolvable",
         "problem is unsolvable",
@@ -170,9 +170,9 @@ pub struct Planner {
     /// The kind of program to start.
     pub kind: Kind,
     /// Advice on how to install it.
-    pub how_to_get: String,
+    pub install_hint: String,
     /// The phrases it prints.
-    pub habits: Habits,
+    pub exit_phrases: ExitPhrases,
 }
 
 /// The kind of program to start.
@@ -238,8 +238,8 @@ impl Planner {
         Ok(Self {
             name: command.program.display().to_string(),
             kind: Kind::Program(command),
-            how_to_get: "check the path, or put its folder into PATH".to_owned(),
-            habits: ANYONE,
+            install_hint: "check the path, or put its folder into PATH".to_owned(),
+            exit_phrases: COMMON_PHRASES,
         })
     }
 
@@ -251,7 +251,7 @@ impl Planner {
                 engine: engine.to_owned(),
                 python,
             },
-            how_to_get: if ENGINES.contains(&engine) {
+            install_hint: if ENGINES.contains(&engine) {
                 format!(
                     "install Python and `pip install unified-planning up-{engine}`; where that is \
                      not the `python3` in PATH, put the path of its interpreter into \
@@ -265,7 +265,7 @@ impl Planner {
                     ENGINES.join(", ")
                 )
             },
-            habits: UNIFIED_PLANNING,
+            exit_phrases: UNIFIED_PLANNING,
         }
     }
 }
@@ -287,8 +287,8 @@ impl Registered {
                 program,
                 arguments: self.arguments.iter().map(|&a| a.to_owned()).collect(),
             }),
-            how_to_get: self.how_to_get.to_owned(),
-            habits: self.habits,
+            install_hint: self.install_hint.to_owned(),
+            exit_phrases: self.exit_phrases,
         }
     }
 }
@@ -324,7 +324,7 @@ mod tests {
         for planner in REGISTRY {
             let line = format!("program {}", planner.arguments.join(" "));
             assert!(Command::parse(&line).is_ok(), "{}", planner.name);
-            let phrases = planner.habits;
+            let phrases = planner.exit_phrases;
             for phrase in [phrases.unsolvable, phrases.gave_up, phrases.unsupported].concat() {
                 assert_eq!(phrase, phrase.to_lowercase());
             }

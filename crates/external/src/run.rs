@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
+use super::channel::Received;
 use super::clock::Clock;
-use super::judge::{Judge, Judgement, Repair};
-use super::log::Sayings;
-use super::mailbox::Mail;
 use super::outcome::{Event, Found, Outcome, Report, Statistics};
+use super::output_parser::FoundPhrases;
+use super::plan_check::{PlanValidator, Repair, ValidationResult};
 use super::reader::{Reader, Shared};
 use super::registry::Planner;
 use super::request::Request;
@@ -50,7 +50,7 @@ pub fn plan(
     };
     match prepared {
         Ok((question, workspace, command)) => {
-            let judge = Judge {
+            let judge = PlanValidator {
                 request,
                 question,
                 repair,
@@ -67,7 +67,7 @@ pub fn plan(
 
 /// A running planner, as seen by the validating thread.
 struct Run<'a, 'r> {
-    judge: Judge<'a, 'r>,
+    validator: PlanValidator<'a, 'r>,
     settings: &'a Settings,
     observe: &'a mut dyn FnMut(&Event<'_>) -> ControlFlow<()>,
     clock: Clock,
@@ -91,12 +91,12 @@ impl Drop for StopAtEnd<'_> {
 
 impl<'a, 'r> Run<'a, 'r> {
     fn new(
-        judge: Judge<'a, 'r>,
+        judge: PlanValidator<'a, 'r>,
         settings: &'a Settings,
         observe: &'a mut dyn FnMut(&Event<'_>) -> ControlFlow<()>,
     ) -> Self {
         Self {
-            judge,
+            validator: judge,
             settings,
             observe,
             clock: Clock::start(),
@@ -123,10 +123,10 @@ impl<'a, 'r> Run<'a, 'r> {
             let _stop = StopAtEnd(&shared.stop);
             let supervisor = scope.spawn(|| {
                 let ended = supervise(command, limits, &shared.stop, &mut reader);
-                reader.end(ended.as_ref().ok().map(|ended| ended.ending));
+                reader.finish(ended.as_ref().ok().map(|ended| ended.ending));
                 ended
             });
-            self.judge_mail(&shared);
+            self.validate_queued(&shared);
             supervisor.join()
         });
         let Ok(ended) = ended else {
@@ -138,26 +138,26 @@ impl<'a, 'r> Run<'a, 'r> {
             Err(error) => return self.not_started(planner, &error),
         };
         self.statistics.printed = reader.printed_bytes();
-        let sayings = reader.sayings();
+        let sayings = reader.phrases();
         let excerpt = reader.excerpt();
         // The folder is removed before the outcome is reported.
         drop(reader);
         self.report(planner, ended, sayings, excerpt)
     }
 
-    fn judge_mail(&mut self, shared: &Shared) {
+    fn validate_queued(&mut self, shared: &Shared) {
         loop {
-            match shared.mailbox.take(HEARTBEAT) {
-                Mail::Text(text) if self.is_over() && self.best.is_some() => drop(text),
-                Mail::Text(text) => self.judge(&text),
-                Mail::Nothing => {
+            match shared.mailbox.pop_timeout(HEARTBEAT) {
+                Received::Text(text) if self.is_over() && self.best.is_some() => drop(text),
+                Received::Text(text) => self.validate(&text),
+                Received::TimedOut => {
                     let running = Event::Running {
                         elapsed: self.clock.elapsed(),
                         memory: shared.memory.load(Ordering::Relaxed),
                     };
-                    self.tell(&running);
+                    self.notify(&running);
                 }
-                Mail::Closed => return,
+                Received::Closed => return,
             }
             if self.is_stopped {
                 shared.stop.store(true, Ordering::SeqCst);
@@ -171,17 +171,17 @@ impl<'a, 'r> Run<'a, 'r> {
         self.is_stopped || limit.is_some_and(|limit| self.clock.elapsed() > limit + GRACE)
     }
 
-    fn tell(&mut self, event: &Event<'_>) {
+    fn notify(&mut self, event: &Event<'_>) {
         if !self.is_stopped {
             self.is_stopped = (self.observe)(event).is_break();
         }
     }
 
-    fn judge(&mut self, text: &str) {
-        let judgement = self.judge.judge(text);
+    fn validate(&mut self, text: &str) {
+        let judgement = self.validator.validate(text);
         let elapsed = self.clock.elapsed();
         match judgement {
-            Judgement::Accepted(found) => {
+            ValidationResult::Accepted(found) => {
                 // A plan that is both written to a file and printed counts once.
                 if self
                     .best
@@ -198,22 +198,22 @@ impl<'a, 'r> Run<'a, 'r> {
                     self.is_stopped = (self.observe)(&event).is_break();
                 }
             }
-            Judgement::Refused(reason) => {
+            ValidationResult::Refused(reason) => {
                 self.statistics.refused += 1;
                 let event = Event::Refused {
                     reason: &reason,
                     elapsed,
                 };
-                self.tell(&event);
+                self.notify(&event);
                 self.refused = Some((reason, text.to_owned()));
             }
-            Judgement::Unreadable(reason) => {
+            ValidationResult::Unreadable(reason) => {
                 self.statistics.refused += 1;
                 let event = Event::Refused {
                     reason: &reason,
                     elapsed,
                 };
-                self.tell(&event);
+                self.notify(&event);
                 self.unreadable = Some(reason);
             }
         }
@@ -222,7 +222,7 @@ impl<'a, 'r> Run<'a, 'r> {
     fn not_started(self, planner: &Planner, error: &io::Error) -> Report {
         let reason = format!("{}: {error}", planner.name);
         Report {
-            outcome: not_started(reason, &planner.how_to_get),
+            outcome: not_started(reason, &planner.install_hint),
             statistics: self.statistics,
         }
     }
@@ -231,7 +231,7 @@ impl<'a, 'r> Run<'a, 'r> {
         mut self,
         planner: &Planner,
         ended: Ended,
-        sayings: Sayings,
+        sayings: FoundPhrases,
         excerpt: String,
     ) -> Report {
         self.statistics.elapsed = self.clock.elapsed();
@@ -240,7 +240,7 @@ impl<'a, 'r> Run<'a, 'r> {
         self.statistics.ending = Some(ended.ending);
         let outcome = match (self.best.take(), &sayings.missing) {
             (Some(found), _) => Outcome::Plan(found),
-            (None, Some(reason)) => not_started(reason.clone(), &planner.how_to_get),
+            (None, Some(reason)) => not_started(reason.clone(), &planner.install_hint),
             (None, None) => self.without_plan(ended, sayings, excerpt),
         };
         Report {
@@ -250,7 +250,7 @@ impl<'a, 'r> Run<'a, 'r> {
     }
 
     /// Determines the outcome of a run without a valid plan.
-    fn without_plan(&mut self, ended: Ended, sayings: Sayings, excerpt: String) -> Outcome {
+    fn without_plan(&mut self, ended: Ended, sayings: FoundPhrases, excerpt: String) -> Outcome {
         let peak = ended.peak_memory;
         if ended.ending == Ending::MemoryLimit {
             return Outcome::OutOfMemory { peak };
@@ -276,7 +276,7 @@ impl<'a, 'r> Run<'a, 'r> {
         &mut self,
         ending: Ending,
         peak: u64,
-        sayings: Sayings,
+        sayings: FoundPhrases,
         excerpt: String,
     ) -> Outcome {
         let signal = crash_signal(ending);
@@ -291,7 +291,7 @@ impl<'a, 'r> Run<'a, 'r> {
         }
         // If no actions are needed, planners print empty plans in various forms.
         if self.unreadable.is_none()
-            && let Some(found) = self.judge.judge_nothing()
+            && let Some(found) = self.validator.validate_empty_plan()
         {
             self.statistics.plans = 1;
             self.statistics.first_plan = Some(self.statistics.elapsed);

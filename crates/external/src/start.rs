@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process;
 use std::time::Duration;
 
-use super::command::{Filling, find_program};
+use super::command::{PlaceholderValues, find_program};
 use super::outcome::Outcome;
 use super::registry::{Kind, Planner};
 use super::request::{Question, Request};
@@ -41,7 +41,10 @@ pub(super) fn prepare(
         } else {
             "there is no program"
         };
-        not_started(format!("{what} {}", program.display()), &planner.how_to_get)
+        not_started(
+            format!("{what} {}", program.display()),
+            &planner.install_hint,
+        )
     })?;
     let domain = request.domain.text();
     let scratch = settings.scratch.as_deref();
@@ -73,7 +76,7 @@ fn command(
     settings: &Settings,
 ) -> io::Result<process::Command> {
     let seconds = |limit: Duration| limit.as_secs() + u64::from(limit.subsec_nanos() > 0);
-    let filling = Filling {
+    let filling = PlaceholderValues {
         domain: workspace.domain(),
         problem: workspace.problem(),
         plan: workspace.plan(),
@@ -85,7 +88,7 @@ fn command(
     let mut command = process::Command::new(program);
     match &planner.kind {
         Kind::Program(own) => {
-            command.args(own.filled(&filling));
+            command.args(own.substitute(&filling));
         }
         Kind::UnifiedPlanning { engine, .. } => {
             let shim = workspace.path().join("up_shim.py");

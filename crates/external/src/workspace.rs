@@ -12,25 +12,25 @@ use tempfile::TempDir;
 /// Maximum size of a plan file; larger files are ignored.
 const LARGEST_PLAN: u64 = 16 << 20;
 /// Maximum number of files that are checked.
-const MOST_FILES: usize = 1000;
+const MAX_FILES: usize = 1000;
 
 /// A temporary folder, removed with its content on drop.
 #[derive(Debug)]
 pub(super) struct Workspace {
     folder: TempDir,
     /// Known plan files with their last state, and whether that state was read.
-    files: BTreeMap<PathBuf, Seen>,
+    files: BTreeMap<PathBuf, PlanFile>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Look {
+struct FileStamp {
     size: u64,
     modified: Option<SystemTime>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Seen {
-    look: Look,
+struct PlanFile {
+    stamp: FileStamp,
     is_read: bool,
 }
 
@@ -76,7 +76,7 @@ impl Workspace {
             return Vec::new();
         };
         let mut ready = Vec::new();
-        for entry in entries.flatten().take(MOST_FILES) {
+        for entry in entries.flatten().take(MAX_FILES) {
             let path = entry.path();
             let is_plan = entry.file_name().to_string_lossy().starts_with("plan");
             let Ok(metadata) = entry.metadata() else {
@@ -85,18 +85,24 @@ impl Workspace {
             if !is_plan || !metadata.is_file() || metadata.len() == 0 {
                 continue;
             }
-            let look = Look {
+            let look = FileStamp {
                 size: metadata.len(),
                 modified: metadata.modified().ok(),
             };
             let before = self.files.get(&path);
-            let is_settled = last || before.is_some_and(|seen| seen.look == look);
-            let is_old = before.is_some_and(|seen| seen.is_read && seen.look == look);
+            let is_settled = last || before.is_some_and(|seen| seen.stamp == look);
+            let is_old = before.is_some_and(|seen| seen.is_read && seen.stamp == look);
             if is_settled && !is_old {
                 ready.push((look.modified, path.clone()));
             }
             let is_read = is_settled || is_old;
-            self.files.insert(path, Seen { look, is_read });
+            self.files.insert(
+                path,
+                PlanFile {
+                    stamp: look,
+                    is_read,
+                },
+            );
         }
         ready.sort();
         let texts = ready.iter().filter_map(|(_, path)| text_of(path).ok());
@@ -139,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn the_folder_goes_with_its_owner() {
+    fn folder_is_removed_on_drop() {
         let workspace = Workspace::new(None, "d", "p").unwrap();
         let path = workspace.path().to_owned();
         assert_eq!(fs::read_to_string(workspace.domain()).unwrap(), "d");

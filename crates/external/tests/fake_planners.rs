@@ -159,7 +159,7 @@ fn a_good_planner_gives_its_plan() {
 }
 
 #[test]
-fn it_gets_the_users_own_texts() {
+fn planner_receives_original_texts() {
     let run = run("cat \"$1\"; cat \"$2\" >&2; exit 3", 30);
     let Outcome::NotUnderstood { code, excerpt } = run.report.outcome else {
         panic!("{:?}", run.report.outcome);
@@ -168,7 +168,7 @@ fn it_gets_the_users_own_texts() {
 }
 
 #[test]
-fn of_several_plans_each_is_told_and_the_last_is_taken() {
+fn each_plan_is_reported_and_last_is_returned() {
     let script = "echo '; Plan found with metric 20'; echo '15: (sell) [5]'; echo
         echo '; Plan found with metric 9'; echo '4: (sell) [5]'; echo
         sleep 0.2; printf '0: (sell) [5]\n' > \"$3.2\"";
@@ -189,7 +189,7 @@ fn plan_files_count_as_soon_as_they_are_there() {
 }
 
 #[test]
-fn one_that_hangs_is_ended_in_time_with_its_children() {
+fn hanging_planner_is_killed_with_children() {
     let script = "trap '' TERM INT HUP
         (trap '' TERM; sleep 999.$TAG; sleep 998.$TAG) & (sleep 997.$TAG &) 
         while :; do sleep 996.$TAG; done";
@@ -212,14 +212,14 @@ fn children_that_leave_the_group_are_found() {
 }
 
 #[test]
-fn a_planner_may_leave_nobody_behind_when_it_ends_well() {
+fn successful_planner_leaves_no_processes() {
     let run = run("sleep 999.$TAG & echo '0: (sell) [5]'", 30);
     assert!(run.plan.is_some());
     assert!(run.report.statistics.elapsed < Duration::from_secs(20));
 }
 
 #[test]
-fn a_crash_is_called_by_its_signal() {
+fn crash_is_reported_with_signal() {
     let outcome = run("echo 'about to fall' >&2; kill -SEGV $$", 30)
         .report
         .outcome;
@@ -241,7 +241,7 @@ fn a_plan_before_a_crash_is_a_plan() {
 }
 
 #[test]
-fn one_that_eats_memory_is_ended() {
+fn planner_over_memory_limit_is_killed() {
     if !has_proc() {
         return;
     }
@@ -260,14 +260,14 @@ fn one_that_eats_memory_is_ended() {
 }
 
 #[test]
-fn one_that_says_it_has_no_memory_is_believed() {
+fn out_of_memory_message_is_outcome() {
     let script = "echo \"terminate called after throwing an instance of 'std::bad_alloc'\" >&2
         kill -ABRT $$";
     assert_eq!(run(script, 30).report.outcome.name(), "out of memory");
 }
 
 #[test]
-fn babble_without_end_fills_no_memory_and_is_cut_off() {
+fn endless_output_is_truncated() {
     for script in [
         "yes 'states evaluated: 1000000000'",
         "cat /dev/zero",
@@ -285,7 +285,7 @@ fn babble_without_end_fills_no_memory_and_is_cut_off() {
 }
 
 #[test]
-fn plans_without_end_keep_nobody_from_the_clock() {
+fn endless_plans_respect_time_limit() {
     let run = run(
         "while :; do echo '0: (sell) [5]'; echo '; Plan found'; done",
         1,
@@ -295,7 +295,7 @@ fn plans_without_end_keep_nobody_from_the_clock() {
 }
 
 #[test]
-fn an_invalid_plan_is_an_outcome_of_its_own() {
+fn invalid_plan_has_own_outcome() {
     let run = run("echo '28: (sell) [5]'", 30);
     assert_eq!(run.events, ["refused"]);
     let Outcome::Refused { reason, plan } = run.report.outcome else {
@@ -327,7 +327,7 @@ fn a_valid_plan_counts_although_others_were_refused() {
 }
 
 #[test]
-fn what_it_says_at_its_end_is_told_apart() {
+fn exit_messages_determine_outcome() {
     let name = |script: &str| run(script, 30).report.outcome.name();
     assert_eq!(name("echo ';; Problem unsolvable!'; exit 1"), "unsolvable");
     assert_eq!(name("echo 'search limit exceeded.'"), "gave up");
@@ -340,13 +340,13 @@ fn what_it_says_at_its_end_is_told_apart() {
 }
 
 #[test]
-fn one_that_has_proven_there_is_no_plan_and_then_hangs_is_heard() {
+fn unsolvable_message_before_hang_is_outcome() {
     let run = run("echo ';; Problem unsolvable!'; sleep 999.$TAG", 1);
     assert_eq!(run.report.outcome.name(), "unsolvable");
 }
 
 #[test]
-fn one_that_is_not_there_is_said_to_be_missing() {
+fn missing_planner_is_reported() {
     let settings = Settings::default();
     let mut go_on = |_: &Event<'_>| ControlFlow::Continue(());
     let run = run_line("no-such-planner {domain} {problem}", &settings, &mut go_on);
@@ -357,7 +357,7 @@ fn one_that_is_not_there_is_said_to_be_missing() {
 }
 
 #[test]
-fn who_watches_can_end_it() {
+fn observer_can_stop_planner() {
     let settings = Settings::default();
     let line = "sh -c 'echo \"0: (sell) [5]\"; echo x; sleep 999' {domain} {problem}";
     let mut until_plan = |event: &Event<'_>| match event {
@@ -374,7 +374,7 @@ fn who_watches_can_end_it() {
 }
 
 #[test]
-fn a_watcher_that_panics_leaves_nothing_running() {
+fn panicking_observer_leaves_no_processes() {
     let tag = tag();
     let line = format!("sh -c 'sleep 999.{tag}; sleep 998.{tag}' {{domain}} {{problem}}");
     let panicked = std::panic::catch_unwind(|| {
@@ -385,7 +385,7 @@ fn a_watcher_that_panics_leaves_nothing_running() {
 }
 
 #[test]
-fn a_repaired_plan_is_judged_again() {
+fn repaired_plan_is_validated_again() {
     let domain = Source::new("shop.pddl", DOMAIN);
     let problem = Source::new("day.pddl", PROBLEM);
     let task = Task::new(problem_of(&domain, &problem));
@@ -418,7 +418,7 @@ fn a_repaired_plan_is_judged_again() {
 }
 
 #[test]
-fn in_mid_execution_the_problem_is_told_anew_and_the_plan_is_shifted_back() {
+fn mid_execution_problem_is_rewritten_and_plan_shifted() {
     let domain = Source::new("shop.pddl", DOMAIN);
     let text = PROBLEM.replace("(:goal (sold))", "(:goal (and (sold) (clean)))");
     let problem = Source::new("day.pddl", text);

@@ -161,7 +161,7 @@ fn aries_proves_that_a_deadline_is_too_early() {
 }
 
 #[test]
-fn an_engine_that_is_not_there_is_said_to_be_missing() {
+fn missing_engine_is_reported() {
     if !is_there("ELBOWROOM_PYTHON") {
         return;
     }

@@ -16,12 +16,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::execute::{
-    Embedded, Execution, Rehearse, Replanning, Rollouts, SharedRehearse, WholeRegion,
+    Embedded, ExactRegion, Execution, Replanning, RolloutPolicy, Rollouts, SharedRolloutPolicy,
 };
-use elbowroom::flow;
-use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means};
+use elbowroom::pipeline;
+use elbowroom_execution::executors::{ExecutorServices, ExecutorSpec, PolicyTableCache};
 use elbowroom_execution::run::{RunSettings, Verdict};
-use elbowroom_execution::{Outlook, PlanAnswer, Planner};
+use elbowroom_execution::{ActionValues, PlanAnswer, Planner};
 use elbowroom_laboratory::timed::{Policy, Settings};
 use elbowroom_model::{Situation, Task};
 use elbowroom_pddl::{Source, read_problem};
@@ -32,7 +32,7 @@ use timed::{Timed, Times, milliseconds};
 const RUNS: u64 = 200;
 
 /// Number of runs of `policy` without a table.
-const REHEARSED_RUNS: u64 = 20;
+const ROLLOUT_RUNS: u64 = 20;
 
 fn main() {
     // Like the test harness, it runs only the cases whose name contains the words.
@@ -62,7 +62,7 @@ fn main() {
             ("door", "door", "door/world.toml"),
             ("clumsy", delivery, "clumsy/door.toml"),
         ] {
-            rehearsed(name, folder, world);
+            bench_rollouts(name, folder, world);
         }
     }
 }
@@ -81,42 +81,42 @@ fn read(folder: &str, world: &str) -> (Arc<Task>, WorldModel) {
 }
 
 /// Measures `policy` without a table.
-fn rehearsed(name: &str, folder: &str, world: &str) {
+fn bench_rollouts(name: &str, folder: &str, world: &str) {
     let (task, world) = read(folder, world);
     let beginning = Situation::initial(&task);
     let PlanAnswer::Plan(plan) = Embedded::default().plan(&task, &beginning).answer else {
         panic!("{name} has a plan");
     };
     let (times, mut reached) = (Times::default(), 0);
-    for seed in 0..REHEARSED_RUNS {
+    for seed in 0..ROLLOUT_RUNS {
         let embedded = Embedded::default();
         let rollouts = Rollouts {
             world: Arc::new(world.clone()),
             executor: ExecutorSpec::default(),
             settings: RunSettings::default(),
-            flow: flow::Settings::default(),
+            flow: pipeline::Settings::default(),
             likelihoods: Arc::new(Likelihoods::certain()),
             replanning: Some(Replanning::within(&embedded)),
             is_ready: true,
         };
-        let rehearse = SharedRehearse::new(Rehearse::new(rollouts, embedded));
+        let rehearse = SharedRolloutPolicy::new(RolloutPolicy::new(rollouts, embedded));
         let spec: ExecutorSpec = "policy".parse().expect("a known executor");
         let clocked = Timed {
-            inner: spec.build(Means {
-                rehearsal: Some(Box::new(rehearse.clone())),
-                ..Means::from(Box::new(WholeRegion))
+            inner: spec.build(ExecutorServices {
+                rollout: Some(Box::new(rehearse.clone())),
+                ..ExecutorServices::from(Box::new(ExactRegion))
             }),
             times: times.clone(),
         };
-        let execution = Execution::of(&task).decided_by(clocked);
+        let execution = Execution::of(&task).with_executor(clocked);
         let execution = execution.beginning_with(plan.clone());
-        let execution = execution.with_rehearsal(Some(rehearse));
+        let execution = execution.with_rollouts(Some(rehearse));
         let report = execution.run_in(&mut *world.world(&task, seed));
         reached += u64::from(report.verdict == Verdict::GoalReached);
     }
     let (decisions, [median, p99, worst]) = times.summary();
     println!(
-        "| `{name}` | `policy` | none | {median} | {p99} | {worst} | {decisions} | {reached} of {REHEARSED_RUNS} | |"
+        "| `{name}` | `policy` | none | {median} | {p99} | {worst} | {decisions} | {reached} of {ROLLOUT_RUNS} | |"
     );
 }
 
@@ -129,7 +129,7 @@ fn rows(name: &str) {
     let policy = policy.expect("a grid was finished");
     let optimum = policy.optimum();
     let (lower, upper) = (optimum.lower, optimum.upper);
-    let policy: Arc<dyn Outlook> = Arc::new(policy);
+    let policy: Arc<dyn ActionValues> = Arc::new(policy);
     let beginning = Situation::initial(&task);
     let PlanAnswer::Plan(plan) = Embedded::default().plan(&task, &beginning).answer else {
         panic!("{name} has a plan");
@@ -140,18 +140,18 @@ fn rows(name: &str) {
         for seed in 0..RUNS {
             let spec: ExecutorSpec = executor.parse().expect("a known executor");
             let clocked = Timed {
-                inner: spec.build(Means {
-                    region: Box::new(WholeRegion),
+                inner: spec.build(ExecutorServices {
+                    region: Box::new(ExactRegion),
                     likelihoods: Arc::new(Likelihoods::certain()),
-                    odds: None,
-                    foresight: Foresight::default(),
-                    orders: None,
-                    outlook: spec.asks_outlook().then(|| Arc::clone(&policy)),
-                    rehearsal: None,
+                    comparator: None,
+                    policy_cache: PolicyTableCache::default(),
+                    order_cache: None,
+                    action_values: spec.needs_action_values().then(|| Arc::clone(&policy)),
+                    rollout: None,
                 }),
                 times: times.clone(),
             };
-            let execution = Execution::of(&task).decided_by(clocked);
+            let execution = Execution::of(&task).with_executor(clocked);
             let execution = execution.beginning_with(plan.clone());
             let report = execution.run_in(&mut *world.world(&task, seed));
             reached += u64::from(report.verdict == Verdict::GoalReached);

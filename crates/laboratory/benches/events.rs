@@ -17,8 +17,8 @@ mod timed;
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::execute::{Execution, WholeRegion};
-use elbowroom_execution::executors::{ExecutorSpec, Means};
+use elbowroom::execute::{ExactRegion, Execution};
+use elbowroom_execution::executors::{ExecutorServices, ExecutorSpec};
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_plan, read_problem};
 use elbowroom_sim::{SimWorld, WorldModel};
@@ -65,12 +65,12 @@ fn main() {
         let spec: ExecutorSpec = executor.parse().expect("a known executor");
         let times = Times::default();
         let decider = Timed {
-            inner: spec.build(Means::from(Box::new(WholeRegion))),
+            inner: spec.build(ExecutorServices::from(Box::new(ExactRegion))),
             times: times.clone(),
         };
         let execution = Execution::of(&task).beginning_with(plan.clone()).by(spec);
         let mut world = SimWorld::new(Arc::clone(&task), &model, 1);
-        let report = execution.decided_by(decider).run_in(&mut world);
+        let report = execution.with_executor(decider).run_in(&mut world);
         let (count, [median, p99, worst]) = times.summary();
         let verdict = report.verdict;
         println!("| `{executor}` | {count} | {median} | {p99} | {worst} | {verdict:?} |");

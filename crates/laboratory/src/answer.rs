@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
 
-use elbowroom::answers::{Event, TrialsProgress, Watcher};
+use elbowroom::answers::{Event, Observer, TrialsProgress};
 use elbowroom_report::plot::IntervalPlot;
 use elbowroom_report::table::Table;
 use elbowroom_text::{Diagnostics, Source};
@@ -43,13 +43,13 @@ pub enum CompareAnswer {
 
 /// Row, column, and the position of a kind of failure among the most frequent ones of that cell. In
 /// worlds without time, case, world and executor make the row, and the column is 0.
-pub type FailurePlace = (usize, usize, usize);
+pub type FailurePosition = (usize, usize, usize);
 
 /// Failed trial, as an example of its kind of failure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FailedTrial {
     /// The kind of failure.
-    pub place: FailurePlace,
+    pub position: FailurePosition,
     /// The trial.
     pub id: TrialId,
 }
@@ -68,7 +68,7 @@ pub enum CompareError {
     #[error(
         "these are results of another experiment; give those of its parts, made from the same files"
     )]
-    OfAnother,
+    WrongExperiment,
 }
 
 impl AnyExperiment {
@@ -80,7 +80,7 @@ impl AnyExperiment {
         source: &Source,
         file: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Self, CompareError> {
-        if PerturbedExperiment::is_one(source.text()) {
+        if PerturbedExperiment::is_experiment(source.text()) {
             let experiment = PerturbedExperiment::read(source, file)?;
             Ok(Self::Untimed(Box::new(experiment)))
         } else {
@@ -107,10 +107,10 @@ impl AnyExperiment {
 
     /// Returns `true` if a trial can be [repeated](Self::traces). It cannot if executors believe in
     /// another world, because a trace names only one.
-    pub fn can_be_made_again(&self, failed: &FailedTrial) -> bool {
+    pub fn is_repeatable(&self, failed: &FailedTrial) -> bool {
         match self {
             Self::Timed(experiment) => {
-                let column = experiment.columns.get(failed.place.1);
+                let column = experiment.columns.get(failed.position.1);
                 column.is_some_and(|column| column.believed.is_none())
             }
             Self::Untimed(_) => true,
@@ -126,7 +126,7 @@ impl AnyExperiment {
         match self {
             Self::Timed(experiment) => {
                 let traces = failed.iter().map(|failed| {
-                    let (row, column, _) = failed.place;
+                    let (row, column, _) = failed.position;
                     Ok(compare::trace(experiment, (row, column), failed.id)?)
                 });
                 traces.collect()
@@ -134,9 +134,9 @@ impl AnyExperiment {
             Self::Untimed(experiment) => {
                 let trials = failed
                     .iter()
-                    .map(|failed| (failed.place.0, failed.id.trial));
+                    .map(|failed| (failed.position.0, failed.id.trial));
                 let trials: Vec<(usize, u64)> = trials.collect();
-                Ok(perturbed::courses(experiment, &trials)?)
+                Ok(perturbed::repeat_trials(experiment, &trials)?)
             }
         }
     }
@@ -161,7 +161,7 @@ impl AnyExperiment {
 /// A problem cannot be read, has no plan to begin with, or is of an unsupported kind.
 pub fn compare(
     request: CompareRequest<'_>,
-    watcher: &mut (dyn Watcher + Send),
+    watcher: &mut (dyn Observer + Send),
 ) -> Result<CompareAnswer, CompareError> {
     compare_recorded(request, None, watcher)
 }
@@ -173,7 +173,7 @@ pub fn compare(
 pub fn compare_recorded(
     request: CompareRequest<'_>,
     records: Option<&TrialRecords>,
-    watcher: &mut (dyn Watcher + Send),
+    watcher: &mut (dyn Observer + Send),
 ) -> Result<CompareAnswer, CompareError> {
     let CompareRequest { experiment, part } = request;
     let of = experiment.count(part);
@@ -183,7 +183,7 @@ pub fn compare_recorded(
         let (watcher, told) = &mut *shared;
         if done > *told {
             *told = done;
-            watcher.notice(&Event::Trials(TrialsProgress { done, of }));
+            watcher.notice(&Event::Trials(TrialsProgress { done, total: of }));
         }
         matches!(watcher.flow(), ControlFlow::Continue(()))
     };
@@ -208,19 +208,19 @@ impl CompareAnswer {
         let (answer, is_of_it) = match experiment {
             AnyExperiment::Timed(experiment) => {
                 let results = Results::read(text).map_err(|error| CompareError::other(&error))?;
-                let is_of_it = results.are_of(experiment);
+                let is_of_it = results.belong_to(experiment);
                 (Self::Timed(results), is_of_it)
             }
             AnyExperiment::Untimed(experiment) => {
                 let results = PerturbedResults::read(text)?;
-                let is_of_it = results.are_of(experiment);
+                let is_of_it = results.belong_to(experiment);
                 (Self::Untimed(results), is_of_it)
             }
         };
         if is_of_it {
             Ok(answer)
         } else {
-            Err(CompareError::OfAnother)
+            Err(CompareError::WrongExperiment)
         }
     }
 
@@ -228,13 +228,14 @@ impl CompareAnswer {
     ///
     /// # Errors
     /// There are no parts, they belong to different experiments, or a part occurs twice.
-    pub fn merged(parts: &[Self]) -> Result<Self, CompareError> {
+    pub fn merge_results(parts: &[Self]) -> Result<Self, CompareError> {
         let timed = parts.iter().map(|part| match part {
             Self::Timed(results) => Some(results.clone()),
             Self::Untimed(_) => None,
         });
         if let Some(timed) = timed.collect::<Option<Vec<Results>>>() {
-            let merged = Results::merged(&timed).map_err(|error| CompareError::other(&error))?;
+            let merged =
+                Results::merge_results(&timed).map_err(|error| CompareError::other(&error))?;
             return Ok(Self::Timed(merged));
         }
         let untimed = parts.iter().map(|part| match part {
@@ -242,8 +243,8 @@ impl CompareAnswer {
             Self::Untimed(results) => Some(results.clone()),
         });
         let untimed: Option<Vec<PerturbedResults>> = untimed.collect();
-        let untimed = untimed.ok_or(CompareError::OfAnother)?;
-        Ok(Self::Untimed(PerturbedResults::merged(&untimed)?))
+        let untimed = untimed.ok_or(CompareError::WrongExperiment)?;
+        Ok(Self::Untimed(PerturbedResults::merge_results(&untimed)?))
     }
 
     /// Returns the first trial of each of the most frequent kinds of failure: at most `of_a_cell`
@@ -255,7 +256,13 @@ impl CompareAnswer {
             for (kind, failure) in kinds.enumerate() {
                 let place = (row, column, kind);
                 let id = failure.first;
-                found.push((std::cmp::Reverse(failure.runs), FailedTrial { place, id }));
+                found.push((
+                    std::cmp::Reverse(failure.runs),
+                    FailedTrial {
+                        position: place,
+                        id,
+                    },
+                ));
             }
         };
         match self {
@@ -298,7 +305,10 @@ impl CompareAnswer {
             for (column, cell) in cells.iter().enumerate() {
                 let place = (row, column, cell.failures.kinds().len());
                 let first = cell.invalid.first.as_ref();
-                found.extend(first.map(|(id, _)| FailedTrial { place, id: *id }));
+                found.extend(first.map(|(id, _)| FailedTrial {
+                    position: place,
+                    id: *id,
+                }));
             }
         }
         found
@@ -330,7 +340,7 @@ impl CompareAnswer {
                 Ok(results.table(experiment))
             }
             (Self::Untimed(results), AnyExperiment::Untimed(_)) => Ok(perturbed::table(results)),
-            _ => Err(CompareError::OfAnother),
+            _ => Err(CompareError::WrongExperiment),
         }
     }
 

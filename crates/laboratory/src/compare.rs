@@ -6,15 +6,15 @@
 //! not random. Trials run in parallel. The results do not depend on the number of threads, and the
 //! results of parts (shards) add up to those of the whole.
 
-mod beginnings;
 mod clairvoyant;
 mod experiment;
 mod failures;
+mod initial_plans;
 mod optimum;
 pub(crate) mod parts;
-mod place;
 mod plots;
 mod results;
+mod scenario;
 mod trials;
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -22,11 +22,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use elbowroom_num::work;
 use rayon::prelude::*;
 
-pub use beginnings::Beginning;
-pub use experiment::{Column, Experiment, ExperimentError, Planning, Published, Together};
+pub use experiment::{Column, Experiment, ExperimentError, LinkedParameters, Planning, Published};
 pub use failures::{Failure, Failures, TrialId};
+pub use initial_plans::FirstPlanNote;
 pub use optimum::ColumnOptimum;
-pub use results::{Cell, Invalid, Pair, Results, ResultsError};
+pub use results::{Cell, DiscordantTrials, Invalid, Results, ResultsError};
 
 use parts::Partial;
 use trials::Setting;
@@ -113,10 +113,10 @@ pub fn run_recorded(
     records: Option<&TrialRecords>,
     observe: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<Results, ExperimentError> {
-    let stop = work::Stop::of_this_thread();
+    let stop = work::Stop::current();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(part.jobs)
-        .start_handler(move |_| stop.iter().for_each(work::Stop::obey))
+        .start_handler(move |_| stop.iter().for_each(work::Stop::install_for_thread))
         .build()
         .map_err(|error| ExperimentError::other(format!("cannot start threads: {error}")))?;
     let fillings = experiment.fillings();
@@ -127,7 +127,7 @@ pub fn run_recorded(
         .div_ceil(fillings.len().max(1))
         .min(part.numbers().count())
         .max(1);
-    let planning_threads = for_each(threads, fillings.len() * pieces);
+    let planning_threads = threads_per_piece(threads, fillings.len() * pieces);
     let settings: Vec<Setting<'_>> = fillings
         .iter()
         .enumerate()
@@ -170,18 +170,22 @@ pub fn run_recorded(
 }
 
 /// Returns the number of threads for each of `pieces` pieces of work.
-fn for_each(threads: usize, pieces: usize) -> usize {
+fn threads_per_piece(threads: usize, pieces: usize) -> usize {
     (threads / pieces.max(1)).max(1)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::for_each;
+    use super::threads_per_piece;
 
     #[test]
-    fn threads_are_for_trials_first() {
+    fn threads_are_assigned_to_trials_first() {
         for (threads, pieces, each) in [(1, 1, 1), (2, 1, 2), (2, 100, 1), (7, 2, 3), (4, 0, 4)] {
-            assert_eq!(for_each(threads, pieces), each, "{threads}, {pieces}");
+            assert_eq!(
+                threads_per_piece(threads, pieces),
+                each,
+                "{threads}, {pieces}"
+            );
         }
     }
 }

@@ -5,10 +5,10 @@
 //! of a trial depend only on the experiment's seed, the case and the trial's number, so results do
 //! not depend on the number of threads.
 
-mod course;
 mod experiment;
 mod planner;
 mod results;
+mod stored_trial;
 mod table;
 
 use std::collections::BTreeMap;
@@ -17,10 +17,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::untimed::{
-    ActionName, Course, ExecutorName, Foresighted, Game, Limits, Means, NoForesight, Plans,
-    Shortest, Trial, UntimedExecutor, UntimedWorld, all_actions_under, trial,
+    ActionName, ExecutorName, ExecutorServices, Limits, LookaheadPolicy, NotTabulated, Plans,
+    Shortest, StepRecord, Trial, TrialSetup, UntimedExecutor, UntimedWorld, all_actions_under,
+    trial,
 };
-use crate::worlds::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
+use crate::worlds::{EventProbabilities, PerturbedFacts, PublishedWorld, SoundWorld};
 use elbowroom_model::ground::Action;
 use elbowroom_model::{State, Task};
 use elbowroom_num::work;
@@ -29,11 +30,11 @@ use elbowroom_probability::Likelihoods;
 use elbowroom_probability::optimum::{self, DeadEnds};
 use rayon::prelude::*;
 
-pub use course::{StoredCourse, StoredPlan, StoredStep};
 pub use experiment::{
     Case, OptimumRules, PerturbedError, PerturbedExperiment, PlannerKind, Published, WorldKind,
 };
 pub use results::{PerturbedResults, Row, Work};
+pub use stored_trial::{StoredPlan, StoredStep, StoredTrial};
 pub use table::{plots, records, table};
 
 use crate::compare::Part;
@@ -41,11 +42,11 @@ use crate::record::{TrialRecord, TrialRecords};
 use planner::EmbeddedPlans;
 
 /// Callbacks of the trials.
-struct Watch<'w> {
+struct TrialCallbacks<'w> {
     /// Returns `false` to stop.
-    goes_on: &'w (dyn Fn() -> bool + Sync),
+    may_continue: &'w (dyn Fn() -> bool + Sync),
     /// Called after each trial.
-    tell: &'w (dyn Fn() + Sync),
+    on_trial: &'w (dyn Fn() + Sync),
     /// Collector of trial records, if any.
     records: Option<&'w TrialRecords>,
 }
@@ -59,9 +60,9 @@ struct Setting<'e> {
     task: Arc<Task>,
     actions: Vec<Action>,
     likelihoods: Arc<Likelihoods>,
-    chances: Chances,
+    chances: EventProbabilities,
     perturbed: Option<PerturbedFacts>,
-    foresight: OnceLock<Result<Foresighted, NoForesight>>,
+    foresight: OnceLock<Result<LookaheadPolicy, NotTabulated>>,
     other_optima: OnceLock<Result<BTreeMap<OptimumRules, f64>, PerturbedError>>,
     has_first_plan: OnceLock<bool>,
 }
@@ -91,9 +92,9 @@ pub fn run_recorded(
     observe: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<PerturbedResults, PerturbedError> {
     let done = AtomicU64::new(0);
-    let watch = Watch {
-        goes_on: &|| observe(done.load(Ordering::Relaxed)),
-        tell: &|| {
+    let watch = TrialCallbacks {
+        may_continue: &|| observe(done.load(Ordering::Relaxed)),
+        on_trial: &|| {
             observe(done.fetch_add(1, Ordering::Relaxed) + 1);
         },
         records,
@@ -104,10 +105,10 @@ pub fn run_recorded(
     let rows: Vec<_> = rows(experiment)
         .map(|(case, world, executor)| (&settings[case], (world, executor)))
         .collect();
-    let stop = work::Stop::of_this_thread();
+    let stop = work::Stop::current();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(part.jobs)
-        .start_handler(move |_| stop.iter().for_each(work::Stop::obey))
+        .start_handler(move |_| stop.iter().for_each(work::Stop::install_for_thread))
         .build()
         .map_err(|error| PerturbedError::other(format!("cannot start threads: {error}")))?;
     let rows: Result<Vec<Row>, _> = pool.install(|| {
@@ -142,14 +143,14 @@ fn rows(
 ///
 /// # Errors
 /// There is no such row, or as for [`run`].
-pub fn courses(
+pub fn repeat_trials(
     experiment: &PerturbedExperiment,
     trials: &[(usize, u64)],
 ) -> Result<Vec<String>, PerturbedError> {
     let rows: Vec<_> = rows(experiment).collect();
-    let watch = Watch {
-        goes_on: &|| true,
-        tell: &|| {},
+    let watch = TrialCallbacks {
+        may_continue: &|| true,
+        on_trial: &|| {},
         records: None,
     };
     // Trials of one case share a table, which takes long to compute.
@@ -163,10 +164,10 @@ pub fn courses(
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => entry.insert(Setting::new(experiment, case)?),
         };
-        let mut course = Course::default();
+        let mut course = StepRecord::default();
         let own = (world, executor);
         setting.row(own, trial..=trial, &watch, Some(&mut course))?;
-        texts.push(StoredCourse::new(setting, own, trial, &course).text());
+        texts.push(StoredTrial::new(setting, own, trial, &course).text());
     }
     Ok(texts)
 }
@@ -204,7 +205,8 @@ impl<'e> Setting<'e> {
             ));
         }
         let actions = all_actions_under(&task, &likelihoods).map_err(|error| wrong(&error))?;
-        let chances = Chances::new(&task, &actions, &likelihoods).map_err(|error| wrong(&error))?;
+        let chances = EventProbabilities::new(&task, &actions, &likelihoods)
+            .map_err(|error| wrong(&error))?;
         let perturbed = match &experiment.perturbation {
             Some(names) => Some(names.find(&task)?.facts(&task, &chances)),
             None => None,
@@ -225,15 +227,15 @@ impl<'e> Setting<'e> {
     }
 
     /// Returns the table of the sound world, computed at its first use.
-    fn table(&self) -> &Result<Foresighted, NoForesight> {
+    fn table(&self) -> &Result<LookaheadPolicy, NotTabulated> {
         self.foresight.get_or_init(|| {
             let settings = optimum::Settings {
                 most_running: self.case.most_running,
-                dead_ends: self.patience(),
+                dead_ends: self.dead_end_rule(),
                 ..optimum::Settings::default()
             };
             let actions = self.actions.clone();
-            Foresighted::new(&self.task, actions, &self.likelihoods, settings)
+            LookaheadPolicy::new(&self.task, actions, &self.likelihoods, settings)
         })
     }
 
@@ -246,14 +248,14 @@ impl<'e> Setting<'e> {
                     dead_ends: if rules.loses_dead_ends() {
                         DeadEnds::Lost
                     } else {
-                        self.patience()
+                        self.dead_end_rule()
                     },
                     enforces_over_all: rules.keeps_over_all(),
                     ..optimum::Settings::default()
                 };
                 let actions = self.actions.clone();
-                let found = Foresighted::new(&self.task, actions, &self.likelihoods, settings);
-                let found = found.map_err(|error| self.no_table(&error))?;
+                let found = LookaheadPolicy::new(&self.task, actions, &self.likelihoods, settings);
+                let found = found.map_err(|error| self.missing_table_error(&error))?;
                 Ok((rules, results::rounded(self.optimum_of(&found))))
             });
             rules.collect()
@@ -262,7 +264,7 @@ impl<'e> Setting<'e> {
 
     /// Returns the value of a table at the beginning of a trial. A trial whose planner finds no
     /// first plan is lost, so its optimum is 0.
-    fn optimum_of(&self, foresight: &Foresighted) -> f64 {
+    fn optimum_of(&self, foresight: &LookaheadPolicy) -> f64 {
         let find = || self.plans()(self.task.initial()).is_some();
         if *self.has_first_plan.get_or_init(find) {
             foresight.value()
@@ -271,27 +273,29 @@ impl<'e> Setting<'e> {
         }
     }
 
-    fn patience(&self) -> DeadEnds {
+    fn dead_end_rule(&self) -> DeadEnds {
         // The first plan takes a round, and each step that ends in a dead end takes another.
         DeadEnds::Patience(self.experiment.rounds.saturating_sub(1).max(1))
     }
 
-    fn foresight(&self) -> Result<&Foresighted, PerturbedError> {
-        self.table().as_ref().map_err(|error| self.no_table(error))
+    fn lookahead_policy(&self) -> Result<&LookaheadPolicy, PerturbedError> {
+        self.table()
+            .as_ref()
+            .map_err(|error| self.missing_table_error(error))
     }
 
-    fn no_table(&self, error: &NoForesight) -> PerturbedError {
+    fn missing_table_error(&self, error: &NotTabulated) -> PerturbedError {
         PerturbedError::other(format!("{}: {error}", self.case.name))
     }
 
     fn executor(&self, name: ExecutorName) -> Result<Box<dyn UntimedExecutor>, PerturbedError> {
         let foresight = || self.table().clone();
-        let executor = name.build(&Means {
+        let executor = name.build(&ExecutorServices {
             task: Arc::clone(&self.task),
             likelihoods: Arc::clone(&self.likelihoods),
             foresight: &foresight,
         });
-        executor.map_err(|error| self.no_table(&error))
+        executor.map_err(|error| self.missing_table_error(&error))
     }
 
     fn plans(&self) -> Box<Plans<'static>> {
@@ -360,17 +364,17 @@ impl<'e> Setting<'e> {
         &self,
         (world, kind): (WorldKind, ExecutorName),
         numbers: impl Iterator<Item = u64>,
-        watch: &Watch<'_>,
-        course: Option<&mut Course>,
+        watch: &TrialCallbacks<'_>,
+        course: Option<&mut StepRecord>,
     ) -> Result<Row, PerturbedError> {
-        if !(watch.goes_on)() {
+        if !(watch.may_continue)() {
             return Ok(Row::new(self.case, world, kind, None));
         }
         let is_for_reading = course.is_some();
         let mut executor = self.executor(kind)?;
         // The table is that of the sound world, and has no meaning elsewhere.
         let foresight = match world {
-            WorldKind::Sound => Some(self.foresight()?),
+            WorldKind::Sound => Some(self.lookahead_policy()?),
             WorldKind::AsPublished => None,
         };
         let is_dead_end = foresight.map(|foresight| {
@@ -378,7 +382,7 @@ impl<'e> Setting<'e> {
         });
         let kind_of_world = world;
         let mut plans = self.plans();
-        let mut game = Game {
+        let mut game = TrialSetup {
             task: &self.task,
             plans: &mut *plans,
             dead_ends: is_dead_end.as_ref().map(|watch| watch as _),
@@ -386,7 +390,7 @@ impl<'e> Setting<'e> {
                 rounds: self.experiment.rounds,
                 ..Limits::default()
             },
-            course,
+            record: course,
         };
         let optimum = foresight.map(|foresight| self.optimum_of(foresight));
         let mut row = Row::new(self.case, world, kind, optimum);
@@ -394,7 +398,7 @@ impl<'e> Setting<'e> {
             row.other_optima = self.other_optima().clone()?;
         }
         for number in numbers {
-            if !(watch.goes_on)() {
+            if !(watch.may_continue)() {
                 break;
             }
             let seed = self.seed(number);
@@ -417,7 +421,7 @@ impl<'e> Setting<'e> {
                 records.add(self.record(kind_of_world, kind, (number, seed), &made));
             }
             row.add(number, &made, &|action| self.name(action));
-            (watch.tell)();
+            (watch.on_trial)();
         }
         Ok(row)
     }

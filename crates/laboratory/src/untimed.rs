@@ -20,12 +20,12 @@
 //! [`Executor`](elbowroom_execution::Executor). They never wait.
 
 mod adaptable;
-mod course;
 mod esterel;
 mod lookahead;
 mod published;
 mod registry;
 mod shortest;
+mod step_record;
 
 use std::sync::Arc;
 
@@ -34,13 +34,13 @@ use elbowroom_model::problem::{ObjectId, SchemaId};
 use elbowroom_model::{State, Task, TimeTriggeredPlan};
 
 pub use adaptable::Adaptable;
-pub use course::{Course, Entry, StepKind};
 pub use elbowroom_probability::{Unsupported, all_actions, all_actions_under};
 pub use esterel::Esterel;
-pub use lookahead::{Foresighted, NoForesight};
-pub use published::AsPublished;
-pub use registry::{EXECUTORS, ExecutorName, Means, Registered, UnknownExecutor};
+pub use lookahead::{LookaheadPolicy, NotTabulated};
+pub use published::PublishedExecutor;
+pub use registry::{EXECUTORS, ExecutorEntry, ExecutorName, ExecutorServices, UnknownExecutor};
 pub use shortest::Shortest;
+pub use step_record::{Entry, StepKind, StepRecord};
 
 /// World without time (a port).
 pub trait UntimedWorld {
@@ -62,7 +62,7 @@ pub trait UntimedExecutor {
     fn begin(&mut self) {}
 
     /// Executes a plan until it is completed or infeasible.
-    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>);
+    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut InstrumentedWorld<'_>);
 }
 
 /// Planner: returns a plan from a state, or `None` if there is none.
@@ -98,7 +98,7 @@ pub type DeadEndWatch<'a> = dyn Fn(&State, &[ActionName]) -> bool + 'a;
 pub type ActionName = (SchemaId, Vec<ObjectId>);
 
 /// Components of a trial.
-pub struct Game<'g> {
+pub struct TrialSetup<'g> {
     /// The problem.
     pub task: &'g Task,
     /// The planner.
@@ -109,12 +109,12 @@ pub struct Game<'g> {
     /// Limits of the trial.
     pub limits: Limits,
     /// Record of the steps of the next trial, if any.
-    pub course: Option<&'g mut Course>,
+    pub record: Option<&'g mut StepRecord>,
 }
 
 /// Counts of the steps in a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
+pub struct StepCounts {
     /// Number of actions that have started.
     pub starts: u64,
     /// Number of durative actions that have ended, with success or not.
@@ -123,7 +123,7 @@ pub struct Tally {
     pub failed_starts: u64,
 }
 
-impl Tally {
+impl StepCounts {
     /// Returns the number of starts and ends, which are messages in the experiments.
     pub fn messages(self) -> u64 {
         self.starts + self.ends
@@ -141,11 +141,11 @@ pub enum Ending {
     /// The planner found no plan.
     NoPlan,
     /// All rounds were used up by plans that did not reach the goal.
-    RoundsUsedUp,
+    RoundLimit,
     /// The last round was used up by a step that ended in a dead end.
     DeadEnd,
     /// All steps were used up.
-    StepsUsedUp,
+    StepLimit,
 }
 
 impl Ending {
@@ -153,16 +153,16 @@ impl Ending {
     pub fn name(self) -> &'static str {
         match self {
             Self::NoPlan => "no-plan",
-            Self::RoundsUsedUp => "rounds-used-up",
+            Self::RoundLimit => "rounds-used-up",
             Self::DeadEnd => "dead-end",
-            Self::StepsUsedUp => "steps-used-up",
+            Self::StepLimit => "steps-used-up",
         }
     }
 }
 
 /// Failure of a trial.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Lost {
+pub struct TrialFailure {
     /// Its ending.
     pub ending: Ending,
     /// Its last step; `None` if there was none.
@@ -173,26 +173,26 @@ pub struct Lost {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trial {
     /// Its failure; `None` if the goal held when an execution ended.
-    pub lost: Option<Lost>,
+    pub failure: Option<TrialFailure>,
     /// Number of executions without success: 0 if the first plan reached the goal. In a failed
     /// trial, the number of all rounds.
     pub replans: usize,
     /// Counts of its steps.
-    pub tally: Tally,
+    pub tally: StepCounts,
 }
 
 impl Trial {
     /// Returns `true` if the goal held when an execution ended.
     pub fn is_success(&self) -> bool {
-        self.lost.is_none()
+        self.failure.is_none()
     }
 }
 
 /// World in the view of an executor, with counts of the steps.
-pub struct Stage<'w> {
+pub struct InstrumentedWorld<'w> {
     task: &'w Task,
     world: &'w mut dyn UntimedWorld,
-    tally: Tally,
+    tally: StepCounts,
     most_steps: u64,
     dead_ends: Option<&'w DeadEndWatch<'w>>,
     /// Running actions of this execution; maintained only if dead ends are detected.
@@ -202,10 +202,10 @@ pub struct Stage<'w> {
     is_lost: bool,
     last: Option<(StepKind, ActionName)>,
     /// The record, and the state before the current step.
-    course: Option<(&'w mut Course, State)>,
+    record: Option<(&'w mut StepRecord, State)>,
 }
 
-impl Stage<'_> {
+impl InstrumentedWorld<'_> {
     /// Returns the current state.
     pub fn state(&self) -> &State {
         self.world.state()
@@ -235,7 +235,7 @@ impl Stage<'_> {
 
     /// Returns the number of further steps that may end in a dead end. The next one after these
     /// loses the trial.
-    pub fn patience(&self) -> usize {
+    pub fn dead_end_steps_left(&self) -> usize {
         self.rounds_left.saturating_sub(1)
     }
 
@@ -255,7 +255,7 @@ impl Stage<'_> {
         } else {
             StepKind::NotStarted
         };
-        self.done(kind, action);
+        self.record_step(kind, action);
         has_started
     }
 
@@ -272,26 +272,26 @@ impl Stage<'_> {
         } else {
             StepKind::Failed
         };
-        self.done(kind, action);
+        self.record_step(kind, action);
         has_succeeded
     }
 
     /// Abandons a running action, which will not be ended. This is not a step.
-    pub fn let_go(&mut self, action: &Action) {
+    pub fn abandon(&mut self, action: &Action) {
         let name = name_of(action);
         self.running.retain(|other| *other != name);
     }
 
     /// Records a step.
-    fn done(&mut self, kind: StepKind, action: &Action) {
-        self.look_out();
+    fn record_step(&mut self, kind: StepKind, action: &Action) {
+        self.update_dead_end();
         // In place, because there are very many steps and few of them are the last.
         let (last_kind, (schema, arguments)) = self
             .last
             .get_or_insert_with(|| (kind, (action.schema, Vec::new())));
         (*last_kind, *schema) = (kind, action.schema);
         arguments.clone_from(&action.arguments);
-        if let Some((course, before)) = &mut self.course {
+        if let Some((course, before)) = &mut self.record {
             let after = self.world.state();
             course.step(kind, action, (before, after), self.is_dead_end);
             before.clone_from(after);
@@ -299,7 +299,7 @@ impl Stage<'_> {
     }
 
     /// Updates the dead-end state after a step, and deducts a round in a dead end.
-    fn look_out(&mut self) {
+    fn update_dead_end(&mut self) {
         let Some(dead_ends) = self.dead_ends else {
             return;
         };
@@ -317,19 +317,19 @@ fn name_of(action: &Action) -> ActionName {
 
 /// Runs a trial.
 pub fn trial(
-    game: &mut Game<'_>,
+    game: &mut TrialSetup<'_>,
     world: &mut dyn UntimedWorld,
     executor: &mut dyn UntimedExecutor,
 ) -> Trial {
     executor.begin();
-    if let Some(course) = game.course.as_deref_mut() {
-        *course = Course::default();
+    if let Some(course) = game.record.as_deref_mut() {
+        *course = StepRecord::default();
     }
-    let before = game.course.as_ref().map(|_| world.state().clone());
-    let mut stage = Stage {
+    let before = game.record.as_ref().map(|_| world.state().clone());
+    let mut stage = InstrumentedWorld {
         task: game.task,
         world,
-        tally: Tally::default(),
+        tally: StepCounts::default(),
         most_steps: game.limits.steps as u64,
         dead_ends: game.dead_ends,
         running: Vec::new(),
@@ -337,7 +337,7 @@ pub fn trial(
         is_dead_end: false,
         is_lost: false,
         last: None,
-        course: game.course.as_deref_mut().zip(before),
+        record: game.record.as_deref_mut().zip(before),
     };
     let mut executions = 0;
     let ending = loop {
@@ -345,15 +345,15 @@ pub fn trial(
             break Ending::DeadEnd;
         }
         if stage.is_over() {
-            break Ending::StepsUsedUp;
+            break Ending::StepLimit;
         }
         if stage.rounds_left == 0 {
-            break Ending::RoundsUsedUp;
+            break Ending::RoundLimit;
         }
         let Some(plan) = (game.plans)(stage.state()) else {
             break Ending::NoPlan;
         };
-        if let Some((course, _)) = &mut stage.course {
+        if let Some((course, _)) = &mut stage.record {
             course.plan(&plan);
         }
         stage.rounds_left -= 1;
@@ -362,18 +362,18 @@ pub fn trial(
         executor.execute(&plan, &mut stage);
         if stage.is_goal() {
             return Trial {
-                lost: None,
+                failure: None,
                 replans: executions,
                 tally: stage.tally,
             };
         }
         executions += 1;
     };
-    if let Some((course, _)) = &mut stage.course {
+    if let Some((course, _)) = &mut stage.record {
         course.ending = Some(ending);
     }
     Trial {
-        lost: Some(Lost {
+        failure: Some(TrialFailure {
             ending,
             last: stage.last,
         }),

@@ -5,11 +5,11 @@
 //! - [`SoundWorld`]: independent draws with the given likelihoods;
 //! - [`PublishedWorld`]: the behaviour of the authors' programs that made the paper's results.
 
-mod chances;
+mod event_probabilities;
+mod likelihood_world;
 mod published;
 mod rand_c;
-mod sound;
 
-pub use chances::Chances;
+pub use event_probabilities::EventProbabilities;
+pub use likelihood_world::SoundWorld;
 pub use published::{Perturbation, PerturbedFacts, PublishedWorld};
-pub use sound::SoundWorld;

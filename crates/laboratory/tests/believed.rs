@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::learn::{LearnRequest, Log, Settings, learn};
 use elbowroom::answers::run::{RunRequest, simulate};
 use elbowroom::execute::{Candidates, Limits, NamedText, RunSpec};
@@ -63,7 +63,7 @@ fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
     let model = WorldModel::read(world.as_str(), task.problem()).expect("it is a world");
     let limits = Limits {
         work: u64::MAX,
-        patience: 1,
+        first_plan_factor: 1,
         most_states: 2_000,
         improve_states: 256,
         other_states: 10_000,
@@ -103,7 +103,7 @@ fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
             let request = RunRequest::new(&spec, &task)
                 .beginning_with(plan.clone())
                 .recorded_by(&mut writer);
-            simulate(request, &mut Unwatched).expect("a world");
+            simulate(request, &mut NoObserver).expect("a world");
             drop(writer);
             Log::read(&Source::new(format!("run {seed}"), text)).expect("a trace")
         });
@@ -117,7 +117,7 @@ fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
 /// For the table of docs/learning.md: `ELBOWROOM_LEARNT=20 cargo test --workspace --test believed
 /// what_was -- --nocapture`.
 #[test]
-fn what_was_learnt_from_few_logs_is_as_good_as_the_truth() {
+fn world_learnt_from_few_logs_is_as_good_as_the_true_one() {
     let times: Option<u64> = std::env::var("ELBOWROOM_LEARNT")
         .ok()
         .and_then(|times| times.parse().ok());
@@ -139,10 +139,10 @@ fn what_was_learnt_from_few_logs_is_as_good_as_the_truth() {
                 let request = LearnRequest {
                     logs: logs(&experiment, *count, 10_000 * time),
                     settings: Settings::default(),
-                    inside: None,
+                    conformal_box: None,
                     expected: None,
                 };
-                let learnt = learn(&request, &mut Unwatched).expect("an answer").world;
+                let learnt = learn(&request, &mut NoObserver).expect("an answer").world;
                 let mut column = experiment.columns[0].clone();
                 column.believed = Some(learnt);
                 column.name = format!("{count} logs, {time}");
@@ -165,7 +165,7 @@ fn what_was_learnt_from_few_logs_is_as_good_as_the_truth() {
 
 /// An executor that believes that nothing slips takes the slide.
 #[test]
-fn executors_go_by_what_they_believe() {
+fn executors_use_the_believed_world() {
     let mut experiment = experiment("vase", &["policy"]);
     let own = experiment.columns[0].clone();
     let mut same = own.clone();

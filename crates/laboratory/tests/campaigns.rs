@@ -28,7 +28,7 @@ const WHOLE: Part = Part {
 };
 
 #[test]
-fn results_do_not_depend_on_the_number_of_threads_and_parts_add_up() {
+fn results_are_independent_of_threads_and_parts() {
     let experiment = experiment();
     let make = |part| run(&experiment, part, &|_| true).expect("a correct test");
     let whole = make(WHOLE);
@@ -43,14 +43,17 @@ fn results_do_not_depend_on_the_number_of_threads_and_parts_add_up() {
             ..WHOLE
         })
     });
-    assert_eq!(Results::merged(&parts).expect("a correct test"), whole);
-    assert!(Results::merged(&[parts[0].clone(), parts[0].clone()]).is_err());
+    assert_eq!(
+        Results::merge_results(&parts).expect("a correct test"),
+        whole
+    );
+    assert!(Results::merge_results(&[parts[0].clone(), parts[0].clone()]).is_err());
     let text = whole.json().to_string();
     assert_eq!(Results::read(&text).expect("a correct test"), whole);
 }
 
 #[test]
-fn mistakes_in_an_experiment_have_their_line() {
+fn errors_in_experiments_name_their_line() {
     let text = read("experiments/table1.toml");
     let file = |name: &str| Ok(read(&format!("experiments/{name}")));
     let broken = text.replace("\"fixed:10\"", "\"fixed:ten\"");
@@ -62,7 +65,7 @@ fn mistakes_in_an_experiment_have_their_line() {
 }
 
 /// Returns `clumsy.toml` with few trials.
-fn clumsy(change: &dyn Fn(&str) -> String) -> Result<Experiment, String> {
+fn clumsy_experiment(change: &dyn Fn(&str) -> String) -> Result<Experiment, String> {
     let file = |name: &str| Ok(read(&format!("experiments/{name}")));
     let text = change(&read("experiments/clumsy.toml"));
     Experiment::read(&text, &file).map_err(|error| error.to_string())
@@ -70,9 +73,9 @@ fn clumsy(change: &dyn Fn(&str) -> String) -> Result<Experiment, String> {
 
 /// Three starts in ten fail, which executors can only know from the likelihoods.
 #[test]
-fn a_column_says_how_likely_everything_is() {
-    let told = clumsy(&str::to_owned).expect("a correct test");
-    let untold = clumsy(&|text| {
+fn column_specifies_likelihoods() {
+    let told = clumsy_experiment(&str::to_owned).expect("a correct test");
+    let untold = clumsy_experiment(&|text| {
         let lines = text.lines();
         let kept = lines.filter(|line| !line.starts_with("likelihoods"));
         kept.collect::<Vec<_>>().join("\n")
@@ -108,7 +111,7 @@ fn a_column_says_how_likely_everything_is() {
 }
 
 #[test]
-fn mistakes_about_likelihoods_are_told_with_their_place() {
+fn errors_about_likelihoods_name_their_position() {
     let text = read("experiments/clumsy.toml");
     let line = 1 + text[..text
         .find("clumsy/starts-fail.toml")
@@ -137,7 +140,7 @@ fn mistakes_about_likelihoods_are_told_with_their_place() {
 
 /// Stored results contain the fingerprint, so it must not change with the program.
 #[test]
-fn the_fingerprint_of_an_experiment_depends_on_what_it_says_and_stays() {
+fn fingerprint_depends_on_content_and_is_stable() {
     let made = |change: &dyn Fn(&mut Experiment)| {
         let mut experiment = experiment();
         change(&mut experiment);
@@ -151,7 +154,7 @@ fn the_fingerprint_of_an_experiment_depends_on_what_it_says_and_stays() {
         made(&|experiment| experiment.domain.push(' ')),
         made(&|experiment| experiment.executors.reverse()),
         made(&|experiment| experiment.columns.reverse()),
-        made(&|experiment| experiment.settings.most_replans += 1),
+        made(&|experiment| experiment.settings.max_replans += 1),
         made(&|experiment| experiment.planner_states += 1),
         made(&|experiment| experiment.planning_budget = 3.into()),
     ];
@@ -162,7 +165,7 @@ fn the_fingerprint_of_an_experiment_depends_on_what_it_says_and_stays() {
 /// An executor whose preparation was interrupted lacks the table of `policy` or has another first
 /// plan. Its trials would not be comparable.
 #[test]
-fn who_is_interrupted_while_getting_ready_makes_no_trial() {
+fn interruption_during_preparation_makes_no_trial() {
     let experiment = experiment();
     let asked = std::sync::atomic::AtomicU64::new(0);
     let only_at_first = |_| asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) == 0;

@@ -43,7 +43,7 @@ fn only(experiment: Experiment, executors: &[&str]) -> Experiment {
 }
 
 #[test]
-fn likelier_first_plans_lose_nothing_to_the_shortest_and_gain_much_where_these_fail() {
+fn likeliest_first_plans_are_never_worse_than_the_shortest() {
     let told = std::env::var("ELBOWROOM_TRIALS").ok();
     let trials: u64 = told.map_or(100, |told| told.parse().expect("a number of trials"));
     let worlds = std::env::var("ELBOWROOM_WORLDS").ok();
@@ -126,7 +126,7 @@ fn with_plan(plan: &str) -> Experiment {
 }
 
 #[test]
-fn every_executor_begins_with_the_plan_that_the_experiment_names() {
+fn executors_start_with_the_given_plan() {
     for (plan, successes) in [("0: (slow) [5]", 3), ("0: (quick) [1]", 0)] {
         let results = results(&with_plan(plan), 1, 3);
         assert!(

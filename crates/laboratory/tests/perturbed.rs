@@ -6,7 +6,7 @@ use std::path::Path;
 
 use elbowroom_laboratory::compare::Part;
 use elbowroom_laboratory::perturbed::{
-    self, OptimumRules, PerturbedExperiment, PerturbedResults, PlannerKind, Row, StoredCourse,
+    self, OptimumRules, PerturbedExperiment, PerturbedResults, PlannerKind, Row, StoredTrial,
     WorldKind,
 };
 use elbowroom_laboratory::record::TrialRecords;
@@ -44,7 +44,7 @@ fn rows(name: &str, world: WorldKind, trials: u64) -> Vec<Row> {
 }
 
 #[test]
-fn conditions_over_all_matter_only_where_what_is_lost_comes_back() {
+fn over_all_conditions_matter_only_if_lost_facts_return() {
     let mut experiment = whole_experiment("olisipo_sf3.toml");
     experiment.worlds = vec![WorldKind::Sound];
     experiment.executors.truncate(1);
@@ -62,7 +62,7 @@ fn conditions_over_all_matter_only_where_what_is_lost_comes_back() {
 }
 
 #[test]
-fn the_optimum_depends_on_what_becomes_of_dead_ends() {
+fn optimum_depends_on_dead_end_rule() {
     let mut experiment = whole_experiment("olisipo_af3.toml");
     experiment.worlds = vec![WorldKind::Sound];
     experiment.executors.truncate(1);
@@ -94,7 +94,7 @@ fn share(rows: &[Row], case: &str, executor: &str) -> f64 {
 }
 
 #[test]
-fn the_published_success_rates_come_out_where_the_world_is_as_published() {
+fn published_success_rates_are_reproduced_in_published_world() {
     for (name, count) in [("olisipo_sf3.toml", 20), ("olisipo_af3.toml", 16)] {
         let rows = rows(name, WorldKind::AsPublished, 1000);
         let distances: Vec<f64> = rows.iter().filter_map(Row::distance).collect();
@@ -120,7 +120,7 @@ fn the_published_success_rates_come_out_where_the_world_is_as_published() {
 }
 
 #[test]
-fn the_lookahead_succeeds_as_often_as_its_table_says() {
+fn lookahead_success_rate_matches_its_table() {
     for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
         let rows = rows(name, WorldKind::Sound, 1000).into_iter();
         for row in rows.filter(|row| row.executor.name() == "lookahead") {
@@ -134,7 +134,7 @@ fn the_lookahead_succeeds_as_often_as_its_table_says() {
 }
 
 #[test]
-fn where_ends_fail_the_lookahead_succeeds_as_often_as_its_table_says_and_nobody_more_often() {
+fn lookahead_is_optimal_where_ends_fail() {
     let trials = 3000.0_f64;
     let mut shares = Vec::new();
     for row in rows("grasp.toml", WorldKind::Sound, 3000) {
@@ -160,7 +160,7 @@ fn where_ends_fail_the_lookahead_succeeds_as_often_as_its_table_says_and_nobody_
 }
 
 #[test]
-fn likelihoods_that_a_world_without_time_cannot_follow_are_refused_by_name() {
+fn unsupported_likelihoods_are_rejected_by_name() {
     let mut experiment = experiment("grasp.toml");
     experiment.cases.truncate(1);
     let said = |experiment: &PerturbedExperiment| {
@@ -182,7 +182,7 @@ fn likelihoods_that_a_world_without_time_cannot_follow_are_refused_by_name() {
 }
 
 #[test]
-fn olisipo_succeeds_more_often_than_esterel_in_a_sound_world_and_no_more_often_than_can_be() {
+fn olisipo_beats_esterel_and_stays_below_optimum_in_sound_world() {
     for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
         let rows = rows(name, WorldKind::Sound, 2000);
         for case in &experiment(name).cases {
@@ -213,15 +213,17 @@ fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> PerturbedResul
     let parts = [run(shard(1)), run(shard(0))]
         .map(|part| PerturbedResults::read(&part.json().to_string()).unwrap());
     assert_ne!(parts[0], whole);
-    assert_eq!(PerturbedResults::merged(&parts).unwrap(), whole);
+    assert_eq!(PerturbedResults::merge_results(&parts).unwrap(), whole);
     let twice = [parts[0].clone(), parts[0].clone()];
-    assert!(PerturbedResults::merged(&twice).is_err());
-    assert!(PerturbedResults::merged(&[parts[0].clone(), run(part(trials - 1, 1))]).is_err());
+    assert!(PerturbedResults::merge_results(&twice).is_err());
+    assert!(
+        PerturbedResults::merge_results(&[parts[0].clone(), run(part(trials - 1, 1))]).is_err()
+    );
     whole
 }
 
 #[test]
-fn results_do_not_depend_on_how_many_run_at_once_and_parts_add_up() {
+fn results_are_independent_of_threads_and_parts() {
     let whole = parts_add_up(&experiment("olisipo_sf3.toml"), 21);
     for (name, plot) in perturbed::plots(&whole) {
         assert!(plot.svg().unwrap().contains("SF3 p10"), "{name}");
@@ -243,7 +245,7 @@ fn with_embedded_plans(name: &str) -> PerturbedExperiment {
 }
 
 #[test]
-fn plans_of_the_embedded_planner_are_the_same_for_any_number_of_threads_and_in_parts() {
+fn embedded_plans_are_independent_of_threads_and_parts() {
     for (name, has_other_plans) in [("olisipo_sf3.toml", false), ("olisipo_af3.toml", true)] {
         let experiment = with_embedded_plans(name);
         let whole = parts_add_up(&experiment, 60);
@@ -255,7 +257,7 @@ fn plans_of_the_embedded_planner_are_the_same_for_any_number_of_threads_and_in_p
         let shortest = perturbed::run(&other, part(60, 0), &|_| true).unwrap();
         assert!((whole.rows != shortest.rows) == has_other_plans, "{name}");
         assert_ne!(whole.fingerprint, shortest.fingerprint);
-        assert!(PerturbedResults::merged(&[whole.clone(), shortest.clone()]).is_err());
+        assert!(PerturbedResults::merge_results(&[whole.clone(), shortest.clone()]).is_err());
         // An executor that does not use plans has the same results with any planner.
         let foresighted = |results: &PerturbedResults| {
             let rows = results.rows.iter();
@@ -268,7 +270,7 @@ fn plans_of_the_embedded_planner_are_the_same_for_any_number_of_threads_and_in_p
 }
 
 #[test]
-fn with_plans_of_the_embedded_planner_nobody_succeeds_more_often_than_can_be() {
+fn no_executor_exceeds_optimum_with_embedded_plans() {
     for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
         let mut experiment = with_embedded_plans(name);
         experiment.worlds = vec![WorldKind::Sound];
@@ -283,7 +285,7 @@ fn with_plans_of_the_embedded_planner_nobody_succeeds_more_often_than_can_be() {
 }
 
 #[test]
-fn failures_are_counted_by_kind_and_the_first_trial_of_each_can_be_made_once_more() {
+fn failures_are_counted_by_kind_and_can_be_repeated() {
     let mut experiment = experiment("olisipo_sf3.toml");
     experiment.cases.truncate(2);
     let records = TrialRecords::default();
@@ -296,10 +298,10 @@ fn failures_are_counted_by_kind_and_the_first_trial_of_each_can_be_made_once_mor
         assert_eq!(failed, row.success.count - row.success.successes);
         for kind in kinds {
             let trial = kind.first.trial;
-            let text = perturbed::courses(&experiment, &[(place, trial)])
+            let text = perturbed::repeat_trials(&experiment, &[(place, trial)])
                 .unwrap()
                 .remove(0);
-            let course = StoredCourse::read(&text).unwrap();
+            let course = StoredTrial::read(&text).unwrap();
             assert_eq!(course.text(), text);
             assert_eq!((&course.ended, course.trial), (&kind.verdict, trial));
             assert_eq!((&course.case, course.world), (&row.case, row.world));
@@ -321,15 +323,15 @@ fn failures_are_counted_by_kind_and_the_first_trial_of_each_can_be_made_once_mor
     assert!(table.contains("goal-reached"));
     let row = &made.rows[0];
     let all: Vec<(usize, u64)> = (0..60).map(|trial| (0, trial)).collect();
-    let courses = perturbed::courses(&experiment, &all).unwrap();
-    let has_failed = |text: &&String| StoredCourse::read(text).unwrap().ended != "goal-reached";
+    let courses = perturbed::repeat_trials(&experiment, &all).unwrap();
+    let has_failed = |text: &&String| StoredTrial::read(text).unwrap().ended != "goal-reached";
     let failed = courses.iter().filter(has_failed).count();
     assert_eq!(failed as u64, row.success.count - row.success.successes);
-    assert!(perturbed::courses(&experiment, &[(made.rows.len(), 0)]).is_err());
+    assert!(perturbed::repeat_trials(&experiment, &[(made.rows.len(), 0)]).is_err());
 }
 
 #[test]
-fn kinds_of_failure_are_the_same_whether_an_experiment_is_made_at_once_or_in_parts() {
+fn failure_kinds_do_not_depend_on_parts() {
     let mut experiment = experiment("olisipo_af3.toml");
     experiment.cases.truncate(1);
     let whole = perturbed::run(&experiment, part(40, 0), &|_| true).unwrap();
@@ -343,11 +345,11 @@ fn kinds_of_failure_are_the_same_whether_an_experiment_is_made_at_once_or_in_par
             perturbed::run(&experiment, part, &|_| true).unwrap()
         })
         .collect();
-    assert_eq!(PerturbedResults::merged(&parts).unwrap(), whole);
+    assert_eq!(PerturbedResults::merge_results(&parts).unwrap(), whole);
 }
 
 #[test]
-fn optimum_is_0_where_the_trials_find_no_first_plan() {
+fn optimum_is_0_without_first_plan() {
     let text = r#"
         format = "elbowroom-perturbed-experiment"
         version = 1

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom_execution::run::{Report, Verdict};
-use elbowroom_execution::{Outlook, PlanAnswer, Planner};
+use elbowroom_execution::{ActionValues, PlanAnswer, Planner};
 use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
 use elbowroom_laboratory::timed::{Policy, Settings};
 use elbowroom_model::{Situation, Task};
@@ -117,13 +117,13 @@ fn a_parcel_that_may_fall_is_grasped_with_care() {
 }
 
 #[test]
-fn machines_are_maintained_all_at_once() {
+fn machines_are_maintained_concurrently() {
     is_near_the_optimum_and_above_all_others("machines");
 }
 
 /// The likelihoods are rates per second, so sequential execution has a cost.
 #[test]
-fn who_goes_by_likelihoods_maintains_machines_as_parallel_as_who_does_not() {
+fn likelihood_executors_maintain_machines_in_parallel() {
     let results = results("machines", 0, 100);
     let won = |name: &str| {
         let row = results.rows.iter().position(|row| row == name);
@@ -140,7 +140,7 @@ fn who_goes_by_likelihoods_maintains_machines_as_parallel_as_who_does_not() {
 }
 
 #[test]
-fn the_same_seed_leads_to_the_same_runs_on_any_number_of_threads() {
+fn runs_depend_on_seed_but_not_on_threads() {
     let one = results("weld", 1, 40);
     let two = results("weld", 2, 40);
     assert_eq!(one.json(), two.json());
@@ -157,7 +157,7 @@ struct Small<'a> {
 }
 
 /// Results of `policy` in a world: the bounds of its table, and the runs.
-struct Made {
+struct PolicyResults {
     lower: f64,
     upper: f64,
     reports: Vec<Report>,
@@ -169,7 +169,7 @@ struct Made {
 const BASELINES: [&str; 5] = ["esterel", "stn", "guarded", "live", "fixed:100"];
 
 /// Returns the results in a world, or `None` if there is no plan to begin with.
-fn made_of(small: &Small<'_>, runs: u64) -> Option<Made> {
+fn made_of(small: &Small<'_>, runs: u64) -> Option<PolicyResults> {
     let source = |text: &str| Source::new("test", text);
     let read = read_problem(&source(small.domain), &source(small.problem));
     let task = Arc::new(Task::new(read.expect("it is PDDL").0));
@@ -192,18 +192,18 @@ fn made_of(small: &Small<'_>, runs: u64) -> Option<Made> {
     let policy = Policy::new(&task, &model, &settings, &|| true);
     let policy = policy.expect("all of it is known to the process")?;
     let (lower, upper) = (policy.optimum().lower, policy.optimum().upper);
-    let outlook: Arc<dyn Outlook> = Arc::new(policy);
+    let outlook: Arc<dyn ActionValues> = Arc::new(policy);
     let runs_of = |executor: &str| -> Vec<Report> {
         let runs = (0..runs).map(|seed| {
             let execution = Execution::of(&task)
                 .by(executor.parse().expect("it is registered"))
                 .beginning_with(plan.clone())
-                .with_outlook(Some(Arc::clone(&outlook)));
+                .with_action_values(Some(Arc::clone(&outlook)));
             execution.run_in(&mut *model.world(&task, seed))
         });
         runs.collect()
     };
-    Some(Made {
+    Some(PolicyResults {
         lower,
         upper,
         reports: runs_of("policy"),
@@ -218,7 +218,7 @@ fn made_of(small: &Small<'_>, runs: u64) -> Option<Made> {
 /// sampling error and two points.
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
-fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
+fn policy_matches_recursion_in_random_small_worlds() {
     const RUNS: u64 = 200;
     const OF_EACH_KIND: usize = 10;
     let mut tried = [0; 4];
@@ -251,7 +251,7 @@ fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
         let Some(made) = made_of(&small, RUNS) else {
             continue;
         };
-        let Made {
+        let PolicyResults {
             lower,
             upper,
             reports,
@@ -306,7 +306,7 @@ fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
 /// executor starts again as soon as the door is open, and never while it is closed.
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
-fn a_door_that_opens_and_closes_at_rates_is_tried_as_often_as_there_is_time() {
+fn door_with_rates_is_tried_while_time_remains() {
     const RUNS: u64 = 400;
     let small = Small {
         domain: "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
@@ -337,7 +337,7 @@ fn a_door_that_opens_and_closes_at_rates_is_tried_as_often_as_there_is_time() {
 
 /// The plan passes through the goal, loses it again, and fails half of the time on the way back.
 #[test]
-fn what_is_under_way_is_let_go_when_the_goal_holds() {
+fn running_actions_are_cancelled_when_goal_holds() {
     let small = Small {
         domain: "(define (domain lamp) (:requirements :durative-actions)
             (:predicates (lit) (pressed) (wired))
@@ -363,7 +363,7 @@ fn what_is_under_way_is_let_go_when_the_goal_holds() {
 /// states; that of these seven actions has few. The first plan has other actions; it is quicker,
 /// and fails half of the time.
 #[test]
-fn where_a_plan_nearly_always_succeeds_it_goes_by_the_table_of_its_actions() {
+fn nearly_certain_plan_uses_table_of_its_actions() {
     let names = ["a", "b", "c", "d", "e", "f"];
     let actions = names.map(|name| {
         format!(
@@ -412,7 +412,7 @@ fn where_a_plan_nearly_always_succeeds_it_goes_by_the_table_of_its_actions() {
             plans,
             ..settings.clone()
         };
-        Policy::close(&task, &model, &settings, &|| true).expect("all of it is known")
+        Policy::if_near_optimal(&task, &model, &settings, &|| true).expect("all of it is known")
     };
     assert!(of(Vec::new()).is_none(), "there are not too many states");
     let quick = vec!["(rush)".to_owned(), "(deliver)".to_owned()];
@@ -427,14 +427,14 @@ fn where_a_plan_nearly_always_succeeds_it_goes_by_the_table_of_its_actions() {
         optimum.within.is_some() && optimum.lower > 0.99,
         "{optimum:?}"
     );
-    let outlook: Arc<dyn Outlook> = Arc::new(policy);
+    let outlook: Arc<dyn ActionValues> = Arc::new(policy);
     let text = "0: (rush) [1]\n1.001: (deliver) [1]\n";
     let first = read_plan(&source(text), &task).expect("it is a plan").0;
     for seed in 0..50 {
         let execution = Execution::of(&task)
             .by("policy".parse().expect("it is registered"))
             .beginning_with(first.clone())
-            .with_outlook(Some(Arc::clone(&outlook)));
+            .with_action_values(Some(Arc::clone(&outlook)));
         let report = execution.run_in(&mut *model.world(&task, seed));
         assert_eq!(report.verdict, Verdict::GoalReached, "{seed}: {report:#?}");
         // The planner was not called.

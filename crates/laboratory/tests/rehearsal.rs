@@ -13,7 +13,7 @@ use elbowroom_pddl::Source;
 /// `policy`, and the executors for comparison.
 const EXECUTORS: &str = "policy live:5 adaptable guarded esterel";
 
-fn told(name: &str, default: &str) -> String {
+fn env_or_default(name: &str, default: &str) -> String {
     std::env::var(name).unwrap_or_else(|_| default.to_owned())
 }
 
@@ -25,7 +25,7 @@ fn experiment(name: &str) -> Experiment {
     };
     let text = file(&format!("{name}.toml")).expect("it is there");
     let read = Experiment::read(Source::new(name, text.as_str()), &file);
-    let executors = told("ELBOWROOM_EXECUTORS", EXECUTORS);
+    let executors = env_or_default("ELBOWROOM_EXECUTORS", EXECUTORS);
     let executors = executors
         .split_whitespace()
         .map(|it| it.parse().expect("a name"));
@@ -55,9 +55,11 @@ const NEAR: [(&str, f64); 2] = [("weld", 0.957 - 0.15), ("vase", 0.976 - 0.13)];
 
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few trials")]
-fn without_a_table_it_is_near_the_optimum_and_not_below_who_does_not_weigh_moves() {
-    let trials = told("ELBOWROOM_TRIALS", "40").parse().expect("a number");
-    for name in told("ELBOWROOM_WORLDS", "vase weld").split_whitespace() {
+fn policy_without_table_is_near_optimum() {
+    let trials = env_or_default("ELBOWROOM_TRIALS", "40")
+        .parse()
+        .expect("a number");
+    for name in env_or_default("ELBOWROOM_WORLDS", "vase weld").split_whitespace() {
         let mut experiment = experiment(name);
         if let Ok(only) = std::env::var("ELBOWROOM_COLUMN") {
             let is_meant = |column: &Column| column.name.contains(&only);
@@ -93,7 +95,7 @@ fn without_a_table_it_is_near_the_optimum_and_not_below_who_does_not_weigh_moves
 }
 
 #[test]
-fn what_is_tried_out_does_not_depend_on_the_number_of_threads() {
+fn rollouts_do_not_depend_on_number_of_threads() {
     let mut experiment = experiment("weld");
     experiment.executors.truncate(1);
     let (one, many) = (results(&experiment, 1, 6), results(&experiment, 3, 6));

@@ -127,7 +127,7 @@ fn scripts(steps: &[i64], ring: i64) -> Vec<Script> {
 }
 
 /// Validates a plan. Returns its end, if it is valid.
-fn judged(task: &Task, text: &str) -> Option<Rational> {
+fn validated_end(task: &Task, text: &str) -> Option<Rational> {
     let (plan, _): (TimeTriggeredPlan, _) =
         read_plan(&Source::new("plan", text), task).expect("a readable plan");
     let verdict = validate(task, &plan, &Settings::default());
@@ -207,8 +207,8 @@ fn compare(table: &str, folder: &Path, domain: &str, steps: [&[i64]; 2], ring: i
             .iter()
             .zip(scripts(our_steps, ring))
         {
-            let verdict = judged(ours, &translated(&mine.text));
-            let expected = judged(&task, &theirs.text);
+            let verdict = validated_end(ours, &translated(&mine.text));
+            let expected = validated_end(&task, &theirs.text);
             assert_eq!(verdict, expected, "{}:\n{}", path.display(), theirs.text);
             *(if verdict.is_some() {
                 &mut valid
@@ -249,7 +249,7 @@ fn table_2_has_the_authors_deadlines_durations_and_actions() {
 /// whatever its capacity, and the order gets the capacity as its weight, which is too heavy for a
 /// delivery. Ours follows the description: a full battery, and no weight.
 #[test]
-fn an_order_that_was_thrown_away_can_be_made_again_only_in_our_table_2() {
+fn discarded_order_can_be_repeated_only_in_own_table_2() {
     let Some(data) = shared::data() else { return };
     let folder = data.join("envelopes/rcll_resource");
     let six: &[i64] = &[170, 160, 150, 140, 130, 120];
@@ -265,7 +265,12 @@ fn an_order_that_was_thrown_away_can_be_made_again_only_in_our_table_2() {
     let mut ours = our_problems("table2");
     for (ours, path) in ours.iter_mut().zip(&theirs) {
         let task = shared::task(&domain, path).expect("a readable problem");
-        assert!(judged(ours, &translated(&again(six).text)).is_some());
-        assert_eq!(judged(&task, &again(six).text), None, "{}", path.display());
+        assert!(validated_end(ours, &translated(&again(six).text)).is_some());
+        assert_eq!(
+            validated_end(&task, &again(six).text),
+            None,
+            "{}",
+            path.display()
+        );
     }
 }

@@ -23,7 +23,7 @@ use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::PartialOrderPlan;
 use elbowroom_probability::optimum::{self as without_time, DeadEnds, Perturbed};
 use elbowroom_probability::{
-    Circumstances, Likelihoods, Model, Semantics, all_actions_under, likelihoods,
+    Likelihoods, Model, SearchState, Semantics, all_actions_under, likelihoods,
 };
 use elbowroom_sim::WorldModel;
 use rand::SeedableRng;
@@ -35,7 +35,7 @@ use twin::SmallWorld;
 
 /// Output of `testing/storm.py` for a file.
 #[derive(Debug, Deserialize)]
-struct Said {
+struct StormResult {
     value: f64,
     fraction: Option<String>,
     states: usize,
@@ -47,7 +47,7 @@ fn root() -> PathBuf {
 
 /// Returns the results of Storm for each text. Those from `exact` on are computed with fractions.
 /// `None` if Storm is not available.
-fn storm(test: &str, texts: &[String], exact: usize) -> Option<Vec<Said>> {
+fn storm(test: &str, texts: &[String], exact: usize) -> Option<Vec<StormResult>> {
     let Some(python) = std::env::var_os("ELBOWROOM_STORM") else {
         skipped("ELBOWROOM_STORM names no Python with stormpy");
         return None;
@@ -72,11 +72,11 @@ fn storm(test: &str, texts: &[String], exact: usize) -> Option<Vec<Said>> {
     assert!(output.status.success(), "{errors}");
     let lines = String::from_utf8(output.stdout).expect("text");
     let lines = lines.lines().filter(|line| line.starts_with('{'));
-    let said: Vec<Said> = lines
+    let said: Vec<StormResult> = lines
         .map(|line| serde_json::from_str(line).expect("an answer"))
         .collect();
     assert_eq!(said.len(), texts.len(), "{errors}");
-    let is_exact = |said: &Said| said.fraction.is_some();
+    let is_exact = |said: &StormResult| said.fraction.is_some();
     assert!(said[exact.min(said.len())..].iter().all(is_exact));
     Some(said)
 }
@@ -95,12 +95,12 @@ fn best(task: &Task, likelihoods: &Likelihoods, settings: &without_time::Setting
     let model = Model::new(Arc::clone(&task), plan, likelihoods, Semantics::World);
     let model = model.expect("all likelihoods are there");
     let process = Perturbed::new(model, settings.clone()).expect("it is small");
-    let circumstances = Circumstances::believed(&task, likelihoods);
+    let circumstances = SearchState::initial_with_beliefs(&task, likelihoods);
     process.optimum().value(&process, &circumstances)
 }
 
 #[track_caller]
-fn assert_the_same(name: &str, ours: f64, said: &Said) {
+fn assert_the_same(name: &str, ours: f64, said: &StormResult) {
     println!(
         "{name}: {ours:.12}, Storm {} of {} states",
         said.value, said.states
@@ -112,7 +112,7 @@ fn assert_the_same(name: &str, ours: f64, said: &Said) {
 }
 
 #[test]
-fn the_optima_of_paper_2_are_those_of_storm() {
+fn optima_of_paper_2_match_storm() {
     let folder = root().join("experiments");
     let file = |path: &str| fs::read_to_string(folder.join(path)).map_err(|it| it.to_string());
     let text = file("olisipo.toml").expect("it is there");
@@ -161,7 +161,7 @@ fn the_optima_of_paper_2_are_those_of_storm() {
 }
 
 #[test]
-fn cases_with_beliefs_and_instantaneous_actions_are_those_of_storm() {
+fn cases_with_beliefs_and_instantaneous_actions_match_storm() {
     let domain = "
         (define (domain door) (:requirements :strips :durative-actions :negative-preconditions)
           (:predicates (open) (inside) (dark) (seen) (bell))
@@ -215,7 +215,7 @@ fn cases_with_beliefs_and_instantaneous_actions_are_those_of_storm() {
 }
 
 #[test]
-fn worlds_in_which_ends_fail_are_those_of_storm() {
+fn worlds_with_failing_ends_match_storm() {
     let file = |name: &str| {
         let path = root().join("experiments/grasp").join(name);
         fs::read_to_string(path).expect("it is there")
@@ -260,7 +260,7 @@ fn grid(task: &Task, world: &WorldModel, settings: &Settings, cells: usize) -> T
 }
 
 #[track_caller]
-fn assert_within(name: &str, ours: &TimedOptimum, (upper, lower): (&Said, &Said)) {
+fn assert_within(name: &str, ours: &TimedOptimum, (upper, lower): (&StormResult, &StormResult)) {
     println!(
         "{name}: {} to {}, Storm {} to {} of {} and {} states",
         ours.lower, ours.upper, lower.value, upper.value, lower.states, upper.states
@@ -277,7 +277,7 @@ fn assert_within(name: &str, ours: &TimedOptimum, (upper, lower): (&Said, &Said)
 }
 
 #[test]
-fn bounds_of_the_timed_optimum_are_those_of_storm() {
+fn bounds_of_timed_optimum_match_storm() {
     let file = |name: &str, file: &str| {
         let path = root().join("experiments").join(name).join(file);
         fs::read_to_string(path).expect("it is there")
@@ -330,7 +330,7 @@ fn bounds_of_the_timed_optimum_are_those_of_storm() {
 }
 
 #[test]
-fn a_world_with_rates_is_refused_as_a_process_by_name() {
+fn export_rejects_rates_by_name() {
     let task = task(
         "(define (domain d) (:requirements :durative-actions) (:predicates (open) (through))
             (:durative-action go :parameters () :duration (= ?duration 2)
@@ -346,7 +346,7 @@ fn a_world_with_rates_is_refused_as_a_process_by_name() {
 }
 
 #[test]
-fn a_world_in_which_failures_differ_is_refused_as_a_process_by_name() {
+fn export_rejects_different_failures_by_name() {
     let task = task(
         "(define (domain d) (:requirements :durative-actions) (:predicates (late) (through))
             (:durative-action go :parameters () :duration (= ?duration 2)

@@ -9,7 +9,7 @@ fn of_first_problem(name: &str) -> Vec<ColumnOptimum> {
     for (_, values) in &mut experiment.blanks {
         values.truncate(1);
     }
-    for group in &mut experiment.together {
+    for group in &mut experiment.linked {
         group.rows.truncate(1);
     }
     optimum_of(&experiment)
@@ -43,7 +43,7 @@ fn optimum_of(experiment: &Experiment) -> Vec<ColumnOptimum> {
 /// Both windows close at the earliest time of all problems. A policy that aims at the later one is
 /// nearly always in time, however many steps vary.
 #[test]
-fn in_the_tightest_problem_of_table_1_hardly_anything_need_be_lost() {
+fn optimum_of_tightest_problem_of_table_1_is_near_1() {
     let columns = of_first_problem("table1");
     assert_eq!(columns.len(), 5);
     for optimum in columns {
@@ -56,11 +56,11 @@ fn in_the_tightest_problem_of_table_1_hardly_anything_need_be_lost() {
 /// may get more material after the rings, because the model allows a workpiece to be picked up
 /// again that was thrown away while it was being picked up.
 #[test]
-fn in_a_problem_of_table_2_the_bounds_are_a_point_apart() {
+fn bounds_of_table_2_differ_by_at_most_one_point() {
     let mut experiment = experiment("table2_optimum");
     experiment.columns.truncate(1);
     // With the largest battery there is only one plan, and its recovery.
-    for group in &mut experiment.together {
+    for group in &mut experiment.linked {
         group.rows.drain(..group.rows.len() - 1);
     }
     let columns = optimum_of(&experiment);

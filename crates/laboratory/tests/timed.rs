@@ -59,7 +59,7 @@ fn assert_encloses(found: &TimedOptimum, value: f64) {
 }
 
 #[test]
-fn machines_are_best_maintained_all_at_once() {
+fn concurrent_maintenance_is_optimal() {
     let found = of_experiment(
         "machines",
         &Settings {
@@ -74,7 +74,7 @@ fn machines_are_best_maintained_all_at_once() {
 /// Six concurrent actions of random duration, and one after them. Free start and cancel times have
 /// too many states. Starting each action as soon as it is possible has few.
 #[test]
-fn many_things_at_once_are_bounded_from_below_within_a_plan() {
+fn many_concurrent_actions_have_lower_bound_within_a_plan() {
     let names = ["a", "b", "c", "d", "e", "f"];
     let predicates = names.map(|name| format!("(todo-{name}) (done-{name})"));
     let actions = names.map(|name| {
@@ -122,7 +122,7 @@ fn many_things_at_once_are_bounded_from_below_within_a_plan() {
 /// carried with care. If there are too many states, the upper bound is that of a world without this
 /// failure.
 #[test]
-fn with_too_many_states_the_bound_from_above_is_that_of_a_kinder_world() {
+fn too_many_states_give_upper_bound_of_relaxed_world() {
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
         (:predicates (day) (whole) (home))
         (:durative-action carry :parameters () :duration (= ?duration 6)
@@ -157,7 +157,7 @@ fn with_too_many_states_the_bound_from_above_is_that_of_a_kinder_world() {
 
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few steps")]
-fn a_door_that_opens_and_closes_at_rates_is_gone_through_when_it_lets_one() {
+fn door_with_rates_matches_hand_computation() {
     // The door is open at first, closes once in ten seconds and opens once in five. Going through
     // takes 4, and the day is over at 12. After a failure, the best policy starts again as soon as
     // the door is open.
@@ -204,7 +204,7 @@ fn a_door_that_opens_and_closes_at_rates_is_gone_through_when_it_lets_one() {
 }
 
 #[test]
-fn what_is_taken_away_and_given_back_in_one_cell_is_there_after_it() {
+fn fact_deleted_and_added_in_one_cell_holds_afterwards() {
     // The door closes at 2.5 and opens again at 3, and going through takes 4. On a coarse grid both
     // happen in one cell, in an unknown order.
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
@@ -226,7 +226,7 @@ fn what_is_taken_away_and_given_back_in_one_cell_is_there_after_it() {
 }
 
 #[test]
-fn who_waits_for_the_door_goes_through_it() {
+fn waiting_for_the_door_succeeds() {
     // The door opens at 3 for certain, and closes at a time in [5, 9]; going through takes 2. A
     // policy that waits at the door is through at 5.
     let domain = "(define (domain d) (:requirements :durative-actions)
@@ -242,7 +242,7 @@ fn who_waits_for_the_door_goes_through_it() {
 }
 
 #[test]
-fn light_that_goes_out_early_is_no_gain() {
+fn early_darkness_does_not_raise_the_bound() {
     // A match burns 4 or 8, each half of the time, and mending takes 5 in its light. Rounding the
     // duration of the match down or that of mending up would both be wrong. There is one match, and
     // it must burn down: if it could be dropped, there would be light forever.
@@ -262,7 +262,7 @@ fn light_that_goes_out_early_is_no_gain() {
 }
 
 #[test]
-fn what_the_process_does_not_know_is_refused_by_name() {
+fn unsupported_features_are_rejected_by_name() {
     let refused = |domain: &str, world: &str| {
         let task = task(
             &format!(
@@ -338,7 +338,7 @@ fn a_goal_that_a_timed_initial_changes_is_refused() {
 }
 
 #[test]
-fn what_a_failure_leaves_behind_and_costs_is_worth_what_hand_says() {
+fn failure_effects_match_hand_computation() {
     // A grasp takes 4 and fails half of the time. Then half of the parcels fall, and can be picked
     // up in 3; the others jam the gripper for 2 more. The counter closes at 10.5. At 4, half are
     // held, a quarter have fallen and are held at 7, and a quarter is on the shelf at 6, of which
@@ -367,7 +367,7 @@ fn what_a_failure_leaves_behind_and_costs_is_worth_what_hand_says() {
 }
 
 #[test]
-fn being_quick_at_everything_is_no_match_for_taking_care() {
+fn careful_policy_beats_fast_policy() {
     let settings = Settings {
         most_states: 300_000,
         gap: 0.05,
@@ -388,7 +388,7 @@ fn being_quick_at_everything_is_no_match_for_taking_care() {
 /// A key lies where a step begins that can only be done at the press. The step leaves it behind
 /// when it starts, and fails at once anywhere else.
 #[test]
-fn nobody_starts_what_breaks_off_at_once() {
+fn action_that_aborts_at_once_is_not_started() {
     let domain = |initial: &str| {
         let domain = "(define (domain d) (:requirements :durative-actions)
            (:predicates (at-press) (ready) (key) (open))
@@ -414,7 +414,7 @@ fn nobody_starts_what_breaks_off_at_once() {
 /// An amount between 0 and 80 is added twice, and 60 are enough. Two insufficient amounts may be
 /// enough together.
 #[test]
-fn what_is_drawn_twice_is_cut_where_half_of_it_decides() {
+fn sum_of_two_draws_is_cut_at_half_thresholds() {
     let domain = "(define (domain d) (:requirements :durative-actions :fluents)
        (:predicates (first) (second) (last) (full)) (:functions (weight))
        (:durative-action once :parameters () :duration (= ?duration 2)

@@ -43,7 +43,7 @@ pub struct Changes {
     /// Rate of each fact with exposure time, by its name: `(open office)`.
     pub facts: Vec<(String, Rate)>,
     /// `true` if each fact has its own rate, instead of one rate for all.
-    pub is_apart: bool,
+    pub has_rate_per_fact: bool,
 }
 
 impl Rate {
@@ -190,7 +190,7 @@ pub fn learn(exposures: &[Exposure]) -> Vec<Changes> {
                 predicate: (*predicate).to_owned(),
                 becomes: *becomes,
                 all,
-                is_apart: more > 0 && gain > float(more as u64),
+                has_rate_per_fact: more > 0 && gain > float(more as u64),
                 facts,
             }
         })
@@ -202,7 +202,7 @@ impl Changes {
     pub fn rate_of(&self, fact: &str) -> Rate {
         let own = self.facts.iter().find(|(name, _)| name == fact);
         match own {
-            Some((_, own)) if self.is_apart => *own,
+            Some((_, own)) if self.has_rate_per_fact => *own,
             _ => self.all,
         }
     }
@@ -232,7 +232,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     #[test]
-    fn intervals_are_those_of_the_tables() {
+    fn intervals_match_published_tables() {
         // Garwood (1936), as in tables of exact limits for Poisson counts.
         for (changes, lower, upper) in [
             (0, 0.0, 3.6889),
@@ -266,7 +266,7 @@ mod tests {
     /// For 20, 50 and 200 traces of half a minute, at three rates, the interval contains the true
     /// rate at least as often as stated, up to three standard errors of 2,000 samples.
     #[test]
-    fn intervals_hold_the_true_rate_as_often_as_they_say() {
+    fn intervals_have_their_nominal_coverage() {
         const TRIES: u32 = 2_000;
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for traces in [20.0, 50.0, 200.0] {
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn facts_that_differ_are_described_apart() {
+    fn facts_with_different_rates_are_separated() {
         let alike = [
             exposure("(works m1)", false, 5, 100.0),
             exposure("(works m2)", false, 7, 100.0),
@@ -315,7 +315,7 @@ mod tests {
             .map(|it| (it.predicate.as_str(), it.becomes))
             .collect();
         assert_eq!(names, [("works", false), ("works", true)]);
-        assert!(!learnt[0].is_apart);
+        assert!(!learnt[0].has_rate_per_fact);
         let rates: Vec<_> = learnt[0].rates().collect();
         assert_eq!(rates, [("(works m1)", 0.06), ("(works m2)", 0.06)]);
         assert_eq!(learnt[1].rates().count(), 0);
@@ -324,7 +324,7 @@ mod tests {
             exposure("(works m2)", false, 19, 100.0),
         ];
         let learnt = learn(&differ);
-        assert!(learnt[0].is_apart);
+        assert!(learnt[0].has_rate_per_fact);
         let rates: Vec<_> = learnt[0].rates().collect();
         assert_eq!(rates, [("(works m1)", 0.01), ("(works m2)", 0.19)]);
     }

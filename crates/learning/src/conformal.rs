@@ -83,7 +83,7 @@ pub fn factor(band: Band, calibration: &[Sample], miss: f64) -> f64 {
 }
 
 /// Returns the number of calibration samples that [`factor`] needs for a finite result.
-pub fn fewest(miss: f64) -> usize {
+pub fn min_samples(miss: f64) -> usize {
     if miss <= 0.0 {
         return usize::MAX;
     }
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coverage_is_as_promised_for_any_distribution() {
+    fn coverage_holds_for_any_distribution() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let band = Band {
             nominal: 1.0,
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn too_few_samples_promise_nothing() {
+    fn too_few_samples_give_infinite_factor() {
         let band = Band {
             nominal: 1.0,
             lower: 0.0,
@@ -158,13 +158,13 @@ mod tests {
         };
         let samples = vec![Sample::observed(1.0); 18];
         assert!(factor(band, &samples, 0.05).is_infinite());
-        assert_eq!(fewest(0.05), 19);
+        assert_eq!(min_samples(0.05), 19);
         let samples = vec![Sample::observed(1.0); 19];
         assert!(factor(band, &samples, 0.05).abs() < 1e-12);
     }
 
     #[test]
-    fn what_was_cut_off_may_be_anything_greater() {
+    fn censored_sample_counts_as_infinite() {
         let band = Band {
             nominal: 10.0,
             lower: 8.0,

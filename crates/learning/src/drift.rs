@@ -18,7 +18,7 @@ pub struct Drift {
 }
 
 /// Fraction of the capital that is redistributed among the directions in each step.
-const JUMPING: f64 = 0.01;
+const REDISTRIBUTED_FRACTION: f64 = 0.01;
 
 /// Tests values in order of observation. The alarm is raised when the evidence reaches `limit`:
 /// with 100, in at most 1 % of the sequences without drift.
@@ -39,7 +39,7 @@ pub fn drift(values: &[f64], limit: f64, rng: &mut impl Rng) -> Drift {
         let share = (float(greater) + rng.random::<f64>() * float(equal)) / float(sorted.len());
         let total: f64 = capital.iter().sum();
         for (bet, direction) in capital.iter_mut().zip([-1.0, 0.0, 1.0]) {
-            *bet = (1.0 - JUMPING) * *bet + JUMPING / 3.0 * total;
+            *bet = (1.0 - REDISTRIBUTED_FRACTION) * *bet + REDISTRIBUTED_FRACTION / 3.0 * total;
             *bet *= 1.0 + direction * (share - 0.5);
         }
         let total: f64 = capital.iter().sum();
@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn false_alarms_are_as_rare_as_promised() {
+    fn false_alarm_rate_is_below_limit() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let sequences = 1_000;
         let mut alarms = 0;
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slower_robot_is_noticed_soon() {
+    fn slowdown_is_detected_soon() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let values: Vec<f64> = (0..120)
             .map(|i| rng.random::<f64>() + if i < 60 { 10.0 } else { 11.5 })

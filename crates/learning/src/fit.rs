@@ -28,7 +28,7 @@ pub struct Fit {
 const LILLIEFORS: f64 = 1.035;
 
 /// Minimum number of observed values for the test of a family.
-const FEWEST_TO_DOUBT: usize = 20;
+const FEWEST_TO_REJECT: usize = 20;
 
 /// Returns the family with the best corrected Akaike criterion: constant, normal, lognormal or
 /// uniform. If that family is doubtful and no sample was censored above the observed values,
@@ -64,7 +64,7 @@ fn observed(samples: &[Sample]) -> impl Iterator<Item = f64> + Clone + '_ {
     observed.map(|sample| sample.value)
 }
 
-fn cut_off(samples: &[Sample]) -> impl Iterator<Item = f64> + Clone + '_ {
+fn censored_values(samples: &[Sample]) -> impl Iterator<Item = f64> + Clone + '_ {
     let censored = samples.iter().filter(|sample| sample.is_censored);
     censored.map(|sample| sample.value)
 }
@@ -77,7 +77,7 @@ fn log_likelihood(
     survival: impl Fn(f64) -> f64,
 ) -> f64 {
     let within = observed(samples).map(|value| (density(value) * resolution).min(1.0).ln());
-    let beyond = cut_off(samples).map(|value| survival(value).ln());
+    let beyond = censored_values(samples).map(|value| survival(value).ln());
     within.chain(beyond).sum()
 }
 
@@ -107,7 +107,7 @@ fn fit(
         standard_error,
         log_likelihood,
         aicc: aicc(log_likelihood, parameters, samples.len()),
-        is_doubtful: count >= FEWEST_TO_DOUBT && distance * float(count).sqrt() > LILLIEFORS,
+        is_doubtful: count >= FEWEST_TO_REJECT && distance * float(count).sqrt() > LILLIEFORS,
     }
 }
 
@@ -128,7 +128,7 @@ fn distance(samples: &[Sample], survival: impl Fn(f64) -> f64) -> f64 {
 fn constant(samples: &[Sample], resolution: f64) -> Option<Fit> {
     let value = observed(samples).next()?;
     let is_same = observed(samples).all(|other| (other - value).abs() <= resolution / 2.0);
-    let is_passed = cut_off(samples).any(|other| other > value + resolution / 2.0);
+    let is_passed = censored_values(samples).any(|other| other > value + resolution / 2.0);
     if !is_same || is_passed {
         return None;
     }
@@ -209,7 +209,7 @@ fn lognormal(samples: &[Sample], resolution: f64) -> Option<Fit> {
 fn uniform(samples: &[Sample], resolution: f64) -> Option<Fit> {
     let from = observed(samples).reduce(f64::min)?;
     let to = observed(samples).reduce(f64::max)?;
-    if to - from <= resolution || cut_off(samples).any(|value| value >= to) {
+    if to - from <= resolution || censored_values(samples).any(|value| value >= to) {
         return None;
     }
     let survival = |value: f64| ((to - value) / (to - from)).clamp(0.0, 1.0);
@@ -260,7 +260,7 @@ fn empirical(samples: &[Sample]) -> Option<Fit> {
         likelihood += float(here.count()) * mass.ln();
         sum += value * mass;
     }
-    for value in cut_off(samples) {
+    for value in censored_values(samples) {
         likelihood += survival.at(value).max(f64::MIN_POSITIVE).ln();
     }
     Some(Fit {
@@ -298,7 +298,7 @@ fn location_and_scale(samples: &[Sample]) -> Option<(f64, f64, f64)> {
     let unit = variance.sqrt();
     let scaled = |value: f64| (value - mean) / unit;
     let inside: Vec<f64> = observed(samples).map(scaled).collect();
-    let beyond: Vec<f64> = cut_off(samples).map(scaled).collect();
+    let beyond: Vec<f64> = censored_values(samples).map(scaled).collect();
     let objective = |delta: f64, gamma: f64| -> f64 {
         let squares: f64 = inside.iter().map(|x| (gamma * x - delta).powi(2)).sum();
         let tails: f64 = beyond

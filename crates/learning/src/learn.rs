@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom_report::statistics::Proportion;
-use elbowroom_sim::{Distribution, Failure};
+use elbowroom_sim::{Distribution, FailureTime};
 use rand::SeedableRng;
 
 use crate::drift::{Drift, drift};
@@ -47,7 +47,7 @@ pub struct Learnt {
     /// Proportion of failures among the attempts that ended by themselves.
     pub failures: Proportion,
     /// Time of failures.
-    pub when: Failure,
+    pub failure_time: FailureTime,
     /// Proportion of failures that undid the effects of the start, among those for which a log
     /// contains the state. Tables of attempts do not contain it.
     pub undone: Proportion,
@@ -70,11 +70,11 @@ pub enum Durations {
     /// No duration was observed, or there is none.
     Unknown,
     /// One distribution for all.
-    Together(Group),
+    Pooled(Group),
     /// One distribution of the ratio to the planned duration.
     Relative(Group),
     /// One distribution for each ground action.
-    Apart(BTreeMap<String, Group>),
+    PerAction(BTreeMap<String, Group>),
 }
 
 /// Samples with a common distribution.
@@ -101,7 +101,7 @@ impl Group {
 }
 
 /// Minimum number of observed durations of each ground action for separate distributions.
-const FEWEST_APART: usize = 5;
+const FEWEST_PER_GROUND_ACTION: usize = 5;
 
 /// Estimates the statistics of actions from attempts, sorted by name. `records` must be in the
 /// order of execution, log by log.
@@ -122,11 +122,11 @@ fn of_name(name: &str, records: &[&Record], settings: &Settings) -> Learnt {
     for record in records.iter().filter(ended) {
         failures.add(record.outcome == Outcome::Failed);
     }
-    let mut durations = durations(records, Outcome::is_whole, settings);
-    let when = when(records, &durations, settings);
-    if when == Failure::AtEnd {
+    let mut durations = durations(records, Outcome::is_observed_to_end, settings);
+    let when = failure_time(records, &durations, settings);
+    if when == FailureTime::AtEnd {
         // An attempt that fails at its end also shows the duration.
-        let shows = |outcome: Outcome| outcome.is_whole() || outcome == Outcome::Failed;
+        let shows = |outcome: Outcome| outcome.is_observed_to_end() || outcome == Outcome::Failed;
         durations = self::durations(records, shows, settings);
     }
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(settings.seed);
@@ -141,7 +141,7 @@ fn of_name(name: &str, records: &[&Record], settings: &Settings) -> Learnt {
         attempts: records.len(),
         delay: delay(records, settings),
         failures,
-        when,
+        failure_time: when,
         undone: Proportion::default(),
         drift: drift(&observed, settings.drift_limit, &mut rng),
         failure_drift: drift(&failed, settings.drift_limit, &mut rng),
@@ -151,7 +151,7 @@ fn of_name(name: &str, records: &[&Record], settings: &Settings) -> Learnt {
 
 impl Outcome {
     /// Returns `true` if the action was observed until its end.
-    fn is_whole(self) -> bool {
+    fn is_observed_to_end(self) -> bool {
         self == Self::Succeeded
     }
 }
@@ -188,7 +188,7 @@ fn durations(
     let Some(together) = together else {
         return Durations::Unknown;
     };
-    let mut best = (together.fit.aicc, Durations::Together(together));
+    let mut best = (together.fit.aicc, Durations::Pooled(together));
     let planned = |record: &Record| record.planned.filter(|planned| *planned > 0.0);
     let relative: Option<Vec<(Sample, f64)>> = all
         .iter()
@@ -220,14 +220,14 @@ fn durations(
             .into_iter()
             .map(|(action, samples)| {
                 let group = Group::of(samples, resolution)?;
-                let is_enough = group.counts().0 >= FEWEST_APART;
+                let is_enough = group.counts().0 >= FEWEST_PER_GROUND_ACTION;
                 is_enough.then(|| (action.to_owned(), group))
             })
             .collect();
         if let Some(groups) = groups {
             let sum: f64 = groups.values().map(|group| group.fit.aicc).sum();
             if sum < best.0 {
-                best = (sum, Durations::Apart(groups));
+                best = (sum, Durations::PerAction(groups));
             }
         }
     }
@@ -239,9 +239,9 @@ impl Durations {
     pub fn of(&self, action: &str, planned: f64) -> Option<(&Group, f64)> {
         match self {
             Self::Unknown => None,
-            Self::Together(group) => Some((group, 1.0)),
+            Self::Pooled(group) => Some((group, 1.0)),
             Self::Relative(group) => Some((group, planned)),
-            Self::Apart(groups) => groups.get(action).map(|group| (group, 1.0)),
+            Self::PerAction(groups) => groups.get(action).map(|group| (group, 1.0)),
         }
     }
 
@@ -252,8 +252,8 @@ impl Durations {
             observed.map(|sample| sample.value).collect::<Vec<f64>>()
         };
         match self {
-            Self::Unknown | Self::Apart(_) => Vec::new(),
-            Self::Together(group) | Self::Relative(group) => observed(group),
+            Self::Unknown | Self::PerAction(_) => Vec::new(),
+            Self::Pooled(group) | Self::Relative(group) => observed(group),
         }
     }
 }
@@ -275,7 +275,7 @@ fn delay(records: &[&Record], settings: &Settings) -> Option<Fit> {
 /// Returns the time of failures: the start if most attempts failed before or at their start.
 /// Otherwise it is the end if attempts failed on average after more than 3/4 of the mean duration,
 /// or else a uniformly distributed moment.
-fn when(records: &[&Record], durations: &Durations, settings: &Settings) -> Failure {
+fn failure_time(records: &[&Record], durations: &Durations, settings: &Settings) -> FailureTime {
     let failed: Vec<(&str, f64, Option<f64>)> = records
         .iter()
         .filter(|record| record.outcome == Outcome::Failed)
@@ -290,9 +290,9 @@ fn when(records: &[&Record], durations: &Durations, settings: &Settings) -> Fail
     let early = early.count();
     if failed.is_empty() || 2 * early > failed.len() {
         return if failed.is_empty() {
-            Failure::AtEnd
+            FailureTime::AtEnd
         } else {
-            Failure::AtStart
+            FailureTime::AtStart
         };
     }
     // Time of each failure as a fraction of the mean duration: about 1 at the end, and about 1/2 in
@@ -309,9 +309,9 @@ fn when(records: &[&Record], durations: &Durations, settings: &Settings) -> Fail
         .collect();
     let middle = shares.iter().sum::<f64>() / float(shares.len().max(1));
     if shares.is_empty() || middle > 0.75 {
-        Failure::AtEnd
+        FailureTime::AtEnd
     } else {
-        Failure::Midway
+        FailureTime::Midway
     }
 }
 

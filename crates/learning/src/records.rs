@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
-use elbowroom_report::trace::line::{GivenLine, ObservationLine};
+use elbowroom_report::trace::schema::{IssuedCommandLine, ObservationLine};
 use elbowroom_report::trace::{Line, Stored};
 
 /// Outcome of an attempt.
@@ -64,7 +64,7 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
         match line {
             Line::Command(line) => {
                 last = last.max(float(&line.now.0));
-                if let GivenLine::Start {
+                if let IssuedCommandLine::Start {
                     ticket,
                     action,
                     duration,
@@ -80,7 +80,7 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
                 }
             }
             Line::Passed(line) => last = last.max(float(&line.now.0)),
-            Line::Observed(line) => match &line.counted() {
+            Line::Observed(line) => match &line.as_processed() {
                 Some(ObservationLine::Started { ticket, time, .. }) => {
                     let commanded = open.get(ticket).map_or(0.0, |open| open.commanded);
                     let time = float(&time.0).max(commanded);

@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_worked_example_by_hand() {
+    fn estimate_matches_hand_computed_example() {
         // One of 5 ends at 3, one of 3 at 5 (4 is censored), and the last one at 8 (the other 5 is
         // censored).
         let samples = [

@@ -5,7 +5,7 @@ use elbowroom_text::{Diagnostic, Diagnostics, Report, Severity, Source, Span, ne
 use crate::records::{Outcome, Record};
 
 /// Required columns, in any order.
-const NEEDED: [&str; 4] = ["action", "start", "end", "outcome"];
+const REQUIRED: [&str; 4] = ["action", "start", "end", "outcome"];
 /// Optional columns.
 const OPTIONAL: [&str; 2] = ["commanded", "planned"];
 const OUTCOMES: [&str; 4] = ["succeeded", "failed", "cancelled", "running"];
@@ -25,8 +25,8 @@ pub fn read(source: &Source) -> Result<Vec<Record>, Diagnostics> {
     let header = match reader.headers() {
         Ok(header) => header.clone(),
         Err(error) => {
-            let place = place(source, error.position());
-            return Err(wrong(source, place, unreadable(&error)).into());
+            let place = span_at(source, error.position());
+            return Err(error_at(source, place, unreadable(&error)).into());
         }
     };
     let columns = columns(source, &header).map_err(Diagnostics::from)?;
@@ -34,11 +34,11 @@ pub fn read(source: &Source) -> Result<Vec<Record>, Diagnostics> {
         let row = match row {
             Ok(row) => row,
             Err(error) => {
-                report.error(place(source, error.position()), unreadable(&error));
+                report.error(span_at(source, error.position()), unreadable(&error));
                 continue;
             }
         };
-        let place = place(source, row.position());
+        let place = span_at(source, row.position());
         match record(&columns, &row) {
             Ok(record) => records.push(record),
             Err(message) => {
@@ -60,13 +60,13 @@ struct Columns {
 }
 
 fn columns(source: &Source, header: &csv::StringRecord) -> Result<Columns, Diagnostic> {
-    let place = place(source, header.position());
+    let place = span_at(source, header.position());
     let find = |name: &str| {
         header
             .iter()
             .position(|column| column.eq_ignore_ascii_case(name))
     };
-    let known = NEEDED.iter().chain(&OPTIONAL).copied();
+    let known = REQUIRED.iter().chain(&OPTIONAL).copied();
     for column in header {
         if !known.clone().any(|name| column.eq_ignore_ascii_case(name)) {
             let names = known.clone().collect::<Vec<_>>().join(", ");
@@ -74,13 +74,13 @@ fn columns(source: &Source, header: &csv::StringRecord) -> Result<Columns, Diagn
             if let Some(near) = nearest(&column.to_lowercase(), known.clone()) {
                 message = format!("{message}; did you mean `{near}`?");
             }
-            return Err(wrong(source, place, message));
+            return Err(error_at(source, place, message));
         }
     }
     let needed = |name: &str| {
         find(name).ok_or_else(|| {
             let message = format!("the column `{name}` is missing from the first line");
-            wrong(source, place.clone(), message)
+            error_at(source, place.clone(), message)
         })
     };
     Ok(Columns {
@@ -172,7 +172,7 @@ fn number(text: &str, column: &str) -> Result<f64, String> {
     }
 }
 
-fn place(source: &Source, position: Option<&csv::Position>) -> Span {
+fn span_at(source: &Source, position: Option<&csv::Position>) -> Span {
     let start = position.map_or(0, |position| {
         usize::try_from(position.byte()).unwrap_or(usize::MAX)
     });
@@ -183,7 +183,7 @@ fn place(source: &Source, position: Option<&csv::Position>) -> Span {
     start + skipped..start + skipped + line.trim_end().len()
 }
 
-fn wrong(source: &Source, place: Span, message: impl Into<String>) -> Diagnostic {
+fn error_at(source: &Source, place: Span, message: impl Into<String>) -> Diagnostic {
     Diagnostic::new(Severity::Error, source, place, message)
 }
 
@@ -196,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_table_is_read() {
+    fn table_is_parsed() {
         let text = "outcome, action, start, end, planned\n\
                     succeeded, (Drive rover a b), 1, 11.5, 10\n\
                     # a remark\n\
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn each_mistake_has_its_line() {
+    fn errors_name_their_line() {
         let said = |text: &str| {
             let wrong = read(&Source::from(text)).expect_err("a mistake");
             wrong.to_string()

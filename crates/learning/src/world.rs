@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use elbowroom_report::statistics::Proportion;
-use elbowroom_sim::{Distribution, Failure};
+use elbowroom_sim::{Distribution, FailureTime};
 use toml::{Table, Value};
 
 use crate::changes::{Changes, Rate};
@@ -54,7 +54,7 @@ fn hazards(text: &mut String, changes: &[Changes]) {
             push(text, &key, Value::Float(rate.per_second().unwrap_or(0.0)));
         }
     };
-    if !changes.iter().any(|change| change.is_apart) {
+    if !changes.iter().any(|change| change.has_rate_per_fact) {
         let rates: Vec<_> = changes.iter().map(|it| (it.becomes, it.all)).collect();
         return section(&changes[0].predicate, &rates);
     }
@@ -72,14 +72,14 @@ fn hazards(text: &mut String, changes: &[Changes]) {
 fn durations(text: &mut String, learnt: &Learnt) {
     match &learnt.durations {
         Durations::Unknown => {}
-        Durations::Together(group) => {
+        Durations::Pooled(group) => {
             section(
                 text,
                 "duration",
                 &learnt.name,
                 &group.fit,
                 false,
-                &rests_on(group),
+                &describe_samples(group),
             );
         }
         Durations::Relative(group) => {
@@ -93,11 +93,11 @@ fn durations(text: &mut String, learnt: &Learnt) {
                     &learnt.name,
                     &group.fit,
                     true,
-                    &rests_on(group),
+                    &describe_samples(group),
                 );
             }
         }
-        Durations::Apart(groups) => {
+        Durations::PerAction(groups) => {
             for (action, group) in groups {
                 section(
                     text,
@@ -105,14 +105,14 @@ fn durations(text: &mut String, learnt: &Learnt) {
                     action,
                     &group.fit,
                     false,
-                    &rests_on(group),
+                    &describe_samples(group),
                 );
             }
         }
     }
 }
 
-fn rests_on(group: &Group) -> String {
+fn describe_samples(group: &Group) -> String {
     match group.counts() {
         (observed, 0) => format!("from {observed} durations"),
         (observed, censored) => format!("from {observed} durations and {censored} cut off"),
@@ -127,10 +127,10 @@ fn failures(text: &mut String, learnt: &Learnt) {
     if learnt.failures.successes == 0 {
         return;
     }
-    let when = match learnt.when {
-        Failure::AtStart => "start",
-        Failure::Midway => "midway",
-        Failure::AtEnd => "end",
+    let when = match learnt.failure_time {
+        FailureTime::AtStart => "start",
+        FailureTime::Midway => "midway",
+        FailureTime::AtEnd => "end",
     };
     let (failed, of) = (learnt.failures.successes, learnt.failures.count);
     let _ = write!(

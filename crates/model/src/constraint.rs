@@ -137,9 +137,9 @@ pub struct Constraints {
     /// Constraints that a plan may violate.
     pub soft: Vec<SoftConstraint>,
     /// `true` if the constraints depend on earlier states, which are unknown.
-    pub(crate) is_past_lost: bool,
+    pub(crate) depends_on_unknown_past: bool,
     /// `true` if earlier states do not matter: the constraints are deadlines of goals that are not achieved yet ([`Task::with_deadlines`](crate::Task::with_deadlines)).
-    pub(crate) begin_now: bool,
+    pub(crate) ignores_past: bool,
 }
 
 /// One instance of a preference among a task's constraints.
@@ -154,14 +154,14 @@ pub struct SoftConstraint {
 impl Constraints {
     /// Returns `true` if the constraints depend on earlier states, which are unknown. This is the
     /// case for the remaining task of a situation during execution.
-    pub fn is_past_lost(&self) -> bool {
-        self.is_past_lost
+    pub fn depends_on_unknown_past(&self) -> bool {
+        self.depends_on_unknown_past
     }
 
     /// Returns `true` if the constraints apply from any situation on as they do from the initial
     /// state: earlier states do not count.
-    pub fn begin_now(&self) -> bool {
-        self.begin_now
+    pub fn ignores_past(&self) -> bool {
+        self.ignores_past
     }
 
     /// Returns `true` if there are no constraints.
@@ -173,8 +173,8 @@ impl Constraints {
     /// `time`.
     pub(crate) fn from(&self, time: &Rational) -> Self {
         let mut rest = self.clone();
-        if !self.begin_now {
-            rest.is_past_lost = !self.is_empty();
+        if !self.ignores_past {
+            rest.depends_on_unknown_past = !self.is_empty();
             return rest;
         }
         for modal in &mut rest.hard {

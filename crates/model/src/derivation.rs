@@ -48,14 +48,14 @@ pub fn holds<F>(condition: &Condition, moment: &dyn Moment<F>) -> Result<bool, F
         Condition::Fact(fact) => moment.fact(*fact),
         Condition::Compare(comparison, left, right) => moment.compare(*comparison, left, right),
         Condition::Not(part) => holds(part, moment).map(|value| !value),
-        Condition::And(parts) => decided_by(parts, moment, false),
-        Condition::Or(parts) => decided_by(parts, moment, true),
+        Condition::And(parts) => combine_truths(parts, moment, false),
+        Condition::Or(parts) => combine_truths(parts, moment, true),
     }
 }
 
 /// Returns `decisive` if one part has that value, its opposite if no part has it, else the first
 /// fault.
-fn decided_by<'a, F>(
+fn combine_truths<'a, F>(
     parts: impl IntoIterator<Item = &'a Condition>,
     moment: &dyn Moment<F>,
     decisive: bool,
@@ -146,20 +146,21 @@ impl Derivation {
             match stratum {
                 [fact] if !sorted.strata.is_recursive(*fact) => {
                     let bodies = self.rules_of(*fact).iter().map(|rule| &rule.body);
-                    let truth = decided_by(bodies, &self.on_top_of(basic, &derived), true);
+                    let truth =
+                        combine_truths(bodies, &self.with_derived_facts(basic, &derived), true);
                     match truth {
                         Ok(truth) => derived.holding[fact.index()] = truth,
                         Err(fault) => derived.set_unclear(*fact, fault),
                     }
                 }
-                stratum => circuit::settle(self, stratum, basic, &mut derived),
+                stratum => circuit::evaluate_stratum(self, stratum, basic, &mut derived),
             }
         }
         derived
     }
 
     /// Returns the moment `basic` with its derived facts.
-    pub fn on_top_of<'b, F: Clone>(
+    pub fn with_derived_facts<'b, F: Clone>(
         &'b self,
         basic: &'b dyn Moment<F>,
         derived: &'b Derived<F>,

@@ -231,7 +231,7 @@ pub struct DurativeBody {
     /// start is then fixed at time 0.
     ///
     /// [`RunningAction::rest`]: crate::RunningAction::rest
-    pub is_under_way: bool,
+    pub is_running: bool,
 }
 
 impl DurativeBody {
@@ -306,7 +306,7 @@ impl Action {
                         rate: effect.rate.map_leaves(replace),
                     })
                     .collect(),
-                is_under_way: body.is_under_way,
+                is_running: body.is_running,
             }),
         };
         Self {
@@ -356,7 +356,7 @@ impl Action {
                 over_all,
                 end: Arc::new(end),
                 continuous,
-                is_under_way: body.is_under_way,
+                is_running: body.is_running,
             }),
             ..self.clone()
         })

@@ -21,15 +21,15 @@ use crate::table::Table;
 use crate::terms::{resolve, with_arguments};
 
 /// Knowledge of static conditions, so that quantifiers need not be expanded in full.
-pub(crate) trait Foreknowledge {
+pub(crate) trait StaticKnowledge {
     /// Returns the truth value of a condition if it is the same in every state, else `None`.
     fn truth(&self, condition: &Condition, binding: &[ObjectId]) -> Option<bool>;
 }
 
 /// No knowledge.
-pub(crate) struct Nothing;
+pub(crate) struct NoKnowledge;
 
-impl Foreknowledge for Nothing {
+impl StaticKnowledge for NoKnowledge {
     fn truth(&self, _: &Condition, _: &[ObjectId]) -> Option<bool> {
         None
     }
@@ -98,7 +98,7 @@ impl<'a> Grounder<'a> {
         &mut self,
         schema: SchemaId,
         arguments: &[ObjectId],
-        known: &dyn Foreknowledge,
+        known: &dyn StaticKnowledge,
     ) -> ground::Action {
         let problem = self.problem;
         let mut binding = arguments.to_vec();
@@ -128,7 +128,7 @@ impl<'a> Grounder<'a> {
                 over_all: self.expand(over_all, binding, known),
                 end: Arc::new(self.ground_snap(at_end, end_effects, binding, known)),
                 continuous: self.ground_continuous(continuous, binding, known),
-                is_under_way: false,
+                is_running: false,
             }),
         };
         let name = problem.apply_name(&problem.schemas[schema.index()].name, arguments);
@@ -145,7 +145,7 @@ impl<'a> Grounder<'a> {
         condition: &Condition,
         effects: &[problem::Effect],
         binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
+        known: &dyn StaticKnowledge,
     ) -> ground::SnapAction {
         let condition = self.expand(condition, binding, known);
         let mut ground_effects = Vec::with_capacity(effects.len());
@@ -169,7 +169,7 @@ impl<'a> Grounder<'a> {
         &mut self,
         effects: &[problem::ContinuousEffect],
         binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
+        known: &dyn StaticKnowledge,
     ) -> Vec<ground::ContinuousEffect> {
         let mut ground_effects = Vec::with_capacity(effects.len());
         for effect in effects {
@@ -191,7 +191,7 @@ impl<'a> Grounder<'a> {
         &mut self,
         guard: &problem::Guard,
         binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
+        known: &dyn StaticKnowledge,
     ) -> ground::Guard {
         ground::Guard {
             at_start: self.expand(&guard.at_start, binding, known),
@@ -224,7 +224,7 @@ impl<'a> Grounder<'a> {
         condition: &Condition,
         binding: &mut Vec<ObjectId>,
     ) -> ground::Condition {
-        self.expand(condition, binding, &Nothing)
+        self.expand(condition, binding, &NoKnowledge)
     }
 
     /// Like [`Self::ground_condition`], with `known` as for [`Self::action`].
@@ -232,7 +232,7 @@ impl<'a> Grounder<'a> {
         &mut self,
         condition: &Condition,
         binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
+        known: &dyn StaticKnowledge,
     ) -> ground::Condition {
         match condition {
             Condition::Atom(atom) => ground::Condition::Fact(self.ground_atom(atom, binding)),
@@ -274,7 +274,7 @@ impl<'a> Grounder<'a> {
         variables: &[Variable],
         part: &Condition,
         binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
+        known: &dyn StaticKnowledge,
     ) -> Vec<ground::Condition> {
         let mut parts = Vec::new();
         self.for_all(variables, binding, &mut |grounder, binding| {
@@ -375,7 +375,7 @@ impl<'a> Grounder<'a> {
 fn is_known_to_fail(
     guard: &problem::Guard,
     binding: &[ObjectId],
-    known: &dyn Foreknowledge,
+    known: &dyn StaticKnowledge,
 ) -> bool {
     [&guard.at_start, &guard.over_all, &guard.now]
         .into_iter()

@@ -1,7 +1,7 @@
 //! Instantiation of actions by schema and arguments.
 
 use crate::ground;
-use crate::grounder::Nothing;
+use crate::grounder::NoKnowledge;
 use crate::problem::{ObjectId, SchemaId};
 use crate::task::Task;
 
@@ -45,7 +45,7 @@ impl Task {
         arguments: &[ObjectId],
     ) -> Result<ground::Action, InstantiateError> {
         self.check_arguments(schema, arguments)?;
-        Ok(self.grounding(|grounder| grounder.action(schema, arguments, &Nothing)))
+        Ok(self.grounding(|grounder| grounder.action(schema, arguments, &NoKnowledge)))
     }
 
     fn check_arguments(

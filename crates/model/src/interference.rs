@@ -120,7 +120,7 @@ impl Footprint {
     /// Returns `true` if this happening writes a fact or fluent that `other` reads, or contradicts
     /// its writes.
     fn disturbs(&self, other: &Self) -> bool {
-        self.writes_what_is_read_by(other) || self.contradicts(other)
+        self.writes_reads_of(other) || self.contradicts(other)
     }
 
     /// Returns `true` if this happening contradicts a write of `other`.
@@ -131,7 +131,7 @@ impl Footprint {
     }
 
     /// Returns `true` if this happening writes a fact or fluent that `other` reads.
-    pub fn writes_what_is_read_by(&self, other: &Self) -> bool {
+    pub fn writes_reads_of(&self, other: &Self) -> bool {
         let touches = |facts: &BTreeSet<FactId>| !facts.is_disjoint(&other.reads);
         let moves = |fluents: &BTreeSet<FluentId>| !fluents.is_disjoint(&other.reads_fluents);
         touches(&self.adds) || touches(&self.deletes) || moves(&self.shifts) || moves(&self.assigns)

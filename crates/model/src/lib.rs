@@ -63,7 +63,7 @@ mod grounder;
 mod hash;
 mod instantiate;
 mod interference;
-mod mention;
+mod lookup;
 mod plan;
 pub mod problem;
 pub mod reachability;

@@ -30,7 +30,7 @@ mod rule;
 mod tests;
 mod value;
 mod variables;
-mod waiting;
+mod watch_lists;
 mod writes;
 
 use std::collections::BTreeSet;
@@ -43,7 +43,7 @@ use crate::grounder::Grounder;
 use crate::problem::{self, ObjectId, Problem, SchemaId, TimedChange};
 use crate::task::Task;
 
-use constants::{Memory, Unwritten};
+use constants::{ResultCache, UnwrittenSymbols};
 use event::Symbol;
 use fixpoint::{Arguments, Reachable, fixpoint};
 use relaxation::Relaxation;
@@ -137,16 +137,16 @@ pub fn ground_while(task: &Task, settings: &Settings, goes_on: &mut dyn FnMut() 
         return Answer::LimitReached;
     };
     let facts = enter_facts(task, &reachable.relaxation);
-    let mut memory = Memory::default();
+    let mut memory = ResultCache::default();
     let Some(actions) = actions(task, &reachable, &mut memory, goes_on) else {
         return Answer::LimitReached;
     };
     let all_rules = task.rules();
     let table = task.table();
-    let mut constants = Unwritten {
+    let mut constants = UnwrittenSymbols {
         table: &table,
         relaxation: &reachable.relaxation,
-        memory: &mut memory,
+        cache: &mut memory,
     };
     let rules = all_rules.iter().filter(|rule| facts.contains(&rule.head));
     let rules = rules.map(|rule| GroundRule {
@@ -186,7 +186,7 @@ fn reach<'a>(
     let read = writes::read(problem);
     let mut banned: Vec<BTreeSet<Arguments>> = vec![BTreeSet::new(); problem.schemas.len()];
     loop {
-        let mut relaxation = Relaxation::initially(problem, domains);
+        let mut relaxation = Relaxation::at_time_zero(problem, domains);
         let rules = rule::rules_of(&relaxation, |schema| writes::is_start_silent(schema, &read));
         add_timed(&mut relaxation);
         let reachable = fixpoint(relaxation, &rules, &banned, settings, count)?;
@@ -230,7 +230,7 @@ fn enter_facts(task: &Task, relaxation: &Relaxation) -> BTreeSet<FactId> {
 fn actions(
     task: &Task,
     reachable: &Reachable,
-    memory: &mut Memory,
+    memory: &mut ResultCache,
     goes_on: &mut dyn FnMut() -> bool,
 ) -> Option<Vec<Action>> {
     let mut actions = Vec::new();
@@ -243,10 +243,10 @@ fn actions(
             let relaxation = &reachable.relaxation;
             let action = task.grounding(|grounder| {
                 let action = grounder.action(schema, arguments, relaxation);
-                action.simplified(&mut Unwritten {
+                action.simplified(&mut UnwrittenSymbols {
                     table: grounder.table,
                     relaxation,
-                    memory,
+                    cache: memory,
                 })
             });
             if !action.is_contradiction() {

@@ -18,12 +18,12 @@ impl Situation {
     ///
     /// Its initial state is the situation's state, and its timed initials are the pending ones,
     /// shifted. Facts and fluents keep their numbers. Running actions are not part of it; a plan
-    /// contains their remaining parts, see [`Situation::rest_of_plan`]. [`Task::problem`] is still
+    /// contains their remaining parts, see [`Situation::remaining_plan`]. [`Task::problem`] is still
     /// the original problem, with its initial facts and times. Constraints on the course of the
     /// whole plan, other than [deadlines](Task::with_deadlines), cannot be evaluated from here; the
     /// validator reports this.
     #[must_use]
-    pub fn rest_of_task(&self, task: &Task) -> Task {
+    pub fn remaining_task(&self, task: &Task) -> Task {
         let to_come = |timed: &&TimedHappening| timed.time > self.time;
         let moved = |timed: &TimedHappening| TimedHappening {
             time: &timed.time - &self.time,
@@ -38,12 +38,12 @@ impl Situation {
         rest
     }
 
-    /// Converts a plan from here to a plan of [`Situation::rest_of_task`].
+    /// Converts a plan from here to a plan of [`Situation::remaining_task`].
     ///
     /// Each running action becomes an action that starts at 0, without conditions or effects at its
     /// start, with the remaining duration and the same end.
     #[must_use]
-    pub fn rest_of_plan(&self, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
+    pub fn remaining_plan(&self, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
         let continued = self
             .running
             .iter()
@@ -54,7 +54,7 @@ impl Situation {
                     .duration
                     .as_ref()
                     .map(|duration| &running.start + duration - &self.time),
-                action: Arc::new(running.rest(&self.time)),
+                action: Arc::new(running.remaining_action(&self.time)),
             });
         let new = plan.new_steps(self).iter().map(|step| Step {
             start: &step.start - &self.time,
@@ -69,7 +69,7 @@ impl Situation {
 impl RunningAction {
     /// Returns the remaining part of the action at `now`, as an action.
     #[must_use]
-    pub fn rest(&self, now: &Rational) -> Action {
+    pub fn remaining_action(&self, now: &Rational) -> Action {
         let elapsed = now - &self.start;
         let mut whole_duration = |leaf: &Expression| match leaf {
             Expression::Duration => Some(Expression::Add(vec![
@@ -92,7 +92,7 @@ impl RunningAction {
                 over_all: body.over_all,
                 end: body.end,
                 continuous: body.continuous,
-                is_under_way: true,
+                is_running: true,
             }),
             ..action
         }

@@ -56,7 +56,7 @@ impl Condition {
                         part => left.push(part),
                     }
                 }
-                only(&mut left).unwrap_or(Self::And(left))
+                take_single(&mut left).unwrap_or(Self::And(left))
             }
             Self::Or(parts) => {
                 let mut left = Vec::with_capacity(parts.len());
@@ -67,7 +67,7 @@ impl Condition {
                         part => left.push(part),
                     }
                 }
-                only(&mut left).unwrap_or(Self::Or(left))
+                take_single(&mut left).unwrap_or(Self::Or(left))
             }
         }
     }
@@ -79,7 +79,7 @@ impl Condition {
 }
 
 /// Returns the only part, if there is exactly one.
-fn only(parts: &mut Vec<Condition>) -> Option<Condition> {
+fn take_single(parts: &mut Vec<Condition>) -> Option<Condition> {
     if parts.len() == 1 { parts.pop() } else { None }
 }
 
@@ -223,9 +223,9 @@ mod tests {
     use crate::problem::Comparison;
 
     /// Fact 0 is true, fact 1 false, fluent 0 is 2; all others change.
-    struct Some0And1;
+    struct SampleConstants;
 
-    impl Constants for Some0And1 {
+    impl Constants for SampleConstants {
         fn truth(&mut self, fact: FactId) -> Option<bool> {
             [Some(true), Some(false)]
                 .get(fact.index())
@@ -247,17 +247,17 @@ mod tests {
     }
 
     #[test]
-    fn what_always_holds_is_left_out_of_a_conjunction() {
+    fn constant_true_part_is_dropped_from_conjunction() {
         let condition = Condition::And(vec![ALWAYS, Condition::And(vec![OPEN, not(NEVER)])]);
-        assert_eq!(condition.simplified(&mut Some0And1), OPEN);
+        assert_eq!(condition.simplified(&mut SampleConstants), OPEN);
     }
 
     #[test]
-    fn one_part_decides_a_conjunction_or_disjunction() {
+    fn single_constant_part_decides_conjunction_or_disjunction() {
         let condition = Condition::And(vec![OPEN, NEVER]);
-        assert_eq!(condition.simplified(&mut Some0And1), Condition::FALSE);
+        assert_eq!(condition.simplified(&mut SampleConstants), Condition::FALSE);
         let condition = Condition::Or(vec![OPEN, not(NEVER)]);
-        assert_eq!(condition.simplified(&mut Some0And1), Condition::TRUE);
+        assert_eq!(condition.simplified(&mut SampleConstants), Condition::TRUE);
     }
 
     #[test]
@@ -267,14 +267,14 @@ mod tests {
         let three = Expression::Constant(Rational::from(3));
         let compare = |left| Condition::Compare(Comparison::Less, left, three.clone());
         assert_eq!(
-            compare(two.clone()).simplified(&mut Some0And1),
+            compare(two.clone()).simplified(&mut SampleConstants),
             Condition::TRUE
         );
         let twice = Expression::Add(vec![two.clone(), two]);
         let sum = Expression::Add(vec![open.clone(), twice]);
         let four = Expression::Constant(Rational::from(4));
         assert_eq!(
-            compare(sum).simplified(&mut Some0And1),
+            compare(sum).simplified(&mut SampleConstants),
             compare(Expression::Add(vec![open, four]))
         );
     }
@@ -283,7 +283,7 @@ mod tests {
     fn a_division_by_zero_is_left_as_it_is() {
         let zero = || Box::new(Expression::Constant(Rational::ZERO));
         let quotient = Expression::Divide(zero(), zero());
-        assert_eq!(quotient.clone().simplified(&mut Some0And1), quotient);
+        assert_eq!(quotient.clone().simplified(&mut SampleConstants), quotient);
     }
 
     #[test]
@@ -299,7 +299,7 @@ mod tests {
             condition: Condition::TRUE,
             effects: vec![effect(NEVER), effect(OPEN)],
         };
-        snap.simplify(&mut Some0And1);
+        snap.simplify(&mut SampleConstants);
         assert_eq!(snap.effects, [effect(OPEN)]);
     }
 }

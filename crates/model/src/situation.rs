@@ -63,7 +63,7 @@ impl Task {
     /// Its initial state is the situation's state. The possible effects of running actions are
     /// among the timed initials of its [`Task::problem`], though not of [`Task::timed`].
     #[must_use]
-    pub fn beginning_at(&self, situation: &Situation) -> Self {
+    pub fn starting_from(&self, situation: &Situation) -> Self {
         let mut problem = (*self.problem).clone();
         let facts = situation.state.facts.iter();
         problem.initial_facts = facts.map(|&fact| self.atom(fact)).collect();
@@ -85,7 +85,7 @@ impl Task {
             let meanwhile = body
                 .continuous
                 .iter()
-                .map(|effect| self.some_value_of(effect.fluent));
+                .map(|effect| self.arbitrary_change_of(effect.fluent));
             let changes: Vec<TimedChange> = at_end.chain(meanwhile).collect();
             problem
                 .timed
@@ -114,7 +114,7 @@ impl Task {
         let processes = processes.flat_map(|process| &process.effects);
         let changes = events
             .map(|effect| self.possible_change(&effect.change))
-            .chain(processes.map(|effect| self.some_value_of(effect.fluent)));
+            .chain(processes.map(|effect| self.arbitrary_change_of(effect.fluent)));
         problem.timed.extend(changes.map(|change| TimedInitial {
             time: Rational::ZERO,
             change,
@@ -132,12 +132,12 @@ impl Task {
                 let (predicate, arguments) = self.atom(*fact);
                 TimedChange::Delete(predicate, arguments)
             }
-            Change::Update { fluent, .. } => self.some_value_of(*fluent),
+            Change::Update { fluent, .. } => self.arbitrary_change_of(*fluent),
         }
     }
 
     /// Represents any change of a fluent: reachability depends only on the fact that it changes.
-    fn some_value_of(&self, fluent: FluentId) -> TimedChange {
+    fn arbitrary_change_of(&self, fluent: FluentId) -> TimedChange {
         let (function, arguments) = self.application(fluent);
         TimedChange::Assign(function, arguments, Rational::ZERO)
     }
@@ -154,7 +154,7 @@ impl RunningAction {
     }
 
     /// Returns `true` if this duration is still possible at `now`.
-    pub fn may_last(&self, duration: &Rational, now: &Rational) -> bool {
+    pub fn can_last(&self, duration: &Rational, now: &Rational) -> bool {
         self.duration.contains(duration) && &self.start + duration >= *now
     }
 

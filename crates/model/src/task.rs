@@ -22,7 +22,7 @@ const CONSTRAINTS: &str = "trajectory constraints (`:constraints`)";
 ///
 /// Facts and fluents enter a table on first mention, so that a plan can be validated without
 /// grounding the whole problem. The table only grows, and clones share it, as do
-/// [`Task::beginning_at`] and [`Situation::rest_of_task`](crate::Situation::rest_of_task): a fact
+/// [`Task::starting_from`] and [`Situation::remaining_task`](crate::Situation::rest_of_task): a fact
 /// has the same number in all of them. Numbers follow the order of first mention. If threads
 /// mention facts in no fixed order, each thread needs a table of its own ([`Task::with_own_table`])
 /// for reproducible results.
@@ -142,7 +142,7 @@ impl Task {
 
     /// Returns a feature of the problem that only the validator supports, and envelopes to a
     /// documented extent. Components that find, change or execute plans must reject it.
-    pub fn left_to_the_judge(&self) -> Option<&'static str> {
+    pub fn unsupported_by_analysis(&self) -> Option<&'static str> {
         if !self.autonomous.is_empty() {
             return Some("processes and events (PDDL+)");
         }
@@ -152,8 +152,8 @@ impl Task {
     /// Returns a feature of the problem that affects the validity of plans and that only the
     /// validator supports, or only the validator, networks and planners. All other components must
     /// reject it.
-    pub fn only_judged(&self) -> Option<&'static str> {
-        if let Some(feature) = self.left_to_the_judge() {
+    pub fn validator_only_feature(&self) -> Option<&'static str> {
+        if let Some(feature) = self.unsupported_by_analysis() {
             return Some(feature);
         }
         (!self.constraints.hard.is_empty()).then_some(CONSTRAINTS)
@@ -162,7 +162,7 @@ impl Task {
     /// Returns a feature of the problem that affects the validity of plans and that the boxes of a
     /// given network do not respect. With processes and events, they respect constraints to a
     /// documented extent.
-    pub fn beyond_boxes(&self) -> Option<&'static str> {
+    pub fn unsupported_by_boxes(&self) -> Option<&'static str> {
         if !self.problem.controls.is_empty() {
             return Some(CONTROLS);
         }
@@ -190,7 +190,7 @@ impl Task {
         &self,
         deadlines: impl IntoIterator<Item = (Rational, &'c problem::Condition)>,
     ) -> Option<Self> {
-        if !self.constraints.is_empty() && !self.constraints.begin_now {
+        if !self.constraints.is_empty() && !self.constraints.ignores_past {
             return None;
         }
         let ground = |condition| {
@@ -212,7 +212,7 @@ impl Task {
             hard: deadlines
                 .map(|(deadline, it)| Modal::Within(deadline, it))
                 .collect(),
-            begin_now: true,
+            ignores_past: true,
             ..Constraints::default()
         };
         Self {
@@ -227,7 +227,7 @@ impl Task {
             .constraints
             .hard
             .iter()
-            .filter(|_| self.constraints.begin_now);
+            .filter(|_| self.constraints.ignores_past);
         hard.filter_map(|constraint| match constraint {
             Modal::Within(deadline, condition) => Some((deadline, condition)),
             _ => None,
@@ -237,7 +237,7 @@ impl Task {
     /// Returns the task with a separate entry for each timed initial in [`timed`](Self::timed),
     /// also for those at the same time.
     #[must_use]
-    pub fn with_timed_apart(&self) -> Self {
+    pub fn with_separate_timed_initials(&self) -> Self {
         let mut task = self.clone();
         let apart = self.timed.iter().flat_map(|group| {
             group.changes.iter().map(|change| TimedHappening {

@@ -38,10 +38,12 @@
 //! }
 //! ```
 
+mod abort;
 mod autonomous;
-mod cells;
+mod constraint_monitor;
 mod display;
 mod effects;
+mod evaluate;
 mod execution;
 mod explain;
 mod instant;
@@ -49,14 +51,12 @@ mod interference;
 mod judge;
 mod margin;
 mod metric;
-mod piece;
 mod polynomial;
 mod preferences;
-mod reading;
+mod segment;
+mod sign_cells;
 mod state;
-mod stop;
 mod timeline;
-mod track;
 mod trajectory;
 mod violation;
 
@@ -69,7 +69,8 @@ pub use execution::{Execution, MeasuredAmount};
 pub use margin::Margin;
 pub use preferences::{Preferences, ViolatedPreference};
 pub use violation::{
-    ActionInstance, Difficulty, Mistake, Occurrence, Point, Reason, Undecided, Violation, When,
+    ActionInstance, ConditionTime, Occurrence, Point, Reason, Undecided, UndecidedReason,
+    Violation, ViolationKind,
 };
 
 use crate::ground::{Body, Condition};
@@ -213,7 +214,7 @@ pub struct Report {
 
 /// Validates a plan. The plan's actions must have been instantiated from this task.
 pub fn validate(task: &Task, plan: &TimeTriggeredPlan, settings: &Settings) -> Verdict {
-    judge(task, None, plan, settings)
+    make_judge(task, None, plan, settings)
 }
 
 /// Validates a plan that continues from `situation`; see [`Situation`] for the form of such a plan.
@@ -224,10 +225,10 @@ pub fn validate_from(
     plan: &TimeTriggeredPlan,
     settings: &Settings,
 ) -> Verdict {
-    judge(task, Some(situation), plan, settings)
+    make_judge(task, Some(situation), plan, settings)
 }
 
-fn judge(
+fn make_judge(
     task: &Task,
     situation: Option<&Situation>,
     plan: &TimeTriggeredPlan,
@@ -235,11 +236,11 @@ fn judge(
 ) -> Verdict {
     let running = situation.map_or(0, |situation| situation.running.len());
     // All facts that the preferences mention must be in the table before the rules are read.
-    let preferences = preferences::OfActions::of(task, plan, running);
+    let preferences = preferences::ActionPreferenceMonitor::of(task, plan, running);
     let Some(derivation) = task.derivation() else {
         return Verdict::Undecided(Undecided {
             time: None,
-            difficulty: Difficulty::Unstratified,
+            reason: UndecidedReason::Unstratified,
         });
     };
     if let Some(violation) = malformed_step(situation, plan) {
@@ -249,22 +250,23 @@ fn judge(
     let state = situation.map_or(task.initial(), |situation| &situation.state);
     let is_begun = situation.is_some_and(|situation| *situation != Situation::initial(task));
     let mut constraints = std::sync::Arc::clone(&task.constraints);
-    if is_begun && !constraints.is_empty() && !constraints.begin_now {
-        std::sync::Arc::make_mut(&mut constraints).is_past_lost = true;
+    if is_begun && !constraints.is_empty() && !constraints.ignores_past {
+        std::sync::Arc::make_mut(&mut constraints).depends_on_unknown_past = true;
     }
     let mut judge = judge::Judge {
         task,
         plan,
         settings,
         derivation,
-        now: state::Now::of(task, state),
+        now: state::BasicState::of(task, state),
         derived: OnceCell::new(),
         running: situation.map_or_else(BTreeMap::new, judge::running),
-        since: BTreeMap::new(),
+        last_changes: BTreeMap::new(),
         margins: margin::Margins::default(),
-        course: (!constraints.is_empty()).then(|| trajectory::Course::new(&constraints)),
+        trajectory: (!constraints.is_empty())
+            .then(|| trajectory::TrajectoryMonitor::new(&constraints)),
         preferences,
-        nature: autonomous::Nature::of(task),
+        event_history: autonomous::EventHistory::of(task),
     };
     let from = situation.map(|situation| &situation.time);
     match judge.run(from, &groups) {
@@ -274,8 +276,8 @@ fn judge(
             preferences: judge.preferences_of(&groups),
             margins: margins(task, plan, judge.margins),
         }),
-        Err(stop::Stop::Violation(violation)) => Verdict::Invalid(*violation),
-        Err(stop::Stop::Undecided(undecided)) => Verdict::Undecided(*undecided),
+        Err(abort::Abort::Violation(violation)) => Verdict::Invalid(*violation),
+        Err(abort::Abort::Undecided(undecided)) => Verdict::Undecided(*undecided),
     }
 }
 
@@ -287,26 +289,26 @@ fn malformed_step(situation: Option<&Situation>, plan: &TimeTriggeredPlan) -> Op
         return Some(Violation {
             time: earliest,
             action: None,
-            mistake: Mistake::Abandoned(missing.action.name.clone()),
+            kind: ViolationKind::Abandoned(missing.action.name.clone()),
         });
     }
     plan.steps.iter().enumerate().find_map(|(position, step)| {
         let continued = running.get(position);
         let mistake = match (&step.action.body, &step.duration) {
             _ if continued.is_some_and(|running| !running.is_continued_by(step)) => {
-                Mistake::Abandoned(running[position].action.name.clone())
+                ViolationKind::Abandoned(running[position].action.name.clone())
             }
             _ if continued.is_none() && step.start < earliest => {
-                Mistake::TooEarly(earliest.clone())
+                ViolationKind::TooEarly(earliest.clone())
             }
-            (Body::Durative(_), None) => Mistake::NoDuration,
+            (Body::Durative(_), None) => ViolationKind::NoDuration,
             (Body::Durative(_), Some(duration)) if duration.is_negative() => {
-                Mistake::NegativeDuration(duration.clone())
+                ViolationKind::NegativeDuration(duration.clone())
             }
             (_, Some(duration))
-                if continued.is_some_and(|running| !running.may_last(duration, &earliest)) =>
+                if continued.is_some_and(|running| !running.can_last(duration, &earliest)) =>
             {
-                Mistake::Elapsed {
+                ViolationKind::Elapsed {
                     duration: duration.clone(),
                     possible: running[position].duration.clone(),
                     now: earliest.clone(),
@@ -317,7 +319,7 @@ fn malformed_step(situation: Option<&Situation>, plan: &TimeTriggeredPlan) -> Op
         Some(Violation {
             time: step.start.clone(),
             action: Some(ActionInstance::of(plan, position)),
-            mistake,
+            kind: mistake,
         })
     })
 }
@@ -348,12 +350,12 @@ fn margins(task: &Task, plan: &TimeTriggeredPlan, margins: margin::Margins) -> V
     listed
 }
 
-fn condition_of(body: &Body, when: When) -> Option<&Condition> {
+fn condition_of(body: &Body, when: ConditionTime) -> Option<&Condition> {
     match (body, when) {
-        (Body::Instantaneous(snap), When::Now) => Some(&snap.condition),
-        (Body::Durative(body), When::Start) => Some(&body.start.condition),
-        (Body::Durative(body), When::OverAll) => Some(&body.over_all),
-        (Body::Durative(body), When::End) => Some(&body.end.condition),
+        (Body::Instantaneous(snap), ConditionTime::Now) => Some(&snap.condition),
+        (Body::Durative(body), ConditionTime::Start) => Some(&body.start.condition),
+        (Body::Durative(body), ConditionTime::OverAll) => Some(&body.over_all),
+        (Body::Durative(body), ConditionTime::End) => Some(&body.end.condition),
         _ => None,
     }
 }

@@ -66,8 +66,8 @@ impl NetworkFile {
     ///
     /// Distributions of durations and waits are left out.
     pub fn in_whole_numbers(&self) -> Option<(Self, Rational)> {
-        let whole = self.network.whole()?;
-        let factor = whole.unit.fraction(1).reciprocal()?;
+        let whole = self.network.to_integer_network()?;
+        let factor = whole.unit.to_fraction(1).reciprocal()?;
         let mut requirements = Network::with_nodes(self.points.len());
         for constraint in whole.network.requirements().constraints() {
             let bound = Rational::from(constraint.bound);

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use crate::mistake::Report;
+use crate::report::Report;
 
 /// Limit on nesting: deeper than any network needs, and shallow enough for any stack.
 const DEEPEST: usize = 64;
@@ -80,7 +80,7 @@ pub(crate) fn parse<'a>(text: &'a str, report: &mut Report) -> Option<Json<'a>> 
     let read = reader.value(0).and_then(|value| {
         reader.skip_space();
         if reader.at < text.len() {
-            return Err(reader.wrong("there is more text after the document", "remove it"));
+            return Err(reader.syntax_error("there is more text after the document", "remove it"));
         }
         Ok(value)
     });
@@ -89,7 +89,7 @@ pub(crate) fn parse<'a>(text: &'a str, report: &mut Report) -> Option<Json<'a>> 
 }
 
 /// A syntax error in JSON: its position and a message.
-struct Wrong {
+struct SyntaxError {
     at: usize,
     message: String,
     help: &'static str,
@@ -101,8 +101,8 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn wrong(&self, message: impl Into<String>, help: &'static str) -> Wrong {
-        Wrong {
+    fn syntax_error(&self, message: impl Into<String>, help: &'static str) -> SyntaxError {
+        SyntaxError {
             at: self.at,
             message: message.into(),
             help,
@@ -120,18 +120,20 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns the text at this place, for a message.
-    fn here(&self) -> String {
+    fn current_text(&self) -> String {
         match self.text[self.at..].chars().next() {
             Some(letter) => format!("`{letter}`"),
             None => "the end of the text".to_owned(),
         }
     }
 
-    fn value(&mut self, depth: usize) -> Result<Json<'a>, Wrong> {
+    fn value(&mut self, depth: usize) -> Result<Json<'a>, SyntaxError> {
         self.skip_space();
         let at = self.at;
         if depth > DEEPEST {
-            return Err(self.wrong("lists and objects are nested too deeply", "flatten them"));
+            return Err(
+                self.syntax_error("lists and objects are nested too deeply", "flatten them")
+            );
         }
         let value = match self.peek() {
             Some(b'{') => self.object(depth)?,
@@ -139,8 +141,8 @@ impl<'a> Reader<'a> {
             Some(b'"') => Value::Text(self.string()?),
             Some(b'-' | b'+' | b'.' | b'0'..=b'9' | b'A'..=b'Z' | b'a'..=b'z') => self.word()?,
             _ => {
-                let here = self.here();
-                return Err(self.wrong(
+                let here = self.current_text();
+                return Err(self.syntax_error(
                     format!("expected a value, found {here}"),
                     "write a number, a text, a list or an object",
                 ));
@@ -149,7 +151,7 @@ impl<'a> Reader<'a> {
         Ok(Json { at, value })
     }
 
-    fn object(&mut self, depth: usize) -> Result<Value<'a>, Wrong> {
+    fn object(&mut self, depth: usize) -> Result<Value<'a>, SyntaxError> {
         self.at += 1;
         let mut members = Vec::new();
         loop {
@@ -158,8 +160,8 @@ impl<'a> Reader<'a> {
                 Some(b'}') if members.is_empty() => break,
                 Some(b'"') => {}
                 _ => {
-                    let here = self.here();
-                    return Err(self.wrong(
+                    let here = self.current_text();
+                    return Err(self.syntax_error(
                         format!("expected the name of a member, found {here}"),
                         "write names in double quotes",
                     ));
@@ -168,8 +170,8 @@ impl<'a> Reader<'a> {
             let name = self.string()?;
             self.skip_space();
             if self.peek() != Some(b':') {
-                let here = self.here();
-                return Err(self.wrong(
+                let here = self.current_text();
+                return Err(self.syntax_error(
                     format!("expected `:` after the name `{name}`, found {here}"),
                     "write `\"name\": value`",
                 ));
@@ -184,7 +186,7 @@ impl<'a> Reader<'a> {
         Ok(Value::Object(members))
     }
 
-    fn items(&mut self, depth: usize) -> Result<Value<'a>, Wrong> {
+    fn items(&mut self, depth: usize) -> Result<Value<'a>, SyntaxError> {
         self.at += 1;
         let mut items = Vec::new();
         self.skip_space();
@@ -201,7 +203,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns `true` if the list or object ends here; otherwise skips the comma.
-    fn is_last(&mut self, end: u8) -> Result<bool, Wrong> {
+    fn is_last(&mut self, end: u8) -> Result<bool, SyntaxError> {
         self.skip_space();
         match self.peek() {
             Some(byte) if byte == end => Ok(true),
@@ -210,8 +212,8 @@ impl<'a> Reader<'a> {
                 Ok(false)
             }
             _ => {
-                let here = self.here();
-                Err(self.wrong(
+                let here = self.current_text();
+                Err(self.syntax_error(
                     format!("expected `,` or `{}`, found {here}", char::from(end)),
                     "the file may be cut off or a comma missing",
                 ))
@@ -220,7 +222,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads a number, `true`, `false`, `null` or an infinity.
-    fn word(&mut self) -> Result<Value<'a>, Wrong> {
+    fn word(&mut self) -> Result<Value<'a>, SyntaxError> {
         let start = self.at;
         while let Some(b'-' | b'+' | b'.' | b'0'..=b'9' | b'A'..=b'Z' | b'a'..=b'z') = self.peek() {
             self.at += 1;
@@ -233,7 +235,7 @@ impl<'a> Reader<'a> {
             _ if word.starts_with(|c: char| !c.is_ascii_alphabetic()) => Ok(Value::Number(word)),
             _ => {
                 self.at = start;
-                Err(self.wrong(
+                Err(self.syntax_error(
                     format!("`{word}` is not a value"),
                     "write texts in double quotes",
                 ))
@@ -241,7 +243,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn string(&mut self) -> Result<Cow<'a, str>, Wrong> {
+    fn string(&mut self) -> Result<Cow<'a, str>, SyntaxError> {
         let start = self.at + 1;
         let bytes = self.text.as_bytes();
         let mut at = start;
@@ -256,11 +258,11 @@ impl<'a> Reader<'a> {
                 _ => at += 1,
             }
         }
-        Err(self.wrong("the text that begins here has no end", "add a double quote"))
+        Err(self.syntax_error("the text that begins here has no end", "add a double quote"))
     }
 
     /// Reads a string with escape sequences, the first of them at `at`.
-    fn escaped(&mut self, start: usize, at: usize) -> Result<Cow<'a, str>, Wrong> {
+    fn escaped(&mut self, start: usize, at: usize) -> Result<Cow<'a, str>, SyntaxError> {
         let begin = self.at;
         let mut read = self.text[start..at].to_owned();
         let mut letters = self.text[at..].char_indices();
@@ -286,7 +288,7 @@ impl<'a> Reader<'a> {
                     }
                     _ => {
                         self.at = at + offset;
-                        return Err(self.wrong(
+                        return Err(self.syntax_error(
                             "this is no escape sequence",
                             "write two backslashes for one",
                         ));
@@ -297,7 +299,7 @@ impl<'a> Reader<'a> {
             }
         }
         self.at = begin;
-        Err(self.wrong("the text that begins here has no end", "add a double quote"))
+        Err(self.syntax_error("the text that begins here has no end", "add a double quote"))
     }
 }
 
@@ -335,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_have_places() {
+    fn syntax_errors_have_positions() {
         assert!(refused("{\"a\": [1,\n 2").starts_with("text:2:3: error: expected `,` or `]`"));
         assert!(refused("{\"a\" 1}").starts_with("text:1:6: error: expected `:`"));
         assert!(refused("[inf]").starts_with("text:1:2: error: `inf` is not a value"));

@@ -24,19 +24,19 @@
 
 mod builder;
 mod derive;
+mod descriptions;
 mod file;
 mod json;
-mod mistake;
 mod number;
 mod read;
+mod report;
 pub mod weak;
-mod words;
 mod write;
 mod xml;
 
+pub use descriptions::decimal;
 pub use elbowroom_text::{Diagnostics, Source};
 pub use file::{Correlation, Duration, Format, GivenWait, NetworkFile};
 pub use read::read;
-pub use weak::{Weak, weak};
-pub use words::number;
+pub use weak::{WeakControllability, weak};
 pub use write::{write_graphml, write_json, write_plain};

@@ -14,8 +14,8 @@ use elbowroom_text::{Diagnostics, Source};
 
 use crate::file::NetworkFile;
 use crate::json::{self, Json, Value};
-use crate::mistake::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// Extensions of files with unsupported kinds of networks, and the names of these kinds.
 const REFUSED: [(&str, &str); 6] = [
@@ -45,14 +45,14 @@ const REFUSED_HELP: &str =
 pub fn read(name: &str, bytes: &[u8]) -> Result<NetworkFile, Diagnostics> {
     let source = Source::from_bytes(name, bytes);
     let mut report = Report::new(&source);
-    let file = any(name, source.text(), &mut report);
+    let file = detect_format(name, source.text(), &mut report);
     let (mut file, remarks) = report.finish(file)?;
     file.remarks = remarks;
     Ok(file)
 }
 
-fn any(name: &str, text: &str, report: &mut Report) -> Option<NetworkFile> {
-    let ending = ending(name);
+fn detect_format(name: &str, text: &str, report: &mut Report) -> Option<NetworkFile> {
+    let ending = file_extension(name);
     if let Some((_, kind)) = REFUSED.iter().find(|(refused, _)| *refused == ending) {
         report.mistake(
             0,
@@ -65,7 +65,7 @@ fn any(name: &str, text: &str, report: &mut Report) -> Option<NetworkFile> {
     let first = text[start..].lines().next().unwrap_or_default();
     match text[start..].chars().next() {
         Some('<') => graphml::read(text, &ending, report),
-        Some('{' | '[') => any_json(text, report),
+        Some('{' | '[') => detect_json_format(text, report),
         Some('#') => plain::read(text, report),
         Some(_) if dimacs::is_line(first) => dimacs::read(text, report),
         Some(_) if is_trace(first) => {
@@ -93,7 +93,7 @@ fn any(name: &str, text: &str, report: &mut Report) -> Option<NetworkFile> {
 }
 
 /// Returns the extension of a file's name, in lower case.
-fn ending(name: &str) -> String {
+fn file_extension(name: &str) -> String {
     let base = name.rsplit(['/', '\\']).next().unwrap_or_default();
     match base.rsplit_once('.') {
         Some((_, ending)) => ending.to_ascii_lowercase(),
@@ -112,7 +112,7 @@ fn is_trace(line: &str) -> bool {
     line.split(',').next().and_then(is_event).is_some()
 }
 
-fn any_json(text: &str, report: &mut Report) -> Option<NetworkFile> {
+fn detect_json_format(text: &str, report: &mut Report) -> Option<NetworkFile> {
     let document = json::parse(text, report)?;
     if document.member("format").and_then(Json::text) == Some(elbowroom::FORMAT) {
         return elbowroom::read(&document, report);
@@ -193,7 +193,12 @@ fn number(json: &Json<'_>, report: &mut Report) -> Option<Rational> {
 }
 
 /// Reads a bound under a name; returns `missing` if there is none.
-fn bound_or(parent: &Json<'_>, name: &str, missing: Bound, report: &mut Report) -> Option<Bound> {
+fn optional_bound(
+    parent: &Json<'_>,
+    name: &str,
+    missing: Bound,
+    report: &mut Report,
+) -> Option<Bound> {
     match parent.member(name) {
         Some(json) if !matches!(json.value, Value::Null) => bound(json, report),
         _ => Some(missing),

@@ -13,13 +13,13 @@
 use std::collections::BTreeMap;
 
 use elbowroom_num::{Rational, Side};
-use elbowroom_stn::branching::{Branching, Corner, OpenBound, TooManyBranches};
+use elbowroom_stn::corner_search::{Branching, Corner, OpenBound, TooManyBranches};
 use elbowroom_stn::uncertain::{ContingentLink, LinkId, UncertainNetwork};
 use elbowroom_stn::{Constraint, ConstraintId, Network, NodeId};
 
 /// The result of a weak-controllability check.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Weak {
+pub enum WeakControllability {
     /// There is a schedule for every choice of durations.
     Controllable,
     /// There is no schedule for these durations.
@@ -52,12 +52,12 @@ pub struct WeakStep {
     /// The upper bound of the difference.
     pub bound: Rational,
     /// Origin of the bound.
-    pub given: Given,
+    pub ground: StepGround,
 }
 
 /// The ground of one step of a conflict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Given {
+pub enum StepGround {
     /// A requirement.
     Requirement(ConstraintId),
     /// The duration of a link.
@@ -66,13 +66,15 @@ pub enum Given {
 
 /// Decides weak controllability: for all durations within their bounds there is a schedule. Returns
 /// [`Weak::Undecided`] after `most_branches` branches.
-pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> Weak {
-    if let Some(conflict) = endless(network).or_else(|| own_limit(network)) {
-        return Weak::Uncontrollable(conflict);
+pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> WeakControllability {
+    if let Some(conflict) =
+        unbounded_link_conflict(network).or_else(|| own_requirement_conflict(network))
+    {
+        return WeakControllability::Uncontrollable(conflict);
     }
     match corner_without_schedule(network, most_branches) {
-        Ok(None) => Weak::Controllable,
-        Err(TooManyBranches) => Weak::Undecided {
+        Ok(None) => WeakControllability::Controllable,
+        Err(TooManyBranches) => WeakControllability::Undecided {
             branches: most_branches,
         },
         Ok(Some(sides)) => {
@@ -80,10 +82,10 @@ pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> Weak 
                 .into_iter()
                 .map(|(link, side)| (link, duration(network.link(link), side)))
                 .collect();
-            match at(network, &durations) {
-                Some(conflict) => Weak::Uncontrollable(conflict),
+            match conflict_with(network, &durations) {
+                Some(conflict) => WeakControllability::Uncontrollable(conflict),
                 // Unreachable: every corner found has a negative cycle.
-                None => Weak::Undecided { branches: 0 },
+                None => WeakControllability::Undecided { branches: 0 },
             }
         }
     }
@@ -91,7 +93,7 @@ pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> Weak 
 
 /// Returns the contradiction that results from these durations, if any. Links that are not listed
 /// add no constraints.
-pub fn at(
+pub fn conflict_with(
     network: &UncertainNetwork<Rational>,
     durations: &BTreeMap<LinkId, Rational>,
 ) -> Option<WeakConflict> {
@@ -100,7 +102,7 @@ pub fn at(
     let mut given = Vec::new();
     for id in requirements.constraint_ids() {
         corner.add(requirements.constraint(id).clone());
-        given.push(Given::Requirement(id));
+        given.push(StepGround::Requirement(id));
     }
     for (&id, duration) in durations {
         let link = network.link(id);
@@ -114,7 +116,7 @@ pub fn at(
             link.end,
             duration.clone(),
         ));
-        given.extend([Given::Link(id); 2]);
+        given.extend([StepGround::Link(id); 2]);
     }
     let cycle = corner.consistency().err()?;
     let steps = cycle.constraints.iter().map(|&id| {
@@ -123,11 +125,15 @@ pub fn at(
             from: constraint.from,
             to: constraint.to,
             bound: constraint.bound.clone(),
-            given: given[id.index()],
+            ground: given[id.index()],
         }
     });
     let steps: Vec<WeakStep> = steps.collect();
-    let is_used = |id: &LinkId| steps.iter().any(|step| step.given == Given::Link(*id));
+    let is_used = |id: &LinkId| {
+        steps
+            .iter()
+            .any(|step| step.ground == StepGround::Link(*id))
+    };
     let used = durations.iter().filter(|(id, _)| is_used(id));
     Some(WeakConflict {
         durations: used.map(|(&id, duration)| (id, duration.clone())).collect(),
@@ -145,7 +151,7 @@ fn duration(link: &ContingentLink<Rational>, side: Side) -> Rational {
 }
 
 /// Returns a conflict of a link without an upper bound whose end is limited from above.
-fn endless(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
+fn unbounded_link_conflict(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
     let shortest: BTreeMap<LinkId, Rational> = network
         .link_ids()
         .map(|id| (id, network.link(id).lower.clone()))
@@ -155,7 +161,7 @@ fn endless(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
         if link.upper.is_some() || !is_limited(network, id) {
             continue;
         }
-        if let Some(conflict) = at(network, &shortest) {
+        if let Some(conflict) = conflict_with(network, &shortest) {
             return Some(conflict);
         }
         // Lengthens the duration until it exceeds the path from the link's beginning to its end.
@@ -163,7 +169,7 @@ fn endless(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
         let mut step = Rational::ONE;
         loop {
             durations.insert(id, &link.lower + &step);
-            if let Some(conflict) = at(network, &durations) {
+            if let Some(conflict) = conflict_with(network, &durations) {
                 return Some(conflict);
             }
             step = &step + &step;
@@ -196,7 +202,7 @@ fn is_limited(network: &UncertainNetwork<Rational>, id: LinkId) -> bool {
 }
 
 /// Returns a conflict of a link with a requirement on the same difference.
-fn own_limit(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
+fn own_requirement_conflict(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
     for constraint in network.requirements().constraints() {
         for (node, other, side) in [
             (constraint.to, constraint.from, Side::Upper),
@@ -212,7 +218,7 @@ fn own_limit(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
                 Side::Lower => -&worst > constraint.bound,
             };
             if link.activation == other && is_broken {
-                return at(network, &BTreeMap::from([(id, worst)]));
+                return conflict_with(network, &BTreeMap::from([(id, worst)]));
             }
         }
     }
@@ -256,7 +262,7 @@ fn corner_without_schedule(
 fn bounds(network: &UncertainNetwork<Rational>) -> Vec<OpenBound<LinkId>> {
     let mut bounds = Vec::new();
     for constraint in network.requirements().constraints() {
-        // The link's own bound on this difference is at least as tight; see `own_limit`.
+        // The link's own bound on this difference is at least as tight; see `own_requirement_conflict`.
         let is_own = [
             (constraint.to, constraint.from),
             (constraint.from, constraint.to),

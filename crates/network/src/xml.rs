@@ -4,7 +4,7 @@
 //! document types are skipped. Prefixes of names are removed. A document may consist of several
 //! root elements, because some tools write that.
 
-use crate::mistake::Report;
+use crate::report::Report;
 
 /// Limit on nesting: deeper than any network needs, and shallow enough for any stack.
 const DEEPEST: usize = 64;
@@ -50,7 +50,7 @@ pub(crate) fn parse(text: &str, report: &mut Report) -> Option<Vec<Element>> {
 }
 
 /// A syntax error in XML: its position and a message.
-struct Wrong {
+struct SyntaxError {
     at: usize,
     message: String,
     help: &'static str,
@@ -64,8 +64,12 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn wrong<T>(&self, message: impl Into<String>, help: &'static str) -> Result<T, Wrong> {
-        Err(Wrong {
+    fn syntax_error<T>(
+        &self,
+        message: impl Into<String>,
+        help: &'static str,
+    ) -> Result<T, SyntaxError> {
+        Err(SyntaxError {
             at: self.at,
             message: message.into(),
             help,
@@ -77,17 +81,17 @@ impl Reader<'_> {
     }
 
     /// Skips everything up to and including `end`.
-    fn skip_past(&mut self, end: &str, what: &str) -> Result<(), Wrong> {
+    fn skip_past(&mut self, end: &str, what: &str) -> Result<(), SyntaxError> {
         match self.rest().find(end) {
             Some(offset) => {
                 self.at += offset + end.len();
                 Ok(())
             }
-            None => self.wrong(format!("this {what} has no end"), "the file may be cut off"),
+            None => self.syntax_error(format!("this {what} has no end"), "the file may be cut off"),
         }
     }
 
-    fn document(&mut self) -> Result<(), Wrong> {
+    fn document(&mut self) -> Result<(), SyntaxError> {
         while self.at < self.text.len() {
             if self.rest().starts_with("<!--") {
                 self.skip_past("-->", "comment")?;
@@ -107,7 +111,7 @@ impl Reader<'_> {
         }
         if self.open.len() > 1 {
             let name = &self.open[self.open.len() - 1].name;
-            return self.wrong(
+            return self.syntax_error(
                 format!("the element `{name}` is not closed"),
                 "the file may be cut off",
             );
@@ -116,7 +120,7 @@ impl Reader<'_> {
     }
 
     /// Skips `<!DOCTYPE …>`, possibly with declarations in brackets.
-    fn document_type(&mut self) -> Result<(), Wrong> {
+    fn document_type(&mut self) -> Result<(), SyntaxError> {
         let rest = self.rest();
         let first = rest.find('>');
         let bracket = rest
@@ -128,10 +132,10 @@ impl Reader<'_> {
         self.skip_past(">", "document type")
     }
 
-    fn character_data(&mut self) -> Result<(), Wrong> {
+    fn character_data(&mut self) -> Result<(), SyntaxError> {
         let start = self.at + "<![CDATA[".len();
         let Some(length) = self.text[start..].find("]]>") else {
-            return self.wrong("this CDATA section has no end", "the file may be cut off");
+            return self.syntax_error("this CDATA section has no end", "the file may be cut off");
         };
         let data = self.text[start..start + length].to_owned();
         self.push_text(&data, start);
@@ -139,14 +143,14 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn characters(&mut self) -> Result<(), Wrong> {
+    fn characters(&mut self) -> Result<(), SyntaxError> {
         let length = self.rest().find('<').unwrap_or(self.rest().len());
         let start = self.at;
-        let text = self.resolved(start, start + length)?;
+        let text = self.resolve_references(start, start + length)?;
         self.at = start;
         if self.open.len() == 1 && !text.trim().is_empty() {
             self.at += self.rest().len() - self.rest().trim_start().len();
-            return self.wrong(
+            return self.syntax_error(
                 "there is text outside of all elements",
                 "the file begins with `<graphml …>` and ends with `</graphml>`",
             );
@@ -165,10 +169,10 @@ impl Reader<'_> {
         }
     }
 
-    fn end_tag(&mut self) -> Result<(), Wrong> {
+    fn end_tag(&mut self) -> Result<(), SyntaxError> {
         let start = self.at + 2;
         let Some(length) = self.text[start..].find('>') else {
-            return self.wrong("this tag has no end", "the file may be cut off");
+            return self.syntax_error("this tag has no end", "the file may be cut off");
         };
         let name = local(self.text[start..start + length].trim());
         let closed = if self.open.len() > 1 {
@@ -177,13 +181,13 @@ impl Reader<'_> {
             None
         };
         let Some(element) = closed else {
-            return self.wrong(
+            return self.syntax_error(
                 format!("`</{name}>` closes nothing"),
                 "remove it, or open the element before",
             );
         };
         if element.name != name {
-            return self.wrong(
+            return self.syntax_error(
                 format!("`</{name}>` stands where `</{}>` should", element.name),
                 "close the innermost element first",
             );
@@ -199,13 +203,13 @@ impl Reader<'_> {
         }
     }
 
-    fn start_tag(&mut self) -> Result<(), Wrong> {
+    fn start_tag(&mut self) -> Result<(), SyntaxError> {
         let begin = self.at;
         self.at += 1;
         let name = self.name();
         if name.is_empty() {
             self.at = begin;
-            return self.wrong("this `<` begins no tag", "write `&lt;` for the character");
+            return self.syntax_error("this `<` begins no tag", "write `&lt;` for the character");
         }
         let mut element = Element {
             at: begin,
@@ -228,17 +232,17 @@ impl Reader<'_> {
         }
         if self.open.len() > DEEPEST {
             self.at = begin;
-            return self.wrong("elements are nested too deeply", "flatten them");
+            return self.syntax_error("elements are nested too deeply", "flatten them");
         }
         self.open.push(element);
         Ok(())
     }
 
-    fn attribute(&mut self) -> Result<(String, String), Wrong> {
+    fn attribute(&mut self) -> Result<(String, String), SyntaxError> {
         let name = self.name();
         self.skip_space();
         if name.is_empty() || !self.rest().starts_with('=') {
-            return self.wrong(
+            return self.syntax_error(
                 "this is neither an attribute nor the end of the tag",
                 "write `name=\"value\"`",
             );
@@ -246,13 +250,13 @@ impl Reader<'_> {
         self.at += 1;
         self.skip_space();
         let Some(quote @ ('"' | '\'')) = self.rest().chars().next() else {
-            return self.wrong("this value has no quotes", "write `name=\"value\"`");
+            return self.syntax_error("this value has no quotes", "write `name=\"value\"`");
         };
         let start = self.at + 1;
         let Some(length) = self.text[start..].find(quote) else {
-            return self.wrong("this value has no end", "add a quote");
+            return self.syntax_error("this value has no end", "add a quote");
         };
-        let value = self.resolved(start, start + length)?;
+        let value = self.resolve_references(start, start + length)?;
         self.at = start + length + 1;
         Ok((name, value))
     }
@@ -272,7 +276,7 @@ impl Reader<'_> {
     }
 
     /// Returns a part of the text with its character references resolved.
-    fn resolved(&mut self, start: usize, end: usize) -> Result<String, Wrong> {
+    fn resolve_references(&mut self, start: usize, end: usize) -> Result<String, SyntaxError> {
         let text = &self.text[start..end];
         if !text.contains('&') {
             return Ok(text.to_owned());
@@ -288,7 +292,7 @@ impl Reader<'_> {
             });
             let Some((letter, length)) = known else {
                 self.at = end - rest.len() - 1;
-                return self.wrong(
+                return self.syntax_error(
                     "this `&` begins no character that is known",
                     "write `&amp;` for the character itself",
                 );
@@ -336,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn what_networks_do_not_need_is_skipped() {
+    fn unused_constructs_are_skipped() {
         let text = "<?xml version='1.0'?>\n<!DOCTYPE g [<!ENTITY a 'b'>]>\n<!-- <x> -->\
                     <x:g a='1 &lt; 2' b=\"'\"><n/>t&#233;<![CDATA[<&]]></x:g>";
         let elements = parse(text, &mut Report::new(&text.into())).expect("right");
@@ -351,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_have_places() {
+    fn syntax_errors_have_positions() {
         assert!(
             refused("<a>\n<b></a>")
                 .starts_with("text:2:4: error: `</a>` stands where `</b>` should")

@@ -111,7 +111,7 @@ fn arcs_are_read_from_the_second_node_and_refinements_count() {
 }
 
 #[test]
-fn inequalities_count_once() {
+fn duplicate_inequalities_are_merged() {
     let file = sample("six.json");
     insta::assert_snapshot!(words(&file), @r"
     1 at most 10 after 0
@@ -121,7 +121,7 @@ fn inequalities_count_once() {
 }
 
 #[test]
-fn what_is_written_is_read_back() {
+fn written_files_round_trip() {
     for (name, _) in samples::ALL {
         let file = sample(name);
         let text = write_json(&file);
@@ -157,7 +157,7 @@ fn the_dispatchable_form_is_read_back_with_its_waits() {
 }
 
 #[test]
-fn the_minimal_network_has_all_that_follows() {
+fn minimal_network_contains_all_implied_bounds() {
     let text = r#"{"0": [[0, 1, 3], [1, 2, 4], [2, 0, -1]], "1": [], "2": []}"#;
     let file = read("f.json", text.as_bytes()).expect("a network");
     let minimal = file.minimal().expect("consistent");
@@ -201,7 +201,7 @@ fn other_kinds_are_refused_by_name() {
     clippy::too_many_lines,
     reason = "a list of mistakes, and what is said of them"
 )]
-fn mistakes_say_where_and_what_to_do() {
+fn mistakes_have_position_and_advice() {
     let mut messages = Vec::new();
     let mut wrong = |name: &str, text: &str, changes: &[(&str, &str)]| {
         for (from, to) in changes {
@@ -334,7 +334,7 @@ fn links_that_depend_on_their_own_end_are_refused() {
 
 /// The second link is refused; later references to its end mean the first link.
 #[test]
-fn two_links_with_one_end_are_refused_whatever_else_names_that_end() {
+fn two_links_with_same_end_are_refused() {
     let link = "{\"source\": 0, \"sink\": 1, \"label\": \"one\", \"type\": \"pstc\",
      \"distribution\": {\"mean\": 10.0, \"sd\": 1.5}},";
     let text = samples::PSTN_LIB.replacen(link, &link.repeat(2), 1);

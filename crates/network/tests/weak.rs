@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_network::weak::{Given, at};
-use elbowroom_network::{Weak, weak};
+use elbowroom_network::weak::{StepGround, conflict_with};
+use elbowroom_network::{WeakControllability, weak};
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{ContingentLink, LinkId, UncertainNetwork};
 use elbowroom_stn::{Constraint, Network, NodeId};
@@ -11,7 +11,7 @@ use proptest::prelude::*;
 
 /// Returns `true` if there is a schedule at each corner; links without an upper bound end very late
 /// there.
-fn plainly_weak(network: &UncertainNetwork<Rational>) -> bool {
+fn is_weak_by_enumeration(network: &UncertainNetwork<Rational>) -> bool {
     let links: Vec<LinkId> = network.link_ids().collect();
     (0..1_u32 << links.len()).all(|corner| {
         let durations: BTreeMap<LinkId, Rational> = links
@@ -25,7 +25,7 @@ fn plainly_weak(network: &UncertainNetwork<Rational>) -> bool {
                 (id, if is_lower { link.lower.clone() } else { upper })
             })
             .collect();
-        at(network, &durations).is_none()
+        conflict_with(network, &durations).is_none()
     })
 }
 
@@ -61,11 +61,11 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
     #[test]
-    fn branching_finds_what_all_corners_say(network in arbitrary_networks()) {
+    fn branching_agrees_with_corner_enumeration(network in arbitrary_networks()) {
         match weak(&network, 1000) {
-            Weak::Controllable => prop_assert!(plainly_weak(&network)),
-            Weak::Uncontrollable(conflict) => {
-                prop_assert!(!plainly_weak(&network));
+            WeakControllability::Controllable => prop_assert!(is_weak_by_enumeration(&network)),
+            WeakControllability::Uncontrollable(conflict) => {
+                prop_assert!(!is_weak_by_enumeration(&network));
                 // The durations lie within the bounds, and the steps form a negative cycle.
                 for (&id, duration) in &conflict.durations {
                     let link = network.link(id);
@@ -77,25 +77,25 @@ proptest! {
                 let nexts = conflict.steps.iter().cycle().skip(1);
                 for (step, next) in conflict.steps.iter().zip(nexts) {
                     prop_assert_eq!(step.to, next.from);
-                    match step.given {
-                        Given::Requirement(id) => {
+                    match step.ground {
+                        StepGround::Requirement(id) => {
                             let constraint = network.requirements().constraint(id);
                             prop_assert_eq!(&constraint.bound, &step.bound);
                         }
-                        Given::Link(id) => {
+                        StepGround::Link(id) => {
                             prop_assert_eq!(&conflict.durations[&id], &step.bound.abs());
                         }
                     }
                 }
             }
-            Weak::Undecided { branches } => prop_assert!(false, "undecided after {branches}"),
+            WeakControllability::Undecided { branches } => prop_assert!(false, "undecided after {branches}"),
         }
     }
 
     #[test]
     fn dynamic_controllability_implies_weak_controllability(network in arbitrary_networks()) {
         if network.is_dynamically_controllable() {
-            prop_assert_eq!(weak(&network, 1000), Weak::Controllable);
+            prop_assert_eq!(weak(&network, 1000), WeakControllability::Controllable);
         }
     }
 }
@@ -103,7 +103,7 @@ proptest! {
 /// Two links that must end together, whatever their durations, are not weakly controllable. They
 /// are if the executor chooses when they begin.
 #[test]
-fn ends_can_be_brought_together_only_by_one_who_knows_the_durations() {
+fn weak_but_not_dynamic_controllability() {
     let minutes = |n: i64| Rational::from(n);
     let network = |is_together: bool| {
         let mut requirements = Network::with_nodes(4);
@@ -121,9 +121,12 @@ fn ends_can_be_brought_together_only_by_one_who_knows_the_durations() {
         };
         UncertainNetwork::new(requirements, vec![link(0, 1), link(2, 3)]).expect("sound")
     };
-    assert_eq!(weak(&network(false), 100), Weak::Controllable);
+    assert_eq!(
+        weak(&network(false), 100),
+        WeakControllability::Controllable
+    );
     assert!(!network(false).is_dynamically_controllable());
-    let Weak::Uncontrollable(conflict) = weak(&network(true), 100) else {
+    let WeakControllability::Uncontrollable(conflict) = weak(&network(true), 100) else {
         panic!("the durations differ");
     };
     assert_eq!(conflict.total, minutes(-2));

@@ -48,13 +48,13 @@ impl CommonDenominator {
 
     /// Returns the number multiplied by the denominator; `None` if that is no whole number, or does
     /// not fit an `i64`.
-    pub fn whole(self, number: &Rational) -> Option<i64> {
+    pub fn to_integer(self, number: &Rational) -> Option<i64> {
         let (numerator, own) = number.as_small()?;
         (self.0 % own == 0).then(|| numerator.checked_mul(self.0 / own))?
     }
 
     /// Returns the whole number divided by the denominator.
-    pub fn fraction(self, whole: i64) -> Rational {
+    pub fn to_fraction(self, whole: i64) -> Rational {
         Rational::new(whole, self.0)
     }
 
@@ -76,23 +76,23 @@ mod tests {
     use crate::Rational;
 
     #[test]
-    fn it_is_the_least_one_and_gives_the_numbers_back() {
+    fn common_denominator_is_least_and_round_trips() {
         let numbers = [(1, 6), (-3, 4), (7, 1), (0, 5)].map(|(n, d)| Rational::new(n, d));
         let common = CommonDenominator::of(&numbers).expect("small");
         assert_eq!(common.get(), 12);
         for number in &numbers {
-            let whole = common.whole(number).expect("whole");
-            assert_eq!(&common.fraction(whole), number);
+            let whole = common.to_integer(number).expect("whole");
+            assert_eq!(&common.to_fraction(whole), number);
         }
     }
 
     #[test]
-    fn what_does_not_fit_is_refused() {
+    fn overflowing_numbers_are_refused() {
         let large = Rational::new(1, i64::MAX);
         let mut common = CommonDenominator::of([&large]).expect("fits");
         assert_eq!(common.include(&Rational::new(1, 2)), None);
         assert_eq!(common.get(), i64::MAX);
-        assert_eq!(common.whole(&Rational::new(2, 1)), None);
+        assert_eq!(common.to_integer(&Rational::new(2, 1)), None);
         let beyond = &Rational::from(i64::MAX) * &Rational::from(i64::MAX);
         assert_eq!(CommonDenominator::of([&beyond]), None);
     }

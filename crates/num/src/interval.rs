@@ -204,7 +204,7 @@ impl Side {
 
     /// Returns the number at which this end of an interval lies if its [`reach`](Self::reach) is
     /// `reach`.
-    pub fn at_reach(self, reach: &Rational) -> Rational {
+    pub fn value_at_reach(self, reach: &Rational) -> Rational {
         match self {
             Self::Lower => -reach,
             Self::Upper => reach.clone(),

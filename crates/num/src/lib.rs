@@ -27,18 +27,18 @@
 //! # Ok::<(), elbowroom_num::ParseRationalError>(())
 //! ```
 
-pub mod chance;
+mod accumulator;
 mod delta;
 mod denominator;
-pub mod enclosed;
+pub mod enclosures;
 mod interval;
+pub mod log_concave;
 mod rational;
 pub mod simplex;
-mod total;
 pub mod work;
 
+pub use accumulator::Accumulator;
 pub use delta::Delta;
 pub use denominator::CommonDenominator;
 pub use interval::{End, Interval, Side};
 pub use rational::{ParseRationalError, Rational};
-pub use total::Total;

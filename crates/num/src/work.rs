@@ -54,13 +54,13 @@ impl Stop {
 
     /// Makes computations of this thread obey this request instead of any other.
     ///
-    /// Threads that are started later do not inherit it: pass [`Stop::of_this_thread`] on to them.
-    pub fn obey(&self) {
+    /// Threads that are started later do not inherit it: pass [`Stop::current`] on to them.
+    pub fn install_for_thread(&self) {
         STOP.set(Some(self.clone()));
     }
 
     /// Returns the request that computations of this thread obey.
-    pub fn of_this_thread() -> Option<Self> {
+    pub fn current() -> Option<Self> {
         STOP.with_borrow(Clone::clone)
     }
 }
@@ -112,18 +112,18 @@ impl Budget {
     }
 
     /// Returns the remaining units.
-    pub fn left(&self) -> u64 {
+    pub fn remaining(&self) -> u64 {
         self.units.saturating_sub(self.used())
     }
 
     /// Returns `true` if nothing is left, or if the thread's computations should end early ([`is_stopped`]).
     pub fn is_spent(&self) -> bool {
-        self.left() == 0 && self.units < u64::MAX || is_stopped()
+        self.remaining() == 0 && self.units < u64::MAX || is_stopped()
     }
 }
 
 /// Executes a task, and counts exactly `units(&result)` for this thread: for tasks that are divided among threads.
-pub fn counted_as<R>(task: impl FnOnce() -> R, units: impl FnOnce(&R) -> u64) -> R {
+pub fn with_fixed_cost<R>(task: impl FnOnce() -> R, units: impl FnOnce(&R) -> u64) -> R {
     let begin = spent();
     let result = task();
     SPENT.set(begin.saturating_add(units(&result)));

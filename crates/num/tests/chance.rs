@@ -2,8 +2,10 @@
 
 use proptest::prelude::*;
 
-use elbowroom_num::chance::{Cell, Chance, Cut, Density, Reach, Steps, Touch};
-use elbowroom_num::{Rational, enclosed};
+use elbowroom_num::log_concave::{
+    Cell, CutPosition, Density, LogConcaveDistribution, Reach, Steps, TangentPoint,
+};
+use elbowroom_num::{Rational, enclosures};
 
 fn number(tenths: i64) -> Rational {
     Rational::new(tenths, 10)
@@ -35,18 +37,18 @@ fn densities() -> impl Strategy<Value = Density> {
     ]
 }
 
-fn chances() -> impl Strategy<Value = Chance> {
+fn chances() -> impl Strategy<Value = LogConcaveDistribution> {
     let cut = || prop::option::of((0..11_i64).prop_map(|own| own * 10));
     let dense = (densities(), cut(), cut()).prop_map(|(density, low, high)| {
         let resolution = Rational::new(1, 10);
-        Chance::dense(density, low.map(number), high.map(number), &resolution)
+        LogConcaveDistribution::dense(density, low.map(number), high.map(number), &resolution)
             .expect("a sound density")
     });
     let values = prop::collection::vec((0..22_i64).prop_map(|own| own * 5), 1..6);
     prop_oneof![
         3 => dense,
         1 => values.prop_map(|own| {
-            Chance::values(own.into_iter().map(number).collect()).expect("some values")
+            LogConcaveDistribution::values(own.into_iter().map(number).collect()).expect("some values")
         }),
     ]
 }
@@ -79,9 +81,9 @@ proptest! {
     ) {
         let point = number(point);
         let slopes = [Rational::new(slopes.0, 16), Rational::new(slopes.1, 16)];
-        let touches = [Touch::At(at.clone()), Touch::Mass(number(3)), Touch::Nowhere];
+        let touches = [TangentPoint::At(at.clone()), TangentPoint::Mass(number(3)), TangentPoint::NoContact];
         for touch in touches {
-            let Some(height) = chance.height(&point, &cell, &touch, &slopes) else { continue };
+            let Some(height) = chance.gap(&point, &cell, &touch, &slopes) else { continue };
             // Reaches outside the cell are not checked.
             let most = |side: usize, [near, far]: &[Rational; 2]| {
                 if cell.is_open[side] && near < far { 5_i64 } else { 6 }
@@ -93,8 +95,8 @@ proptest! {
                         near + &((far - near) * Rational::new(step, 6))
                     };
                     let reach = [place(&cell.below, step), place(&cell.above, other)];
-                    let [mass, _] = chance.mass(&point, &reach);
-                    let Some([below, _]) = enclosed::ln(&mass) else { continue };
+                    let [mass, _] = chance.probability_bounds(&point, &reach);
+                    let Some([below, _]) = enclosures::ln(&mass) else { continue };
                     let bound = &height + &slopes[0] * &reach[0] + &slopes[1] * &reach[1];
                     prop_assert!(below <= bound, "{:?} at {:?}: {} > {}", touch, reach, below, bound);
                 }
@@ -109,63 +111,63 @@ proptest! {
         point in (1..9_i64).prop_map(|own| own * 10),
     ) {
         let point = number(point);
-        let chance = Chance::dense(density, None, None, &Rational::new(1, 1000)).unwrap();
-        let Chance::Dense(dense) = &chance else { return Ok(()) };
-        let Some(seen) = dense.seen(&point, &cell) else { return Ok(()) };
-        prop_assume!(seen.iter().all(|own| *own == Cut::Before));
+        let chance = LogConcaveDistribution::dense(density, None, None, &Rational::new(1, 1000)).unwrap();
+        let LogConcaveDistribution::Dense(dense) = &chance else { return Ok(()) };
+        let Some(seen) = dense.cut_positions(&point, &cell) else { return Ok(()) };
+        prop_assume!(seen.iter().all(|own| *own == CutPosition::NotReached));
         let Some(([mass, _], rises)) = dense.tangent(&point, &seen, &at) else { return Ok(()) };
         prop_assume!(mass > Rational::new(1, 1_000_000));
         let slopes = rises.map(|[low, _]| low);
-        let height = chance.height(&point, &cell, &Touch::At(at.clone()), &slopes).unwrap();
-        let [_, above] = enclosed::ln(&mass).unwrap();
+        let height = chance.gap(&point, &cell, &TangentPoint::At(at.clone()), &slopes).unwrap();
+        let [_, above] = enclosures::ln(&mass).unwrap();
         let bound = &height + &slopes[0] * &at[0] + &slopes[1] * &at[1];
         prop_assert!(bound - above < Rational::new(1, 100_000_000));
     }
 
     #[test]
-    fn what_a_number_is_rounded_to_is_inside_no_more_often_than_an_interval_with_its_margin(
+    fn rounded_number_is_no_more_probable_than_widened_interval(
         chance in chances(),
         (_, at) in cells(),
         point in (1..9_i64).prop_map(|own| own * 10),
     ) {
         let point = number(point);
         let (lower, upper) = (&point - &at[0], &point + &at[1]);
-        let inside = chance.inside([&lower, &upper], &Rational::new(1, 10));
-        let [_, above] = chance.mass(&point, &at);
+        let inside = chance.probability_inside([&lower, &upper], &Rational::new(1, 10));
+        let [_, above] = chance.probability_bounds(&point, &at);
         prop_assert!(inside <= above);
     }
 
     #[test]
-    fn reaching_less_than_the_least_has_no_chance_and_more_than_the_most_gains_nothing(
+    fn reach_outside_support_is_impossible_or_gains_nothing(
         chance in chances(),
         (_, at) in cells(),
         point in (1..9_i64).prop_map(|own| own * 10),
     ) {
         let point = number(point);
         let [(least_below, most_below), (least_above, most_above)] = chance.limits(&point);
-        let [low, high] = chance.mass(&point, &at);
+        let [low, high] = chance.probability_bounds(&point, &at);
         if at[0] < least_below || at[1] < least_above {
             prop_assert!(low.is_zero());
-        } else if !matches!(&chance, Chance::Dense(own) if own.density.bend().is_some()) {
+        } else if !matches!(&chance, LogConcaveDistribution::Dense(own) if own.density.concavity_limit().is_some()) {
             let cut = |value: &Rational, most: &Option<Rational>| {
                 most.as_ref().map_or(value.clone(), |most| value.clone().min(most.clone()))
             };
             let kept = [cut(&at[0], &most_below), cut(&at[1], &most_above)];
-            let [_, kept] = chance.mass(&point, &kept);
+            let [_, kept] = chance.probability_bounds(&point, &kept);
             prop_assert!(kept >= low && kept <= high.max(kept.clone()), "{kept} {low}");
         }
     }
 }
 
 #[test]
-fn masses_are_those_of_draws() {
+fn probabilities_match_samples() {
     // Some ten thousand evenly spread quantiles represent random draws.
     let quantile = |density: &Density, share: f64| -> f64 {
         let (mut low, mut high): (f64, f64) = (-100.0, 200.0);
         for _ in 0..60 {
             let middle = f64::midpoint(low, high);
             let at = Rational::from_f64_exactly(middle).unwrap();
-            if density.at_most(&at)[0].to_f64() < share {
+            if density.cdf_bounds(&at)[0].to_f64() < share {
                 low = middle;
             } else {
                 high = middle;
@@ -180,7 +182,8 @@ fn masses_are_those_of_draws() {
     let resolution = Rational::new(1, 10);
     let cuts = [Some(Rational::from(7)), Some(Rational::from(14))];
     let [minimum, maximum] = cuts;
-    let chance = Chance::dense(density.clone(), minimum, maximum, &resolution).unwrap();
+    let chance =
+        LogConcaveDistribution::dense(density.clone(), minimum, maximum, &resolution).unwrap();
     let draws: Vec<f64> = (0..2000)
         .map(|index| quantile(&density, (f64::from(index) + 0.5) / 2000.0))
         .map(|own| (own.clamp(7.0, 14.0) * 10.0).round() / 10.0)
@@ -193,7 +196,7 @@ fn masses_are_those_of_draws() {
         (100, 100),
         (20, 69),
     ] {
-        let inside = chance.inside([&number(lower), &number(upper)], &resolution);
+        let inside = chance.probability_inside([&number(lower), &number(upper)], &resolution);
         let ends = [number(lower).to_f64() - 1e-9, number(upper).to_f64() + 1e-9];
         let count = draws
             .iter()
@@ -208,9 +211,9 @@ fn masses_are_those_of_draws() {
 }
 
 #[test]
-fn steps_of_values_add_up_to_what_an_interval_has() {
+fn value_steps_sum_to_interval_probability() {
     let values: Vec<Rational> = [10, 20, 30, 40, 40, 70].map(number).to_vec();
-    let chance = Chance::Values(values.clone());
+    let chance = LogConcaveDistribution::Values(values.clone());
     let cell = Cell {
         below: [number(5), number(25)],
         above: [number(0), number(15)],
@@ -220,11 +223,11 @@ fn steps_of_values_add_up_to_what_an_interval_has() {
     let total = steps.sides.iter().filter_map(|own| own.last());
     let total = steps.center + total.map(|(_, share)| share).sum::<Rational>();
     let far = [cell.below[1].clone(), cell.above[1].clone()];
-    assert_eq!(chance.mass(&number(30), &far)[0], total);
+    assert_eq!(chance.probability_bounds(&number(30), &far)[0], total);
 }
 
 #[test]
-fn what_lies_in_a_short_interval_is_known_to_a_part_of_itself() {
+fn short_interval_probability_has_small_relative_error() {
     // The probability is the density in the middle times the width, as the interval is very short.
     let bells = [
         Density::Normal {
@@ -241,8 +244,8 @@ fn what_lies_in_a_short_interval_is_known_to_a_part_of_itself() {
             let (lower, width) = (number(tenths), Rational::new(1, 1_000_000_000));
             let upper = &lower + &width;
             let [least, most] = density.between([Some(&lower), Some(&upper)]);
-            let [below, above] = density.at(&lower);
-            let [later_below, later_above] = density.at(&upper);
+            let [below, above] = density.density_bounds(&lower);
+            let [later_below, later_above] = density.density_bounds(&upper);
             assert!(
                 least <= above.max(later_above) * &width,
                 "{density:?} {tenths}"

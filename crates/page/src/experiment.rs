@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom::report::statistics::{Mean, Proportion, mcnemar};
-use elbowroom_laboratory::answer::FailurePlace;
+use elbowroom_laboratory::answer::FailurePosition;
 use elbowroom_laboratory::compare::{Cell, Results};
 
 use crate::document::{Document, Rate, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
@@ -13,7 +13,7 @@ pub(crate) const INTERVALS: &str =
     "The share of runs that reached the goal, with Wilson's 95 % interval.";
 
 /// The pages of some failed trials, by row, column and kind of failure.
-pub(crate) type Trials = BTreeMap<FailurePlace, Document>;
+pub(crate) type Trials = BTreeMap<FailurePosition, Document>;
 
 /// The page about an experiment on a clock.
 pub(crate) fn timed(results: &Results, trials: Trials) -> Document {
@@ -51,7 +51,7 @@ pub(crate) fn timed(results: &Results, trials: Trials) -> Document {
         &results.parts,
         &results.fingerprint,
     );
-    let made = made(runs, "runs", results.is_interrupted);
+    let made = trial_count_text(runs, "runs", results.is_interrupted);
     Document {
         more,
         ..document(&results.title, made, facts, sections)
@@ -98,7 +98,7 @@ fn failures(results: &Results, trials: Trials) -> (Option<Section>, Vec<Document
         note: "Failed runs, by what the last plan was given up for, and the action that this was \
                about."
             .to_owned(),
-        columns: named(&columns),
+        columns: column_headings(&columns),
         ..Table::default()
     };
     with_trials(table, kinds, trials)
@@ -108,7 +108,7 @@ fn failures(results: &Results, trials: Trials) -> (Option<Section>, Vec<Document
 /// Returns the section, or `None` without failures, and the linked pages.
 pub(crate) fn with_trials(
     mut table: Table,
-    kinds: Vec<(FailurePlace, Vec<Text>)>,
+    kinds: Vec<(FailurePosition, Vec<Text>)>,
     mut trials: Trials,
 ) -> (Option<Section>, Vec<Document>) {
     let mut more = Vec::new();
@@ -131,7 +131,7 @@ pub(crate) fn with_trials(
 }
 
 /// Converts columns: heading, and `true` if the column holds numbers.
-pub(crate) fn named(columns: &[(&str, bool)]) -> Vec<(String, bool)> {
+pub(crate) fn column_headings(columns: &[(&str, bool)]) -> Vec<(String, bool)> {
     let named = columns.iter();
     named
         .map(|(name, is_number)| ((*name).to_owned(), *is_number))
@@ -159,7 +159,7 @@ pub(crate) fn document(
 }
 
 /// States the number of trials.
-pub(crate) fn made(count: u64, what: &str, is_interrupted: bool) -> String {
+pub(crate) fn trial_count_text(count: u64, what: &str, is_interrupted: bool) -> String {
     if is_interrupted {
         return format!("{count} {what}; the experiment was interrupted before all were made.");
     }

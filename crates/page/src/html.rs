@@ -23,12 +23,12 @@ const SCRIPTS: &[&str] = &[
 
 /// Renders the page as a self-contained file.
 pub(crate) fn html(document: &Document) -> String {
-    filled(document, &FILE)
+    fill_template(document, &FILE)
 }
 
 /// Renders the live page of a running run, which is updated by its server.
-pub(crate) fn live(document: &Document) -> String {
-    filled(document, &LIVE)
+pub(crate) fn live_html(document: &Document) -> String {
+    fill_template(document, &LIVE)
 }
 
 /// Differences between a page in a file and a live page.
@@ -51,7 +51,7 @@ const LIVE: Kind = Kind {
            stays from the run's trace.",
 };
 
-fn filled(document: &Document, kind: &Kind) -> String {
+fn fill_template(document: &Document, kind: &Kind) -> String {
     let parts = [
         ("{live}", kind.live.to_owned()),
         ("{reach}", kind.reach.to_owned()),
@@ -121,7 +121,7 @@ mod tests {
         "</script><script>alert(1)</script><!-- {data} {script} & \u{2028} \u{202e}";
 
     #[test]
-    fn a_hostile_text_in_data_stays_one_json_text() {
+    fn hostile_text_in_data_stays_valid_json() {
         let data = as_data(&HOSTILE);
         assert!(!data.contains(['<', '>', '&', '\u{2028}']));
         let read: String = serde_json::from_str(&data).unwrap();
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_put_into_a_page_is_not_searched_for_more_places() {
+    fn inserted_text_is_not_searched_for_placeholders() {
         let document = Document {
             title: HOSTILE.to_owned(),
             verdict: Verdict {

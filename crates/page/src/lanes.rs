@@ -49,7 +49,7 @@ pub(crate) fn lanes<'a>(
             .iter()
             .map(|occupant| {
                 let objects = objects(occupant.name).enumerate();
-                let mut of_kind = objects.filter(|(_, name)| kind.takes(name, type_of));
+                let mut of_kind = objects.filter(|(_, name)| kind.matches_object(name, type_of));
                 of_kind.next()
             })
             .collect();
@@ -111,7 +111,7 @@ enum Kind<'a> {
 }
 
 impl<'a> Kind<'a> {
-    fn takes(self, object: &str, type_of: &dyn Fn(&str) -> Option<&'a str>) -> bool {
+    fn matches_object(self, object: &str, type_of: &dyn Fn(&str) -> Option<&'a str>) -> bool {
         match self {
             Self::Type(name) => type_of(object) == Some(name),
             Self::First => true,
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn robots_are_lanes_and_what_needs_none_is_with_the_others() {
+    fn actions_without_robot_share_a_lane() {
         let occupants = [
             ("(drive r1 a b)", (0.0, 5.0)),
             ("(drive r2 a b)", (0.0, 7.0)),
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_that_would_do_several_things_at_once_are_no_lanes_to_begin_with() {
+    fn objects_with_overlapping_actions_are_not_initial_lanes() {
         let occupants =
             ["(serve a r1)", "(serve a r2)", "(serve a r3)"].map(|name| occupant(name, (0.0, 9.0)));
         let type_of = |object: &str| Some(if object == "a" { "place" } else { "robot" });
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_given_up_does_not_choose_the_lanes() {
+    fn abandoned_actions_do_not_affect_lane_choice() {
         let mut occupants = ["(drive r1 a)", "(drive r1 b)", "(open b)"].map(|name| Occupant {
             counts: name != "(drive r1 b)",
             ..occupant(name, (0.0, 9.0))
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn without_types_the_first_object_is_the_lane_and_without_objects_the_action() {
+    fn untyped_lane_is_first_object_or_action() {
         let untyped = [occupant("(go x y)", (0.0, 1.0))];
         let names = |occupants: &[Occupant<'_>]| -> Vec<String> {
             let lanes = lanes(occupants, &|_| None);

@@ -31,7 +31,6 @@
 //! # }
 //! ```
 
-mod belief;
 mod clock;
 pub mod document;
 mod experiment;
@@ -43,13 +42,14 @@ mod perturbed;
 mod plan;
 mod region;
 mod run;
+mod state_timeline;
 
 use elbowroom::answers::{EnvelopeAnswer, PlanAnswer, RegionAnswer, RunAnswer};
 use elbowroom::execute::RunSpec;
 use elbowroom::report::trace::Stored;
-use elbowroom_laboratory::answer::FailurePlace;
+use elbowroom_laboratory::answer::FailurePosition;
 use elbowroom_laboratory::compare::Results;
-use elbowroom_laboratory::perturbed::{PerturbedResults, StoredCourse};
+use elbowroom_laboratory::perturbed::{PerturbedResults, StoredTrial};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
@@ -109,23 +109,23 @@ pub fn page(name: &str, text: &str) -> Result<String, PageError> {
 pub fn experiment_page(
     name: &str,
     text: &str,
-    traces: &[(FailurePlace, String, String)],
+    traces: &[(FailurePosition, String, String)],
 ) -> Result<String, PageError> {
     let mut trials = experiment::Trials::new();
     for (place, name, text) in traces {
         trials.insert(*place, document(name, text)?);
     }
     let page = if format(text).as_deref() == Some(PERTURBED) {
-        perturbed::untimed(&perturbed_results(name, text)?, trials)
+        perturbed::untimed_experiment(&perturbed_results(name, text)?, trials)
     } else {
-        let results = Results::read(text).map_err(|error| damaged(name, &error))?;
+        let results = Results::read(text).map_err(|error| damaged_input(name, &error))?;
         experiment::timed(&results, trials)
     };
     Ok(html::html(&page))
 }
 
 fn perturbed_results(name: &str, text: &str) -> Result<PerturbedResults, PageError> {
-    PerturbedResults::read(text).map_err(|error| damaged(name, &error))
+    PerturbedResults::read(text).map_err(|error| damaged_input(name, &error))
 }
 
 /// Returns the live page of a running run, from its trace so far.
@@ -138,7 +138,7 @@ fn perturbed_results(name: &str, text: &str) -> Result<PerturbedResults, PageErr
 /// # Errors
 /// If the text is not a trace of a run, or damaged.
 pub fn live_page(name: &str, text: &str, left_out: usize) -> Result<String, PageError> {
-    Ok(html::live(&live_document(name, text, left_out)?))
+    Ok(html::live_html(&live_document(name, text, left_out)?))
 }
 
 /// Returns the content of the live page of a running run; `left_out` as for [`live_page`].
@@ -147,7 +147,7 @@ pub fn live_page(name: &str, text: &str, left_out: usize) -> Result<String, Page
 /// If the text is not a trace of a run, or damaged.
 pub fn live_document(name: &str, text: &str, left_out: usize) -> Result<Document, PageError> {
     match format(text).as_deref() {
-        Some(TRACE) => of_trace(name, text, run::Record::Growing { left_out }),
+        Some(TRACE) => trace_document(name, text, run::Record::Live { left_out }),
         _ => Err(PageError::NoRun(name.to_owned())),
     }
 }
@@ -155,13 +155,15 @@ pub fn live_document(name: &str, text: &str, left_out: usize) -> Result<Document
 const TRACE: &str = "elbowroom-trace";
 const PERTURBED: &str = "elbowroom-perturbed-results";
 
-fn of_trace(name: &str, text: &str, record: run::Record) -> Result<Document, PageError> {
-    let stored = Stored::read(text).map_err(|error| damaged(name, &error))?;
-    let spec: RunSpec = stored.header().map_err(|error| damaged(name, &error))?;
+fn trace_document(name: &str, text: &str, record: run::Record) -> Result<Document, PageError> {
+    let stored = Stored::read(text).map_err(|error| damaged_input(name, &error))?;
+    let spec: RunSpec = stored
+        .header()
+        .map_err(|error| damaged_input(name, &error))?;
     Ok(run::trace(name, &stored, &spec, record))
 }
 
-fn damaged(name: &str, error: &impl ToString) -> PageError {
+fn damaged_input(name: &str, error: &impl ToString) -> PageError {
     PageError::Damaged {
         name: name.to_owned(),
         why: error.to_string(),
@@ -192,24 +194,29 @@ pub fn mcap(name: &str, text: &str) -> Result<Vec<u8>, PageError> {
 /// As [`page`].
 pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
     match format(text).as_deref() {
-        Some(TRACE) => of_trace(name, text, run::Record::Ended),
+        Some(TRACE) => trace_document(name, text, run::Record::Ended),
         Some("elbowroom-envelope") => {
             read::<EnvelopeAnswer>(name, text).map(|it| plan::envelope(&it))
         }
         Some("elbowroom-region") => read::<RegionAnswer>(name, text).map(|it| region::region(&it)),
-        Some("elbowroom-plan") => read::<PlanAnswer>(name, text).map(|it| plan::found(&it)),
+        Some("elbowroom-plan") => {
+            read::<PlanAnswer>(name, text).map(|it| plan::planner_answer(&it))
+        }
         Some("elbowroom-run") => read::<RunAnswer>(name, text).map(|it| run::outcome(&it)),
         Some("elbowroom-results") => {
-            let results = Results::read(text).map_err(|error| damaged(name, &error))?;
+            let results = Results::read(text).map_err(|error| damaged_input(name, &error))?;
             Ok(experiment::timed(&results, experiment::Trials::new()))
         }
         Some(PERTURBED) => {
             let results = perturbed_results(name, text)?;
-            Ok(perturbed::untimed(&results, experiment::Trials::new()))
+            Ok(perturbed::untimed_experiment(
+                &results,
+                experiment::Trials::new(),
+            ))
         }
         Some("elbowroom-course") => {
-            let course = StoredCourse::read(text).map_err(|error| damaged(name, &error))?;
-            Ok(perturbed::course(&course))
+            let course = StoredTrial::read(text).map_err(|error| damaged_input(name, &error))?;
+            Ok(perturbed::trial_page(&course))
         }
         Some(format) => Err(PageError::OtherFormat {
             name: name.to_owned(),
@@ -233,5 +240,5 @@ fn format(text: &str) -> Option<String> {
 }
 
 fn read<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, PageError> {
-    serde_json::from_str(text).map_err(|error| damaged(name, &error))
+    serde_json::from_str(text).map_err(|error| damaged_input(name, &error))
 }

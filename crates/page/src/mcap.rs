@@ -150,7 +150,7 @@ impl File {
                 }
             }
             let members = json!({ "action": { "type": "string" } });
-            let topic = format!("/elbowroom/lanes/{}", word(name));
+            let topic = format!("/elbowroom/lanes/{}", topic_component(name));
             let Some(channel) = self.channel(&topic, "elbowroom.Lane", &members) else {
                 return;
             };
@@ -193,7 +193,7 @@ impl File {
                 continue;
             };
             for line in &series.lines {
-                let topic = format!("/elbowroom/numbers/{}", word(&line.name));
+                let topic = format!("/elbowroom/numbers/{}", topic_component(&line.name));
                 let Some(channel) = self.channel(&topic, "elbowroom.Number", &members) else {
                     return;
                 };
@@ -269,7 +269,7 @@ impl Record {
 }
 
 /// Converts a name to a part of a topic.
-fn word(name: &str) -> String {
+fn topic_component(name: &str) -> String {
     let trimmed = name.trim_matches(['(', ')']);
     let kept = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';
     trimmed

@@ -1,25 +1,30 @@
 //! Pages of an experiment in worlds without time, and of one of its trials.
 
 use elbowroom::report::statistics::Proportion;
-use elbowroom_laboratory::perturbed::{PerturbedResults, StoredCourse, StoredStep};
+use elbowroom_laboratory::perturbed::{PerturbedResults, StoredStep, StoredTrial};
 
 use crate::document::{Document, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
 use crate::experiment::{
-    INTERVALS, Trials, document, facts, made, mean, named, percent, rate, with_trials,
+    INTERVALS, Trials, column_headings, document, facts, mean, percent, rate, trial_count_text,
+    with_trials,
 };
-use crate::plan::word;
+use crate::plan::serialized_name;
 
 /// The page about an experiment in worlds without time.
-pub(crate) fn untimed(results: &PerturbedResults, trials: Trials) -> Document {
+pub(crate) fn untimed_experiment(results: &PerturbedResults, trials: Trials) -> Document {
     let mut groups: Vec<RateGroup> = Vec::new();
     let mut rows: Vec<Vec<Text>> = Vec::new();
     for row in &results.rows {
-        let name = format!("{}, {}", row.case, word(&row.world));
+        let name = format!("{}, {}", row.case, serialized_name(&row.world));
         let published = row.published.and_then(Proportion::share);
-        let rate = rate(word(&row.executor), row.success, published.or(row.optimum));
+        let rate = rate(
+            serialized_name(&row.executor),
+            row.success,
+            published.or(row.optimum),
+        );
         rows.push(vec![
             row.case.as_str().into(),
-            word(&row.world).into(),
+            serialized_name(&row.world).into(),
             rate.name.as_str().into(),
             rate.words.as_str().into(),
             row.published
@@ -58,7 +63,7 @@ pub(crate) fn untimed(results: &PerturbedResults, trials: Trials) -> Document {
         }),
         Section::Table(Table {
             heading: "All rows".to_owned(),
-            columns: named(&columns),
+            columns: column_headings(&columns),
             rows,
             ..Table::default()
         }),
@@ -76,7 +81,7 @@ pub(crate) fn untimed(results: &PerturbedResults, trials: Trials) -> Document {
         &results.parts,
         &results.fingerprint,
     );
-    let made = made(trials, "trials", results.is_interrupted);
+    let made = trial_count_text(trials, "trials", results.is_interrupted);
     Document {
         more,
         ..document(&results.title, made, facts, sections)
@@ -99,11 +104,14 @@ fn failures(results: &PerturbedResults, trials: Trials) -> (Option<Section>, Vec
     let mut kinds = Vec::new();
     for (place, row) in results.rows.iter().enumerate() {
         for (kind, failure) in row.failures.kinds().into_iter().enumerate() {
-            let last = failure.cause.as_deref().map_or("there was none", after);
+            let last = failure
+                .cause
+                .as_deref()
+                .map_or("there was none", last_step_result);
             let cells = vec![
                 row.case.as_str().into(),
-                word(&row.world).into(),
-                word(&row.executor).into(),
+                serialized_name(&row.world).into(),
+                serialized_name(&row.executor).into(),
                 ending(&failure.verdict).into(),
                 failure.action.clone().unwrap_or_default().into(),
                 last.into(),
@@ -116,19 +124,19 @@ fn failures(results: &PerturbedResults, trials: Trials) -> (Option<Section>, Vec
     let table = Table {
         heading: "Where trials fail".to_owned(),
         note: "Failed trials, by what ended them and by their last step.".to_owned(),
-        columns: named(&columns),
+        columns: column_headings(&columns),
         ..Table::default()
     };
     with_trials(table, kinds, trials)
 }
 
 /// The page about a trial.
-pub(crate) fn course(course: &StoredCourse) -> Document {
+pub(crate) fn trial_page(course: &StoredTrial) -> Document {
     let facts = [
         ("experiment", course.title.clone()),
         ("case", course.case.clone()),
-        ("world", word(&course.world)),
-        ("executor", word(&course.executor)),
+        ("world", serialized_name(&course.world)),
+        ("executor", serialized_name(&course.executor)),
         ("trial", course.trial.to_string()),
         ("seed", course.seed.to_string()),
     ];
@@ -145,7 +153,7 @@ pub(crate) fn course(course: &StoredCourse) -> Document {
                 (steps.len() + 1).to_string().into(),
                 round.to_string().into(),
                 step.action.as_str().into(),
-                came(step).into(),
+                step_result(step).into(),
                 step.became_true.join(", ").into(),
                 step.became_false.join(", ").into(),
             ]);
@@ -164,14 +172,14 @@ pub(crate) fn course(course: &StoredCourse) -> Document {
             heading: "Step by step".to_owned(),
             note: "Executed actions and the facts they changed; some facts may have changed by themselves."
                 .to_owned(),
-            columns: named(&columns),
+            columns: column_headings(&columns),
             rows: steps,
             ..Table::default()
         },
         Table {
             heading: "Plans".to_owned(),
             note: "A new one is made when the one before does not work any more.".to_owned(),
-            columns: named(&[("plan", true), ("actions", false)]),
+            columns: column_headings(&[("plan", true), ("actions", false)]),
             rows: plans,
             ..Table::default()
         },
@@ -180,7 +188,7 @@ pub(crate) fn course(course: &StoredCourse) -> Document {
         "Trial {} of {}, {}",
         course.trial,
         course.case,
-        word(&course.executor)
+        serialized_name(&course.executor)
     );
     let facts = facts.map(|(name, value)| (name.to_owned(), value));
     let sections = tables.map(Section::Table);
@@ -208,7 +216,7 @@ fn ending(name: &str) -> &str {
 }
 
 /// Describes the outcome of the last step.
-fn after(cause: &str) -> &str {
+fn last_step_result(cause: &str) -> &str {
     match cause {
         "after-start" => "it started",
         "start-failed" => "its start failed",
@@ -218,7 +226,7 @@ fn after(cause: &str) -> &str {
     }
 }
 
-fn came(step: &StoredStep) -> String {
+fn step_result(step: &StoredStep) -> String {
     let words = match step.step.as_str() {
         "started" => "it started",
         "not-started" => "its start failed",

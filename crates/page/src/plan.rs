@@ -8,19 +8,19 @@ use std::collections::BTreeMap;
 use elbowroom::answers::Exact;
 use elbowroom::answers::envelope::timeline::{TimedAction, Timeline, WindowAnswer};
 use elbowroom::answers::envelope::{
-    Counterexample, EnvelopeAnswer, EnvelopeFinding, Failing, Room, Stop,
+    Counterexample, EnvelopeAnswer, EnvelopeFinding, LimitedRange, NominalFailure, Stop,
 };
 use elbowroom::answers::plan::{PlanAnswer, PlanFinding};
 use elbowroom::execution::run::TimeoutRule;
-use elbowroom::report::short::nearest;
+use elbowroom::report::decimal::nearest;
 
 use crate::document::{
     Bar, Chart, Document, Mark, Prose, Section, Table, Text, Texts, Tone, Verdict,
 };
 use crate::lanes::{Lanes, Occupant, lanes};
-use tables::{ends, ranges, rooms};
+use tables::{ends, ranges, slack_table};
 
-pub(crate) use sliders::{Reach, sliders};
+pub(crate) use sliders::{SliderInterval, sliders};
 pub(crate) use tables::{quantities, times};
 
 /// The page about an envelope.
@@ -30,7 +30,10 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
         ("domain".to_owned(), answer.domain.clone()),
         ("problem".to_owned(), answer.problem.clone()),
         ("plan".to_owned(), answer.plan.clone()),
-        ("guarantee".to_owned(), word(&answer.settings.guarantee)),
+        (
+            "guarantee".to_owned(),
+            serialized_name(&answer.settings.guarantee),
+        ),
         ("epsilon".to_owned(), nearest(&answer.settings.epsilon)),
         ("time-out".to_owned(), answer.settings.timeout.in_words()),
     ];
@@ -47,14 +50,16 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
             facts.push(("boxes checked".to_owned(), checks.to_string()));
             if let Some(timeline) = timeline {
                 sections.push(Section::Chart(chart(timeline, parameters, &mut texts)));
-                let reaches: Vec<Reach<'_>> =
-                    parameters.iter().map(|it| Reach::of(&it.range)).collect();
+                let reaches: Vec<SliderInterval<'_>> = parameters
+                    .iter()
+                    .map(|it| SliderInterval::of(&it.range))
+                    .collect();
                 let sliders = inequalities
                     .as_ref()
                     .and_then(|it| sliders(timeline, &reaches, it));
                 sections.extend(sliders.map(Section::Sliders));
             }
-            sections.push(Section::Table(rooms(parameters, &mut texts)));
+            sections.push(Section::Table(slack_table(parameters, &mut texts)));
             sections.extend(
                 timeline
                     .as_ref()
@@ -66,7 +71,7 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
             } else {
                 ""
             };
-            good(&match stop {
+            positive_verdict(&match stop {
                 Stop::Converged => format!(
                     "The plan works as long as each quantity stays inside its interval{before}, whatever the others do in theirs."
                 ),
@@ -77,7 +82,7 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
         }
         EnvelopeFinding::Inside { parameters } => {
             sections.push(Section::Table(ranges(parameters)));
-            good("The plan works everywhere in this box.")
+            positive_verdict("The plan works everywhere in this box.")
         }
         EnvelopeFinding::Outside {
             parameters,
@@ -85,27 +90,27 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
         } => {
             sections.extend(failure(counterexample, &mut texts));
             sections.push(Section::Table(ranges(parameters)));
-            bad("The plan does not work everywhere in this box.")
+            negative_verdict("The plan does not work everywhere in this box.")
         }
-        EnvelopeFinding::Fails(Failing::AsPlanned {
+        EnvelopeFinding::Fails(NominalFailure::AsPlanned {
             parameters,
             counterexample,
         }) => {
             sections.extend(failure(counterexample, &mut texts));
             sections.push(Section::Table(quantities(parameters)));
             sections.push(repair_advice());
-            bad("The plan fails even if nothing deviates.")
+            negative_verdict("The plan fails even if nothing deviates.")
         }
-        EnvelopeFinding::Fails(Failing::Invalid { violation }) => {
+        EnvelopeFinding::Fails(NominalFailure::Invalid { violation }) => {
             sections.push(prose("What is wrong", vec![violation.message.clone()]));
             sections.push(repair_advice());
-            bad("The plan is not valid as it stands.")
+            negative_verdict("The plan is not valid as it stands.")
         }
         EnvelopeFinding::None { stop } => Verdict {
             tone: Tone::Plain,
             words: format!(
                 "Nothing is known yet: the search ended before it began ({}).",
-                word(stop)
+                serialized_name(stop)
             ),
         },
     };
@@ -121,7 +126,7 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
 }
 
 /// The page about the result of a planner.
-pub(crate) fn found(answer: &PlanAnswer) -> Document {
+pub(crate) fn planner_answer(answer: &PlanAnswer) -> Document {
     let mut texts = Texts::default();
     let mut facts = vec![
         ("domain".to_owned(), answer.domain.clone()),
@@ -140,7 +145,7 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
             if let Some(metric) = metric {
                 facts.push(("metric".to_owned(), nearest(metric)));
             }
-            let timeline = fixed(steps.iter().map(|step| {
+            let timeline = fixed_timeline(steps.iter().map(|step| {
                 let duration = step.duration.as_ref();
                 let end = duration.map(|it| (&step.start.0 + &it.0).into());
                 ("", step.action.as_str(), step.start.clone(), end)
@@ -151,12 +156,14 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
                 let heading = "Errors in the planner's own times";
                 sections.push(prose(heading, vec![repaired.clone()]));
             }
-            good(&format!(
+            positive_verdict(&format!(
                 "A plan that reaches the goal at {}.",
                 nearest(makespan)
             ))
         }
-        PlanFinding::NoPlan { reason, .. } => bad(&format!("There is no plan: {reason}")),
+        PlanFinding::NoPlan { reason, .. } => {
+            negative_verdict(&format!("There is no plan: {reason}"))
+        }
         PlanFinding::None { reason, .. } => Verdict {
             tone: Tone::Plain,
             words: format!("It is not known whether there is a plan: {reason}"),
@@ -174,7 +181,9 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
 }
 
 /// Builds a timeline of actions with fixed times: label, name, start and end of each.
-fn fixed<'a>(actions: impl Iterator<Item = (&'a str, &'a str, Exact, Option<Exact>)>) -> Timeline {
+fn fixed_timeline<'a>(
+    actions: impl Iterator<Item = (&'a str, &'a str, Exact, Option<Exact>)>,
+) -> Timeline {
     let actions = actions.map(|(instance, action, start, end)| TimedAction {
         instance: instance.to_owned(),
         action: action.to_owned(),
@@ -200,7 +209,7 @@ fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
     paragraphs.extend(example.plays.iter().cloned());
     let mut sections = vec![prose("Possible failures", paragraphs)];
     if !example.schedule.is_empty() {
-        let timeline = fixed(example.schedule.iter().map(|happening| {
+        let timeline = fixed_timeline(example.schedule.iter().map(|happening| {
             let (start, end) = (happening.start.clone(), happening.end.clone());
             (
                 happening.instance.as_str(),
@@ -227,8 +236,8 @@ fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
 }
 
 /// The plan as a chart.
-pub(crate) fn chart(timeline: &Timeline, rooms: &[Room], texts: &mut Texts) -> Chart {
-    let by_name: BTreeMap<&str, &Room> = rooms
+pub(crate) fn chart(timeline: &Timeline, rooms: &[LimitedRange], texts: &mut Texts) -> Chart {
+    let by_name: BTreeMap<&str, &LimitedRange> = rooms
         .iter()
         .map(|room| (room.range.quantity.name.as_str(), room))
         .collect();
@@ -330,7 +339,7 @@ pub(crate) fn window_words(window: &WindowAnswer) -> Option<String> {
 
 fn details(
     action: &TimedAction,
-    room: Option<&Room>,
+    room: Option<&LimitedRange>,
     texts: &mut Texts,
 ) -> Vec<(&'static str, Text)> {
     let mut details: Vec<(&'static str, Text)> = Vec::new();
@@ -390,14 +399,14 @@ pub(crate) fn prose(heading: &str, paragraphs: Vec<String>) -> Section {
     })
 }
 
-pub(crate) fn good(words: &str) -> Verdict {
+pub(crate) fn positive_verdict(words: &str) -> Verdict {
     Verdict {
         tone: Tone::Good,
         words: words.to_owned(),
     }
 }
 
-pub(crate) fn bad(words: &str) -> Verdict {
+pub(crate) fn negative_verdict(words: &str) -> Verdict {
     Verdict {
         tone: Tone::Bad,
         words: words.to_owned(),
@@ -412,7 +421,7 @@ pub(crate) fn name_of(path: &str, otherwise: &str) -> String {
 }
 
 /// Returns the word that documents use for a value.
-pub(crate) fn word(value: &impl serde::Serialize) -> String {
+pub(crate) fn serialized_name(value: &impl serde::Serialize) -> String {
     match serde_json::to_value(value) {
         Ok(serde_json::Value::String(word)) => word,
         _ => String::new(),

@@ -1,25 +1,26 @@
 //! Page of the region: all values for which a plan works.
 
-mod alone;
+mod one_at_a_time;
 
 use elbowroom::answers::envelope::Quantity;
 use elbowroom::answers::region::{
     BoxAnswer, Measure, PieceAnswer, RegionAnswer, RegionFinding, RowAnswer, Share,
 };
 use elbowroom::num::{End, Rational};
-use elbowroom::report::short::nearest;
+use elbowroom::report::decimal::nearest;
 use std::collections::BTreeMap;
 
 use crate::document::{
     Document, Plane, PlaneBox, PlaneQuantity, PlaneRow, Section, Table, Texts, Tone, Verdict,
 };
 use crate::plan::{
-    Reach, bad, chart, good, name_of, prose, quantities, repair_advice, sliders, times,
+    SliderInterval, chart, name_of, negative_verdict, positive_verdict, prose, quantities,
+    repair_advice, sliders, times,
 };
-use alone::{Alone, reach};
+use one_at_a_time::{IntervalWithOthersFixed, reach};
 
 /// Maximum number of quantities.
-const MOST: usize = 100;
+const MAX_TABLE_ROWS: usize = 100;
 
 /// The page about a region.
 pub(crate) fn region(answer: &RegionAnswer) -> Document {
@@ -43,16 +44,17 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
         } => {
             if let Some(timeline) = timeline {
                 sections.push(Section::Chart(chart(timeline, &[], &mut texts)));
-                let alone: Vec<Alone> = (0..parameters.len())
-                    .map(|place| Alone::of(parameters, pieces, place))
+                let alone: Vec<IntervalWithOthersFixed> = (0..parameters.len())
+                    .map(|place| IntervalWithOthersFixed::of(parameters, pieces, place))
                     .collect();
-                let reaches: Vec<Reach<'_>> = alone.iter().zip(parameters).map(reach).collect();
+                let reaches: Vec<SliderInterval<'_>> =
+                    alone.iter().zip(parameters).map(reach).collect();
                 let sliders = inequalities
                     .as_ref()
                     .and_then(|it| sliders(timeline, &reaches, it));
                 sections.extend(sliders.map(Section::Sliders));
             }
-            if !parameters.is_empty() && parameters.len() <= MOST && !pieces.is_empty() {
+            if !parameters.is_empty() && parameters.len() <= MAX_TABLE_ROWS && !pieces.is_empty() {
                 sections.push(Section::Plane(plane(parameters, pieces, boxes)));
             }
             if let Some(measure) = measure {
@@ -67,14 +69,14 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
                     .map(|it| Section::Table(times(it, "for which the plan works"))),
             );
             match (&pieces[..], missing) {
-                ([], _) => bad("The plan works with no values."),
-                (_, Some(missing)) => good(&format!(
+                ([], _) => negative_verdict("The plan works with no values."),
+                (_, Some(missing)) => positive_verdict(&format!(
                     "The plan works with all values below. There may be more, for {missing}."
                 )),
-                ([_], None) => {
-                    good("The plan works with all values that satisfy the inequalities below.")
-                }
-                (several, None) => good(&format!(
+                ([_], None) => positive_verdict(
+                    "The plan works with all values that satisfy the inequalities below.",
+                ),
+                (several, None) => positive_verdict(&format!(
                     "The plan works with all values that satisfy one of {} lists of inequalities.",
                     several.len()
                 )),
@@ -83,9 +85,11 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
         RegionFinding::Invalid { violation } => {
             sections.push(prose("What is wrong", vec![violation.message.clone()]));
             sections.push(repair_advice());
-            bad("The plan is not valid as it stands.")
+            negative_verdict("The plan is not valid as it stands.")
         }
-        RegionFinding::Unscheduled => bad("The plan has no schedule at its nominal values."),
+        RegionFinding::Unscheduled => {
+            negative_verdict("The plan has no schedule at its nominal values.")
+        }
         RegionFinding::None { reason } => Verdict {
             tone: Tone::Plain,
             words: format!("The region is not known: {reason}."),
@@ -143,7 +147,11 @@ fn plane(parameters: &[Quantity], pieces: &[PieceAnswer], boxes: &[BoxAnswer]) -
         let intervals = || boxes.iter().map(|own| own.intervals[place]);
         let lower = intervals().filter_map(|(lower, _)| lower).filter(near);
         let upper = intervals().filter_map(|(_, upper)| upper).filter(near);
-        let alone = || ends_alone(&pieces, &all, place).into_iter().filter(near);
+        let alone = || {
+            ends_with_others_fixed(&pieces, &all, place)
+                .into_iter()
+                .filter(near)
+        };
         let from = lower.chain(alone()).fold(nominal - size, f64::min);
         let to = upper.chain(alone()).fold(nominal + 1.5 * size, f64::max);
         // Durations are not negative.
@@ -169,7 +177,7 @@ fn plane(parameters: &[Quantity], pieces: &[PieceAnswer], boxes: &[BoxAnswer]) -
 }
 
 /// Returns the values at which rows limit a quantity while the others have these values.
-fn ends_alone(pieces: &[Vec<PlaneRow>], values: &[f64], place: usize) -> Vec<f64> {
+fn ends_with_others_fixed(pieces: &[Vec<PlaneRow>], values: &[f64], place: usize) -> Vec<f64> {
     let end = |row: &PlaneRow| {
         let own = row.factors.iter().find(|(index, _)| *index == place)?.1;
         let others = row.factors.iter().filter(|(index, _)| *index != place);

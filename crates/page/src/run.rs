@@ -15,17 +15,17 @@ use elbowroom::learning::records;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl;
-use elbowroom::report::line::{ObservationLine, ReasonLine, ReportLine};
-use elbowroom::report::short::nearest;
+use elbowroom::report::decimal::nearest;
+use elbowroom::report::schema::{ObservationLine, ReasonLine, ReportLine};
 use elbowroom::report::trace::{Line, Stored};
 
-use crate::belief::Belief;
 use crate::document::{Chart, Document, Mark, Section, Series, Table, Text, Texts, Tone, Verdict};
 use crate::lanes::{Lanes, Occupant, lanes};
 use crate::plan::{end_of_axis, prose};
 use crate::run::bars::Bars;
 use crate::run::guarantee::Guarantees;
 use crate::run::log::Log;
+use crate::state_timeline::StateTimeline;
 
 /// State of the record of an unfinished run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ pub(crate) enum Record {
     /// The record has ended.
     Ended,
     /// The run is still recorded.
-    Growing {
+    Live {
         /// Number of lines after the first one that the record no longer contains.
         left_out: usize,
     },
@@ -48,25 +48,25 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
     let mut texts = Texts::default();
     let task = task(spec).map(Arc::new);
     let left_out = match record {
-        Record::Growing { left_out } => left_out,
+        Record::Live { left_out } => left_out,
         Record::Ended => 0,
     };
     // Beliefs can only be recomputed from a complete record.
     let mut belief = task
         .as_ref()
         .filter(|_| left_out == 0 && !stored.has_snapshot())
-        .map(|task| Belief::new(task, &mut texts));
+        .map(|task| StateTimeline::new(task, &mut texts));
     let (mut bars, mut guarantees, mut log) =
         (Bars::default(), Guarantees::default(), Log::default());
     let mut report = None;
     let mut is_paused = false;
     if let Ok(Some(snapshot)) = stored.snapshot() {
-        bars.known(&snapshot);
+        bars.add_snapshot_starts(&snapshot);
         is_paused = snapshot.paused;
     }
     for line in &stored.lines {
         let counted = match line {
-            Line::Observed(observed) => observed.counted(),
+            Line::Observed(observed) => observed.as_processed(),
             _ => None,
         };
         if let Some(observation) = &counted {
@@ -82,7 +82,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
                     let planned = planned.as_ref();
                     belief.started(ticket, &action, planned, observation, &mut texts);
                 }
-                None => belief.reported(observation, &mut texts),
+                None => belief.record_observation(observation, &mut texts),
             }
         }
         bars.read(line);
@@ -98,7 +98,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
     if let Some(belief) = &mut belief {
         belief.advance(&now, &mut texts);
     }
-    let (changes, numbers) = belief.map(Belief::finish).unwrap_or_default();
+    let (changes, numbers) = belief.map(StateTimeline::finish).unwrap_or_default();
     let mut chart = bars.chart(task.as_deref(), &now);
     chart.guarantee = guarantees.finish(now.to_f64());
     chart.changes = changes;
@@ -107,7 +107,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
     let end = chart.end;
     let table = bars.table();
     let mut sections = vec![Section::Chart(chart)];
-    sections.extend(report.into_iter().flat_map(why));
+    sections.extend(report.into_iter().flat_map(failure_sections));
     sections.push(Section::Table(table));
     if !numbers.is_empty() {
         sections.push(Section::Series(Series {
@@ -134,7 +134,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         ("time-out".to_owned(), spec.timeout.in_words()),
         ("trace".to_owned(), name.to_owned()),
     ];
-    let not_shown = not_shown(stored, left_out);
+    let not_shown = omitted_part_note(stored, left_out);
     facts.extend(not_shown.map(|words| ("not shown".to_owned(), words)));
     if let Some(report) = report {
         facts.push(("new plans".to_owned(), report.replans.to_string()));
@@ -144,7 +144,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         title: format!("Run of {problem}"),
         verdict: match report {
             Some(report) => verdict(report),
-            None => so_far(record, is_paused, &now),
+            None => unfinished_verdict(record, is_paused, &now),
         },
         facts,
         sections,
@@ -201,7 +201,7 @@ fn predictions(stored: &Stored, spec: &RunSpec, task: &Task) -> Option<Section> 
 }
 
 /// Describes the part of the run that is missing if the record does not begin with the run.
-fn not_shown(stored: &Stored, left_out: usize) -> Option<String> {
+fn omitted_part_note(stored: &Stored, left_out: usize) -> Option<String> {
     if stored.has_snapshot() {
         let words = "everything before this segment of the journal, except the last actions, facts and numbers";
         return Some(words.to_owned());
@@ -211,14 +211,14 @@ fn not_shown(stored: &Stored, left_out: usize) -> Option<String> {
 }
 
 /// Describes the state of a run that is unfinished in its record.
-fn so_far(record: Record, is_paused: bool, now: &Rational) -> Verdict {
+fn unfinished_verdict(record: Record, is_paused: bool, now: &Rational) -> Verdict {
     let now = nearest(now);
     let words = match record {
         Record::Ended => format!("The trace ends at {now} before the run was over."),
-        Record::Growing { .. } if is_paused => {
+        Record::Live { .. } if is_paused => {
             format!("The run is paused: nothing more is started. It is at {now}.")
         }
-        Record::Growing { .. } => format!("The run continues; its time is {now}."),
+        Record::Live { .. } => format!("The run continues; its time is {now}."),
     };
     Verdict {
         tone: Tone::Plain,
@@ -230,10 +230,10 @@ fn so_far(record: Record, is_paused: bool, now: &Rational) -> Verdict {
 pub(crate) fn outcome(answer: &RunAnswer) -> Document {
     let report = &answer.report;
     let mut bars = Bars::default();
-    bars.executed(&report.executed);
+    bars.add_executed_steps(&report.executed);
     let chart = bars.chart(None, &report.time);
     let mut sections = vec![Section::Chart(chart)];
-    sections.extend(why(report));
+    sections.extend(failure_sections(report));
     sections.push(Section::Table(bars.table()));
     Document {
         title: "Outcome of a run".to_owned(),
@@ -281,7 +281,7 @@ fn verdict(report: &ReportLine) -> Verdict {
 }
 
 /// Returns the reasons why plans were abandoned, and why no plan reaches the goal.
-fn why(report: &ReportLine) -> Vec<Section> {
+fn failure_sections(report: &ReportLine) -> Vec<Section> {
     let sentences = |reasons: &[ReasonLine]| -> Vec<String> {
         reasons.iter().map(|reason| reason.words.clone()).collect()
     };
@@ -304,7 +304,7 @@ fn why(report: &ReportLine) -> Vec<Section> {
 impl Bars {
     /// Converts the plans and executed actions to a chart.
     fn chart(&self, task: Option<&Task>, now: &Rational) -> Chart {
-        let mut bars = self.drawn(now);
+        let mut bars = self.draw_bars(now);
         let occupants: Vec<Occupant<'_>> = bars
             .iter()
             .map(|bar| Occupant {

@@ -11,7 +11,7 @@ const STYLE: &str = include_str!("../src/page.css");
 
 type Matrix = [[f64; 3]; 3];
 
-const VISIONS: [(&str, Matrix); 4] = [
+const VISION_TYPES: [(&str, Matrix); 4] = [
     (
         "all colours",
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -104,12 +104,12 @@ fn themes() -> Vec<BTreeMap<&'static str, [f64; 3]>> {
 }
 
 #[test]
-fn colours_that_stand_side_by_side_look_different_to_everybody() {
+fn adjacent_colours_are_distinguishable_for_all_vision_types() {
     let themes = themes();
     assert_eq!(themes.len(), 2, "light and dark");
     for theme in &themes {
         for (names, least) in GROUPS {
-            for (vision, matrix) in &VISIONS {
+            for (vision, matrix) in &VISION_TYPES {
                 let seen = |name: &str| lab(&times(matrix, &theme[name]));
                 for (index, one) in names.iter().enumerate() {
                     for two in &names[index + 1..] {
@@ -128,7 +128,7 @@ fn colours_that_stand_side_by_side_look_different_to_everybody() {
 }
 
 #[test]
-fn words_on_the_strip_of_guarantees_stand_out() {
+fn guarantee_strip_text_has_sufficient_contrast() {
     for theme in themes() {
         let luminance = |name: &str| {
             let [red, green, blue] = theme[name];

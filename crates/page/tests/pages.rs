@@ -6,7 +6,7 @@ use std::sync::Arc;
 use elbowroom::answers::Exact;
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, envelope};
 use elbowroom::answers::run::simulate;
-use elbowroom::answers::{RunRequest, Unwatched};
+use elbowroom::answers::{NoObserver, RunRequest};
 use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
@@ -61,7 +61,7 @@ fn trace(case: &str, seed: u64) -> String {
     let request = RunRequest::new(&spec, &task)
         .beginning_with(plan)
         .recorded_by(&mut writer);
-    simulate(request, &mut Unwatched).expect("a run");
+    simulate(request, &mut NoObserver).expect("a run");
     lines
 }
 
@@ -89,7 +89,7 @@ fn words<'a>(document: &'a Document, text: &'a Text) -> &'a str {
 }
 
 #[test]
-fn page_of_an_invalid_plan_names_the_command_that_repairs_it() {
+fn invalid_plan_page_names_repair_command() {
     let (task, mut plan) = read("delivery");
     let step = plan
         .steps
@@ -98,7 +98,7 @@ fn page_of_an_invalid_plan_names_the_command_that_repairs_it() {
         .expect("a durative action");
     // Ten times the duration in the domain.
     step.duration = step.duration.take().map(|it| it * Rational::from(10));
-    let answer = envelope(&EnvelopeRequest::new(&task, plan), &mut Unwatched);
+    let answer = envelope(&EnvelopeRequest::new(&task, plan), &mut NoObserver);
     let json = serde_json::to_string(&answer.expect("an answer").answer).expect("JSON");
     let document = document("envelope.json", &json).expect("a document");
     assert_eq!(document.verdict.tone, Tone::Bad);
@@ -110,11 +110,11 @@ fn page_of_an_invalid_plan_names_the_command_that_repairs_it() {
 }
 
 #[test]
-fn the_page_of_an_envelope_has_each_action_and_each_interval() {
+fn envelope_page_lists_actions_and_intervals() {
     for case in ["delivery", "battery", "match", "tank", "paintshop"] {
         let (task, plan) = read(case);
         let steps = plan.steps.len();
-        let answer = envelope(&EnvelopeRequest::new(&task, plan), &mut Unwatched);
+        let answer = envelope(&EnvelopeRequest::new(&task, plan), &mut NoObserver);
         let answer = answer.expect("an answer").answer;
         let json = serde_json::to_string(&answer).expect("JSON");
         let document = document("envelope.json", &json).expect("a document");
@@ -141,7 +141,7 @@ fn the_page_of_an_envelope_has_each_action_and_each_interval() {
 }
 
 #[test]
-fn the_page_of_a_run_has_what_was_done_beside_what_was_planned() {
+fn run_page_shows_planned_and_observed_times() {
     let (mut reached, mut failed) = (0, 0);
     for seed in 0..12 {
         let trace = trace("delivery", seed);
@@ -194,7 +194,7 @@ fn the_page_of_a_run_has_what_was_done_beside_what_was_planned() {
 }
 
 #[test]
-fn numbers_that_change_are_drawn_with_the_values_that_the_judge_computes() {
+fn changing_numbers_match_validator_values() {
     let document = document("run.jsonl", &trace("battery", 0)).expect("a document");
     let series = document.sections.iter().find_map(|section| match section {
         Section::Series(series) => Some(series),
@@ -212,7 +212,7 @@ fn numbers_that_change_are_drawn_with_the_values_that_the_judge_computes() {
 }
 
 #[test]
-fn a_trace_that_was_cut_off_has_a_page_that_says_so() {
+fn truncated_trace_page_reports_truncation() {
     let trace = trace("delivery", 3);
     let lines: Vec<&str> = trace.lines().collect();
     let cut = lines[..lines.len() / 2].join("\n");
@@ -222,13 +222,13 @@ fn a_trace_that_was_cut_off_has_a_page_that_says_so() {
 }
 
 #[test]
-fn the_same_input_gives_the_same_bytes() {
+fn same_input_yields_same_bytes() {
     let trace = trace("delivery", 3);
     assert_eq!(page("run.jsonl", &trace), page("run.jsonl", &trace));
 }
 
 #[test]
-fn what_is_no_document_is_refused_with_one_sentence() {
+fn non_document_is_rejected_with_one_sentence() {
     let refused = |text: &str| page("file", text).expect_err("no page").to_string();
     for text in [
         "",
@@ -273,7 +273,7 @@ fn what_is_no_document_is_refused_with_one_sentence() {
 /// Page of a rotated journal: it contains actions that were running at the rotation or had ended
 /// shortly before, and later reports about them.
 #[test]
-fn a_journal_that_begins_anew_has_a_page_with_the_starts_from_before() {
+fn rotated_journal_page_includes_earlier_starts() {
     let exact = |number: i64| Exact(Rational::from(number));
     let start = |ticket, action: &str, began| StartLine {
         ticket,

@@ -64,13 +64,13 @@ pub enum WriteProblemError {
         "a problem file cannot say what has been so far, which the problem's constraints on the \
          course of the plan depend on"
     )]
-    Begun,
+    UnknownPast,
     /// The effects at the end of the action, or until then, are not known in advance.
     #[error(
         "a problem file cannot say that {action} is under way: {why}; \
          the embedded planner takes it as it is"
     )]
-    Unspeakable {
+    Inexpressible {
         /// The action.
         action: String,
         /// The part that timed initials cannot express.
@@ -124,7 +124,7 @@ pub fn write_problem(
         "(define (problem {})\n(:domain {})\n",
         problem.name, problem.domain
     );
-    let writer = Writer { task, how };
+    let writer = Writer { task, options: how };
     writer.objects(&mut text);
     text.push_str("(:init\n");
     writer.state(&situation.state, &mut text);
@@ -166,11 +166,13 @@ fn counts_violations(metric: &problem::Expression) -> bool {
 }
 
 /// Returns `true` if the constraint does not depend on the past.
-fn looks_ahead(constraint: &Constraint) -> bool {
+fn is_independent_of_past(constraint: &Constraint) -> bool {
     match constraint {
         Constraint::Modal(modal) => matches!(modal, Modal::AtEnd(_)),
-        Constraint::And(parts) => parts.iter().all(looks_ahead),
-        Constraint::Forall(_, part) | Constraint::Preference(_, part) => looks_ahead(part),
+        Constraint::And(parts) => parts.iter().all(is_independent_of_past),
+        Constraint::Forall(_, part) | Constraint::Preference(_, part) => {
+            is_independent_of_past(part)
+        }
     }
 }
 
@@ -197,7 +199,7 @@ enum Deleted {
 /// Writes the parts of a problem file.
 struct Writer<'a> {
     task: &'a Task,
-    how: &'a ProblemText,
+    options: &'a ProblemText,
 }
 
 impl Writer<'_> {
@@ -239,10 +241,10 @@ impl Writer<'_> {
         let (of_domain, own) = problem
             .constraints
             .split_at(problem.domain_constraints.min(problem.constraints.len()));
-        let is_lost = |part: &&Constraint| is_begun && !looks_ahead(part);
+        let is_lost = |part: &&Constraint| is_begun && !is_independent_of_past(part);
         let mut all = of_domain.iter().chain(own);
         if all.any(|part| is_lost(&part) && !is_soft(part)) {
-            return Err(WriteProblemError::Begun);
+            return Err(WriteProblemError::UnknownPast);
         }
         let mut kept = own.iter().filter(|part| !is_lost(part)).peekable();
         if kept.peek().is_some() {
@@ -316,7 +318,7 @@ impl Writer<'_> {
     fn number(&self, value: &Rational) -> String {
         let is_exact = |text: &String| text.parse().is_ok_and(|read: Rational| read == *value);
         let exact = [12, 60].map(|digits| value.to_decimal(digits));
-        match (exact.into_iter().find(is_exact), self.how.digits) {
+        match (exact.into_iter().find(is_exact), self.options.digits) {
             (Some(exact), _) => exact,
             (None, Some(digits)) => value.to_decimal(digits),
             (None, None) => value.to_string(),

@@ -7,7 +7,7 @@ use elbowroom_text::nearest;
 use elbowroom_text::{Diagnostic, Label, Severity};
 
 /// Maximum number of diagnostics: a text with more mistakes is not PDDL.
-const MOST_DIAGNOSTICS: usize = 200;
+const MAX_DIAGNOSTICS: usize = 200;
 
 /// The texts being read, and the diagnostics found so far.
 #[derive(Debug)]
@@ -81,7 +81,7 @@ impl Report {
         name: &str,
         candidates: impl IntoIterator<Item = &'a str>,
     ) -> Option<&'a str> {
-        if self.diagnostics.len() < MOST_DIAGNOSTICS {
+        if self.diagnostics.len() < MAX_DIAGNOSTICS {
             nearest(name, candidates)
         } else {
             None
@@ -123,7 +123,7 @@ impl Report {
                 .diagnostics
                 .iter()
                 .any(|d| d.severity == Severity::Error);
-        if self.diagnostics.len() < MOST_DIAGNOSTICS || is_first_error {
+        if self.diagnostics.len() < MAX_DIAGNOSTICS || is_first_error {
             self.diagnostics.push(diagnostic);
             self.diagnostics.last_mut().expect("just pushed")
         } else {

@@ -42,7 +42,7 @@ fn an_instantaneous_action_has_conditions_and_effects() {
 }
 
 #[test]
-fn nothing_need_be_said_about_conditions_and_effects() {
+fn conditions_and_effects_can_be_omitted() {
     assert_snapshot!(only_action("(:action a)"), @"");
     assert_snapshot!(only_action("(:action a :parameters () :precondition () :effect ())"), @"");
     assert_snapshot!(only_action("(:action a :precondition (and) :effect (and))"), @"");
@@ -150,7 +150,7 @@ fn quantified_effects_carry_their_variables() {
 }
 
 #[test]
-fn variables_bound_in_a_guard_make_room_for_those_of_an_inner_forall() {
+fn inner_forall_variables_are_renumbered_after_guard_variables() {
     assert_snapshot!(
         effect("(at end (when (exists (?z - ball) (in ?z ?r)) (forall (?y - ball) (in ?y ?r))))"),
         @"end effect (in ?2 ?1) for all ?y - ball when now (exists (?z - ball) (in ?3 ?1))"
@@ -230,7 +230,7 @@ fn either_ranges_over_all_its_types() {
 }
 
 #[test]
-fn preferences_of_actions_are_kept_beside_their_conditions() {
+fn action_preferences_are_separate_from_conditions() {
     let (problem, warnings) = read_actions(
         "(:action a :precondition (and (lit) (preference p (open hall))))
          (:durative-action b :parameters (?r - room) :duration (= ?duration 1)

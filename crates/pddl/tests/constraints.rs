@@ -27,7 +27,7 @@ const DOMAIN: &str = "(define (domain d)
 ";
 
 /// Returns the validator's verdict on a plan for a problem with these sections.
-fn said(sections: &str, plan: &str) -> String {
+fn verdict_on(sections: &str, plan: &str) -> String {
     let problem = problem(&format!("(:init (in b1 kitchen) (in B2 hall)) {sections}"));
     let task = task(&Source::new("domain.pddl", DOMAIN), &problem);
     let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a plan");
@@ -55,8 +55,9 @@ const PLAN: &str = "1: (carry b1 kitchen hall) [3]
 6: (carry b2 hall kitchen) [3]";
 
 #[test]
-fn a_violated_constraint_is_told_with_its_time_and_reason() {
-    let constraints = |text: &str| said(&format!("(:goal (and)) (:constraints {text})"), PLAN);
+fn violated_constraint_is_reported_with_time_and_reason() {
+    let constraints =
+        |text: &str| verdict_on(&format!("(:goal (and)) (:constraints {text})"), PLAN);
     assert_snapshot!(
         constraints("(within 3 (in b1 hall))"),
         @"at 3.000: the constraint (within 3 (in b1 hall)) is violated: (in b1 hall) does not hold until 3"
@@ -83,7 +84,7 @@ fn violated_preferences_are_counted_in_the_metric() {
                             (preference late (hold-after 9 (in b2 kitchen)))))
          (:metric minimize (+ (total-time) (+ (* 10 (is-violated light))
             (+ (* 100 (is-violated opened)) (* 1000 (is-violated soon))))))";
-    assert_snapshot!(said(sections, PLAN), @r"
+    assert_snapshot!(verdict_on(sections, PLAN), @r"
     valid, 1119
     light at 1: (lit) does not hold over all
     shut at 9: (at end (not (open kitchen))): (not (open kitchen)) does not hold in the end
@@ -136,7 +137,7 @@ fn a_written_problem_has_the_same_constraints() {
 }
 
 #[test]
-fn a_goal_by_itself_has_no_preferences() {
+fn goal_read_alone_ignores_preferences() {
     let (problem, _) = read_sections("(:init) (:goal (and))").expect("a problem");
     let read = |goal: &str| elbowroom_pddl::read_goal(&Source::new("goal", goal), &problem);
     assert!(read("(lit)").is_ok());
@@ -144,7 +145,7 @@ fn a_goal_by_itself_has_no_preferences() {
 }
 
 #[test]
-fn constraints_that_make_no_sense_are_mistakes() {
+fn meaningless_constraints_are_errors() {
     let wrong = |text: &str| {
         mistakes(read_sections(&format!(
             "(:init) (:goal (and)) (:constraints {text})"
@@ -163,7 +164,7 @@ fn constraints_that_make_no_sense_are_mistakes() {
 }
 
 #[test]
-fn forms_that_belong_elsewhere_are_told_so() {
+fn misplaced_forms_are_reported_with_their_proper_place() {
     let sections = "(:init) (:goal (and)) (:constraints (sometime (always (lit))))";
     assert_snapshot!(mistakes(read_sections(sections)), @"problem.pddl:2:48: error: `(always …)` does not belong here; trajectory constraints belong under `:constraints`, and do not nest");
     assert_snapshot!(mistakes(read_actions("(:action a :precondition (within 3 (lit)))")), @"domain.pddl:6:27: error: `(within …)` does not belong here; trajectory constraints belong under `:constraints`, and do not nest");

@@ -47,7 +47,7 @@ fn read(folder: &Path, domain: &str, problem: &str) -> Option<Task> {
 }
 
 #[test]
-fn all_readable_instances_are_grounded_within_the_limits() {
+fn readable_instances_are_grounded_within_limits() {
     let Some(folder) = benchmarks() else { return };
     let (mut grounded, mut hopeless) = (0, Vec::new());
     for row in rows(&folder, "manifest.csv") {
@@ -80,7 +80,7 @@ fn all_readable_instances_are_grounded_within_the_limits() {
 }
 
 #[test]
-fn each_action_of_a_valid_plan_is_reached() {
+fn each_action_of_a_valid_plan_is_grounded() {
     let Some(folder) = benchmarks() else { return };
     let mut compared = 0;
     for row in rows(&folder, "plans.csv") {
@@ -116,7 +116,7 @@ fn each_action_of_a_valid_plan_is_reached() {
 
 /// Checks the property of the benchmark test on the cases of the repository.
 #[test]
-fn each_action_of_our_own_plans_is_reached() {
+fn each_action_of_own_plans_is_grounded() {
     let cases = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases"));
     let mut compared = 0;
     for entry in std::fs::read_dir(&cases).expect("the cases") {

@@ -12,7 +12,7 @@ fn rendered(actions: &str) -> String {
 }
 
 #[test]
-fn a_misspelt_name_is_shown_with_the_likely_one() {
+fn misspelt_name_is_reported_with_suggestion() {
     assert_snapshot!(rendered("(:action a :parameters (?r - roon) :effect (opne ?r))"), @r"
     error: unknown type `roon`
      --> domain.pddl:6:30
@@ -46,7 +46,7 @@ fn a_wrong_number_of_arguments_is_shown_with_the_declaration() {
 }
 
 #[test]
-fn a_missing_time_specifier_is_asked_for() {
+fn missing_time_specifier_is_reported() {
     assert_snapshot!(
         rendered("(:durative-action a :duration (= ?duration 1) :condition (lit) :effect (at end (not (lit))))"),
         @r"
@@ -62,7 +62,7 @@ fn a_missing_time_specifier_is_asked_for() {
 }
 
 #[test]
-fn all_mistakes_of_an_action_are_reported() {
+fn every_mistake_of_an_action_is_reported() {
     let found = mistakes(read_actions(
         "(:durative-action a :parameters (?x) :duration (= ?dur 1)
            :condition (at start (blue ?x))
@@ -80,7 +80,7 @@ fn all_mistakes_of_an_action_are_reported() {
 }
 
 #[test]
-fn a_forgotten_parenthesis_is_found_where_the_next_section_begins() {
+fn missing_parenthesis_is_located_at_next_section() {
     let actions = "(:action a :effect (and (lit) (open hall))\n(:action b :effect (lit))";
     assert_snapshot!(rendered(actions), @r"
     error: `(` without a matching `)`
@@ -124,7 +124,7 @@ fn a_condition_of_a_durative_action_is_not_called_a_precondition() {
 }
 
 #[test]
-fn an_effect_cannot_depend_on_what_comes_later() {
+fn effect_that_depends_on_later_condition_is_refused() {
     let found = mistakes(read_actions(
         "(:durative-action a :duration () :effect (when (at end (lit)) (at start (open hall))))",
     ));
@@ -146,7 +146,7 @@ fn derived_predicates_cannot_be_set_nor_negate_themselves() {
 }
 
 #[test]
-fn negation_of_another_derived_predicate_is_fine() {
+fn negation_of_other_derived_predicate_is_allowed() {
     let read = read_actions(
         "(:derived (lit) (exists (?r - room) (open ?r)))
          (:derived (dark ?r - room) (and (not (lit)) (not (open ?r))))",
@@ -197,7 +197,7 @@ fn bytes_that_are_not_text_are_reported_unless_commented_out() {
 }
 
 #[test]
-fn colored_output_says_the_same() {
+fn colored_output_has_same_text() {
     let diagnostics = read_actions("(:action a :effect (opne hall))").unwrap_err();
     assert!(diagnostics.render(true).contains("\u{1b}["));
     assert!(!diagnostics.render(false).contains('\u{1b}'));
@@ -211,7 +211,7 @@ const ROOM: &str = "(define (domain room)
   (:action measure :parameters () :effect (assign (level) 3)))";
 
 /// Returns the diagnostics for a problem with these sections.
-fn said_of(sections: &str) -> String {
+fn diagnostics_of(sections: &str) -> String {
     let problem = format!("(define (problem p) (:domain room) {sections})");
     let read = read_problem(
         &Source::new("room", ROOM),
@@ -227,20 +227,23 @@ fn said_of(sections: &str) -> String {
 
 #[test]
 fn a_timed_initial_without_parentheses_shows_its_form() {
-    assert_snapshot!(said_of("(:init (at 120 not (lit))) (:goal (lit))"), @"problem:1:43: error: this timed initial cannot be understood; write `(at 120 (not (lit)))`");
-    assert_snapshot!(said_of("(:init (at 120 lit)) (:goal (lit))"), @"problem:1:43: error: this timed initial cannot be understood; write `(at 120 (p …))`, `(at 120 (not (p …)))` or `(at 120 (= (f …) 5))`");
+    assert_snapshot!(diagnostics_of("(:init (at 120 not (lit))) (:goal (lit))"), @"problem:1:43: error: this timed initial cannot be understood; write `(at 120 (not (lit)))`");
+    assert_snapshot!(diagnostics_of("(:init (at 120 lit)) (:goal (lit))"), @"problem:1:43: error: this timed initial cannot be understood; write `(at 120 (p …))`, `(at 120 (not (p …)))` or `(at 120 (= (f …) 5))`");
 }
 
 #[test]
-fn a_decimal_comma_is_told() {
-    assert_snapshot!(said_of("(:init (= (speed) 1,5)) (:goal (lit))"), @"problem:1:54: error: unknown function `1,5`; write 1.5");
+fn decimal_comma_is_reported() {
+    assert_snapshot!(diagnostics_of("(:init (= (speed) 1,5)) (:goal (lit))"), @"problem:1:54: error: unknown function `1,5`; write 1.5");
 }
 
 #[test]
-fn a_goal_on_what_never_gets_a_value_is_told() {
-    assert_snapshot!(said_of("(:init) (:goal (and (lit) (>= (speed) 2)))"), @"problem:1:45: warning: the goal reads `(speed)`, which never gets a value; say `(= (speed) …)` under `:init`");
-    assert_eq!(said_of("(:init) (:goal (>= (level) 2))"), "");
-    assert_eq!(said_of("(:init (= (speed) 1)) (:goal (>= (speed) 2))"), "");
+fn goal_on_fluent_without_value_is_reported() {
+    assert_snapshot!(diagnostics_of("(:init) (:goal (and (lit) (>= (speed) 2)))"), @"problem:1:45: warning: the goal reads `(speed)`, which never gets a value; say `(= (speed) …)` under `:init`");
+    assert_eq!(diagnostics_of("(:init) (:goal (>= (level) 2))"), "");
+    assert_eq!(
+        diagnostics_of("(:init (= (speed) 1)) (:goal (>= (speed) 2))"),
+        ""
+    );
 }
 
 #[test]

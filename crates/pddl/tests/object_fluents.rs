@@ -29,7 +29,7 @@ fn problem(sections: &str) -> Source {
     Source::new("problem.pddl", text)
 }
 
-fn said(goal: &str, plan: &str) -> String {
+fn verdict_on(goal: &str, plan: &str) -> String {
     let task = task(
         &Source::new("domain.pddl", DOMAIN),
         &problem(&format!("(:goal {goal})")),
@@ -55,14 +55,14 @@ fn said(goal: &str, plan: &str) -> String {
 
 #[test]
 fn an_assignment_replaces_the_value() {
-    assert_snapshot!(said("(= (position r) b)", "1: (jump r a)\n2: (jump r b)\n11: (jump r b)"), @"valid (= (post) b) (= (position r) b)");
-    assert_snapshot!(said("(= (position r) home)", "1: (jump r a)"), @"at 10.000: the goal (= (position r) home) does not hold: (= (position r) home) is false since (jump r a) at 1.000");
+    assert_snapshot!(verdict_on("(= (position r) b)", "1: (jump r a)\n2: (jump r b)\n11: (jump r b)"), @"valid (= (post) b) (= (position r) b)");
+    assert_snapshot!(verdict_on("(= (position r) home)", "1: (jump r a)"), @"at 10.000: the goal (= (position r) home) does not hold: (= (position r) home) is false since (jump r a) at 1.000");
 }
 
 #[test]
-fn values_stand_as_arguments_in_conditions() {
-    assert_snapshot!(said("(seen home)", "1: (jump r a)\n2: (jump r b)\n3: (look r)"), @"valid (= (post) b) (= (position r) a)");
-    let missing = said("(seen home)", "1: (jump r b)");
+fn values_are_arguments_in_conditions() {
+    assert_snapshot!(verdict_on("(seen home)", "1: (jump r a)\n2: (jump r b)\n3: (look r)"), @"valid (= (post) b) (= (position r) a)");
+    let missing = verdict_on("(seen home)", "1: (jump r b)");
     assert!(
         missing.starts_with("at 1.000: (jump r b) needs (or "),
         "{missing}"
@@ -70,9 +70,9 @@ fn values_stand_as_arguments_in_conditions() {
 }
 
 #[test]
-fn a_change_that_takes_time_leaves_no_value_meanwhile() {
-    assert_snapshot!(said("(seen home)", "1: (drive r b) [2]\n4: (look r)"), @"valid (= (post) b) (= (position r) a)");
-    let meanwhile = said("(seen home)", "1: (drive r b) [2]\n2: (look r)");
+fn durative_assignment_leaves_value_undefined_meanwhile() {
+    assert_snapshot!(verdict_on("(seen home)", "1: (drive r b) [2]\n4: (look r)"), @"valid (= (post) b) (= (position r) a)");
+    let meanwhile = verdict_on("(seen home)", "1: (drive r b) [2]\n2: (look r)");
     assert!(
         meanwhile.starts_with("at 2.000: (look r) needs"),
         "{meanwhile}"
@@ -81,8 +81,8 @@ fn a_change_that_takes_time_leaves_no_value_meanwhile() {
 
 #[test]
 fn a_function_may_be_undefined() {
-    assert_snapshot!(said("(= (position r) undefined)", "11: (vanish r)"), @"valid (= (post) b)");
-    let defined = said("(= (position r) undefined)", "");
+    assert_snapshot!(verdict_on("(= (position r) undefined)", "11: (vanish r)"), @"valid (= (post) b)");
+    let defined = verdict_on("(= (position r) undefined)", "");
     assert!(
         defined.starts_with("at 10.000: the goal (not (or "),
         "{defined}"
@@ -110,7 +110,7 @@ fn a_written_problem_has_the_same_values() {
 }
 
 #[test]
-fn mistakes_say_what_to_do() {
+fn error_messages_suggest_a_fix() {
     let read = |goal: &str| {
         let domain = Source::new("domain.pddl", DOMAIN);
         mistakes(read_problem(&domain, &problem(&format!("(:goal {goal})"))))
@@ -126,7 +126,7 @@ problem.pddl:4:34: error: unknown function `home`; declare it under `:functions`
 }
 
 #[test]
-fn a_value_of_another_type_is_told() {
+fn value_of_wrong_type_is_reported() {
     let warnings = |domain: &str, goal: &str| {
         let problem = problem(&format!("(:goal {goal})"));
         let read = read_problem(&Source::new("domain.pddl", domain), &problem);

@@ -215,7 +215,7 @@ proptest! {
     }
 
     #[test]
-    fn no_text_makes_the_reader_panic(text in "([ -~]{0,30}\n?){0,6}") {
+    fn arbitrary_text_does_not_panic(text in "([ -~]{0,30}\n?){0,6}") {
         let _ = read(&text);
     }
 }
@@ -257,7 +257,7 @@ fn text_that_may_hold_an_action_is_an_error_before_and_after_a_plan() {
 }
 
 #[test]
-fn name_of_an_action_with_a_number_or_a_bracket_is_an_error_beside_a_plan() {
+fn action_name_with_number_or_bracket_is_an_error_next_to_plan() {
     for line in [
         "t1: ('wait') [1]",
         "t9= (:action wait)[1]",
@@ -293,7 +293,7 @@ fn name_of_an_action_with_a_number_or_a_bracket_is_an_error_beside_a_plan() {
 }
 
 #[test]
-fn action_in_prose_is_an_error_beside_a_plan() {
+fn action_name_in_prose_is_an_error_next_to_plan() {
     for line in [
         "executing: wait",
         "Executing wait",
@@ -431,7 +431,7 @@ fn comment_begins_at_the_line_or_behind_a_complete_action() {
 }
 
 #[test]
-fn text_without_an_action_is_no_plan_unless_nothing_has_to_be_done() {
+fn text_without_action_is_a_plan_only_if_goal_holds_initially() {
     let no_plan = "1: this is not a plan: it has no action";
     for text in [
         "",

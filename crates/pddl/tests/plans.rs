@@ -51,7 +51,7 @@ fn a_plan_is_times_actions_and_durations() {
 }
 
 #[test]
-fn what_planners_print_around_a_plan_is_skipped() {
+fn planner_output_around_plan_is_skipped() {
     let log = "Number of literals: 4
 b (10.000 | 0.100)b (8.000 | 0.200)(G)
 ; Plan found with metric 12.0
@@ -99,7 +99,7 @@ fn actions_without_times_happen_one_after_the_other() {
 }
 
 #[test]
-fn a_time_is_not_left_out_for_some_actions_only() {
+fn missing_time_of_some_actions_is_an_error() {
     assert_snapshot!(
         mistakes("0: (snap b1)\n(snap b2)"),
         @"plan:2:2: error: an action without a time; expected `time: (action argument …) [duration]`"
@@ -169,7 +169,7 @@ fn a_wrong_action_is_shown_with_what_is_expected() {
 }
 
 #[test]
-fn a_broken_line_is_a_mistake_not_noise() {
+fn malformed_line_is_an_error() {
     assert_snapshot!(
         mistakes("0.0: (snap b1\n1: (snap b1) twice\n2: (wait) [3\n-1: (snap b1)\n4: (wait) [x]\n1e999: (snap b1)"),
         @r"
@@ -184,7 +184,7 @@ fn a_broken_line_is_a_mistake_not_noise() {
 }
 
 #[test]
-fn a_broken_line_of_an_abandoned_plan_does_not_matter() {
+fn malformed_line_of_discarded_plan_is_ignored() {
     assert_eq!(mistakes("0: (snap\nPlan found\n0: (snap b1)"), "none");
 }
 
@@ -219,7 +219,7 @@ fn remarks(text: &str) -> String {
 }
 
 #[test]
-fn what_is_read_leniently_is_said() {
+fn lenient_reading_is_reported_as_note() {
     // A unit of time.
     assert_snapshot!(remarks("0: (wait) [9 min]"), @"plan:1:14: warning: `min` is ignored; a duration is a number in brackets, in the domain's unit: `[10.000]`");
     // No brackets.

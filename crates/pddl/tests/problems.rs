@@ -8,7 +8,7 @@ use insta::assert_snapshot;
 use reading::{Printer, read_sections};
 
 #[test]
-fn facts_numbers_and_what_comes_later_are_told_apart() {
+fn facts_numbers_and_timed_initials_are_distinguished() {
     let (problem, _) = read_sections(
         "(:init (in b1 kitchen) (not (lit)) (= (size b1) 2.5) (= (level) (- 3))
                (at 10 (lit)) (at 12.5 (not (lit))) (at 20 (= (level) 7)))
@@ -44,7 +44,7 @@ fn timed_initials_that_contradict_each_other_at_one_time_are_refused() {
 }
 
 #[test]
-fn what_happens_at_time_zero_is_initial() {
+fn timed_initial_at_zero_belongs_to_initial_state() {
     let (problem, warnings) =
         read_sections("(:init (lit) (at 0 (not (lit))) (at 0 (= (level) 1))) (:goal (and))")
             .unwrap();
@@ -118,7 +118,7 @@ fn metrics_count_time_numbers_and_violations() {
 }
 
 #[test]
-fn sections_that_say_nothing_about_validity_are_ignored_with_a_warning() {
+fn sections_without_effect_on_validity_are_ignored_with_warning() {
     let (_, warnings) = read_sections(
         "(:requirements :strips :mystery) (:init) (:goal (and)) (:length (:serial 3)) (:wibble 1)",
     )

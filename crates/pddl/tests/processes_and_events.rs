@@ -43,37 +43,37 @@ fn verdict(task: &Task, plan: &str, settings: &Settings) -> String {
     }
 }
 
-fn said(domain: &str, sections: &str, plan: &str) -> String {
+fn verdict_on(domain: &str, sections: &str, plan: &str) -> String {
     verdict(&plus(domain, sections), plan, &Settings::default())
 }
 
 const FILLING: &str = "(:process filling :precondition (on) :effect (increase (x) (* #t 2)))";
 
 #[test]
-fn a_process_is_at_work_while_its_condition_holds() {
+fn process_is_active_while_its_condition_holds() {
     let init = "(:init (= (x) 0)) (:goal (>= (x) 6))";
-    assert_snapshot!(said(FILLING, init, "1: (switch-on)\n4: (switch-off)"), @"valid (x) = 6");
+    assert_snapshot!(verdict_on(FILLING, init, "1: (switch-on)\n4: (switch-off)"), @"valid (x) = 6");
     assert_snapshot!(
-        said(FILLING, init, "1: (switch-on)\n3.5: (switch-off)\n9: (switch-on)"),
+        verdict_on(FILLING, init, "1: (switch-on)\n3.5: (switch-off)\n9: (switch-on)"),
         @"at 9.000: the goal (>= (x) 6) does not hold: (x) = 5, short by 1"
     );
     // From the very beginning until the evaluation of the goal.
     let init = "(:init (on) (= (x) 0)) (:goal (= (x) 4))";
-    assert_snapshot!(said(FILLING, init, "2: (switch-off)"), @"valid (x) = 4");
+    assert_snapshot!(verdict_on(FILLING, init, "2: (switch-off)"), @"valid (x) = 4");
 }
 
 #[test]
 fn processes_and_actions_add_up() {
     let init = "(:init (on) (= (x) 0)) (:goal (and))";
-    assert_snapshot!(said(FILLING, init, "1: (rise) [3]"), @"valid (x) = 11");
+    assert_snapshot!(verdict_on(FILLING, init, "1: (rise) [3]"), @"valid (x) = 11");
 }
 
 #[test]
-fn a_process_stops_at_its_bound_and_another_takes_over() {
+fn process_stops_at_bound_and_next_process_starts() {
     let both = "(:process up :precondition (< (x) 3) :effect (increase (x) (* #t 2)))
         (:process on :precondition (>= (x) 3) :effect (increase (y) (* #t 1)))";
     let init = "(:init (= (x) 0) (= (y) 0)) (:goal (and))";
-    assert_snapshot!(said(both, init, "5: (switch-on)"), @"valid (x) = 3, (y) = 7/2");
+    assert_snapshot!(verdict_on(both, init, "5: (switch-on)"), @"valid (x) = 3, (y) = 7/2");
 }
 
 #[test]
@@ -82,13 +82,13 @@ fn an_event_happens_as_soon_as_its_condition_holds() {
         "{FILLING} (:event overflow :precondition (and (>= (x) 5) (not (broken))) :effect (broken))"
     );
     let init = "(:init (on) (= (x) 0)) (:goal (and))";
-    assert_snapshot!(said(&overflow, init, "0.1: (watch) [2]"), @"valid (x) = 21/5");
+    assert_snapshot!(verdict_on(&overflow, init, "0.1: (watch) [2]"), @"valid (x) = 21/5");
     assert_snapshot!(
-        said(&overflow, init, "0.1: (watch) [2.4]"),
+        verdict_on(&overflow, init, "0.1: (watch) [2.4]"),
         @"valid (x) = 5"
     );
     assert_snapshot!(
-        said(&overflow, init, "0.1: (watch) [2.5]"),
+        verdict_on(&overflow, init, "0.1: (watch) [2.5]"),
         @"at 2.500: (watch) needs (not (broken)) over all: (broken) is true since the event (overflow) at 2.500"
     );
 }
@@ -98,9 +98,9 @@ fn an_event_on_a_strict_bound_happens_right_after_it() {
     let strict = "(:process run :precondition (on) :effect (increase (x) (* #t 1)))
         (:event e :precondition (and (> (x) 3) (on)) :effect (and (p) (not (on))))";
     let init = "(:init (on) (= (x) 0)) (:goal (and))";
-    assert_snapshot!(said(strict, init, "5: (look)"), @"valid (x) = 3");
+    assert_snapshot!(verdict_on(strict, init, "5: (look)"), @"valid (x) = 3");
     // Exactly at the bound, it has not happened.
-    assert_snapshot!(said(strict, init, "3: (look)"), @"at 3.000: (look) needs (p): (p) is false");
+    assert_snapshot!(verdict_on(strict, init, "3: (look)"), @"at 3.000: (look) needs (p): (p) is false");
 }
 
 #[test]
@@ -108,33 +108,33 @@ fn events_cause_events_before_anything_else_happens() {
     let chain = "(:event a :precondition (on) :effect (and (not (on)) (q)))
         (:event b :precondition (and (q) (not (p))) :effect (p))";
     let init = "(:init) (:goal (done))";
-    assert_snapshot!(said(chain, init, "1: (switch-on)\n1.001: (look)"), @"valid");
+    assert_snapshot!(verdict_on(chain, init, "1: (switch-on)\n1.001: (look)"), @"valid");
     assert_snapshot!(
-        said(chain, init, "1: (switch-on)\n1.0005: (look)"),
+        verdict_on(chain, init, "1: (switch-on)\n1.0005: (look)"),
         @"at 1.0005: (look) interferes: the event (b) at 1.000 and (look) at 1.0005 both concern (p) and must be at least 0.001 apart"
     );
 }
 
 #[test]
-fn an_event_without_end_is_told_by_name() {
+fn endlessly_repeating_event_is_reported_by_name() {
     let init = "(:init) (:goal (and))";
     assert_snapshot!(
-        said("(:event again :precondition (on) :effect (p))", init, "2: (switch-on)"),
+        verdict_on("(:event again :precondition (on) :effect (p))", init, "2: (switch-on)"),
         @"at 2.000: the event (again) happens without end: its effects do not make its precondition false"
     );
     let pair = "(:event there :precondition (on) :effect (and (not (on)) (off)))
         (:event back :precondition (and (off) (q)) :effect (and (not (off)) (on)))";
     assert_snapshot!(
-        said(pair, "(:init (q)) (:goal (and))", "2: (switch-on)"),
+        verdict_on(pair, "(:init (q)) (:goal (and))", "2: (switch-on)"),
         @"at 2.000: the event (there) happens without end: other events make its precondition true again at once"
     );
 }
 
 #[test]
-fn a_process_that_would_chatter_is_told_by_name() {
+fn chattering_process_is_reported_by_name() {
     let drain = "(:process drain :precondition (>= (x) 0) :effect (decrease (x) (* #t 1)))";
     assert_snapshot!(
-        said(drain, "(:init (= (x) 2)) (:goal (and))", "5: (switch-on)"),
+        verdict_on(drain, "(:init (= (x) 2)) (:goal (and))", "5: (switch-on)"),
         @"undecided: at 2.000: the process (drain) would start and stop without end: at work it makes its condition false, and without it the condition is true"
     );
 }
@@ -144,7 +144,7 @@ fn two_events_at_once_must_not_interfere() {
     let two = "(:event a :precondition (on) :effect (and (not (on)) (p)))
         (:event b :precondition (on) :effect (and (not (on)) (q)))";
     assert_snapshot!(
-        said(two, "(:init) (:goal (and))", "2: (switch-on)"),
+        verdict_on(two, "(:init) (:goal (and))", "2: (switch-on)"),
         @"at 2.000: interferes: the event (a) at 2.000 and the event (b) at 2.000 both concern (on) and must not happen at the same time"
     );
 }
@@ -160,58 +160,58 @@ fn an_event_at_an_irrational_moment_changes_facts_exactly() {
     );
     let init = "(:init (on) (= (x) 0) (= (y) 0) (= (z) 0)) (:goal (done))";
     // √2 is 1.41421356…
-    assert_snapshot!(said(&fall, init, "1.4153: (look)"), @"valid (x) = 200307409/200000000, (y) = 14153/10000, (z) = 1");
-    assert_snapshot!(said(&fall, init, "1.4142: (look)"), @"at 1.4142: (look) needs (p): (p) is false");
+    assert_snapshot!(verdict_on(&fall, init, "1.4153: (look)"), @"valid (x) = 200307409/200000000, (y) = 14153/10000, (z) = 1");
+    assert_snapshot!(verdict_on(&fall, init, "1.4142: (look)"), @"at 1.4142: (look) needs (p): (p) is false");
     assert_snapshot!(
-        said(&fall, init, "1.41521: (look)"),
+        verdict_on(&fall, init, "1.41521: (look)"),
         @"at 1.41521: (look) interferes: the event (e) at about 1.414213 and (look) at 1.41521 both concern (p) and must be at least 0.001 apart"
     );
 }
 
 #[test]
-fn what_stops_at_its_bound_has_that_value_also_at_an_irrational_moment() {
+fn process_stopped_at_bound_has_exact_value_at_irrational_time() {
     let stop = format!("{FALL} (:event e :precondition (and (>= (x) 1) (on)) :effect (not (on)))");
     let init = "(:init (on) (= (x) 0) (= (y) 0) (= (z) 0)) (:goal (= (x) 1))";
-    assert_snapshot!(said(&stop, init, "3: (switch-off)"), @"valid (x) = 1, (z) = 0");
+    assert_snapshot!(verdict_on(&stop, init, "3: (switch-off)"), @"valid (x) = 1, (z) = 0");
     // The speed at that moment is √2.
     let init = "(:init (on) (= (x) 0) (= (y) 0)) (:goal (> (y) 1))";
     assert_snapshot!(
-        said(&stop, init, "3: (switch-off)"),
+        verdict_on(&stop, init, "3: (switch-off)"),
         @"undecided: at 3.000: (> (y) 1) reads (y), whose value is irrational: its change stopped, or went on differently, at an irrational moment"
     );
     let reset = format!(
         "{FALL} (:event e :precondition (and (>= (x) 1) (on)) :effect (and (not (on)) (assign (y) 0) (off)))"
     );
-    assert_snapshot!(said(&reset, "(:init (on) (= (x) 0) (= (y) 0)) (:goal (= (y) 0))", "3: (switch-off)"), @"valid (x) = 1, (y) = 0");
+    assert_snapshot!(verdict_on(&reset, "(:init (on) (= (x) 0) (= (y) 0)) (:goal (= (y) 0))", "3: (switch-off)"), @"valid (x) = 1, (y) = 0");
 }
 
 #[test]
 fn a_rate_that_depends_on_its_own_fluent_is_undecided() {
     let grow = "(:process grow :precondition (on) :effect (increase (x) (* #t (x))))";
     assert_snapshot!(
-        said(grow, "(:init (on) (= (x) 1)) (:goal (> (x) 2))", "1: (switch-off)"),
+        verdict_on(grow, "(:init (on) (= (x) 1)) (:goal (> (x) 2))", "1: (switch-off)"),
         @"undecided: at 0.000: nonlinear change: the rate of (x) depends on (x) itself, so its value is no polynomial in time"
     );
 }
 
 #[test]
-fn a_ball_that_bounces_ever_faster_is_undecided_in_the_end() {
+fn zeno_behaviour_is_undecided() {
     let bounce =
         "(:process fall :precondition (on) :effect (and (increase (x) (* #t (y))) (decrease (y) (* #t 2))))
          (:event bounce :precondition (and (<= (x) 0) (< (y) 0)) :effect (and (assign (x) 0) (assign (y) (* -0.5 (y)))))";
     let init = "(:init (on) (= (x) 0) (= (y) 8)) (:goal (and))";
-    assert_snapshot!(said(bounce, init, "14.5: (switch-off)"), @"valid (x) = 1/4, (y) = 0");
+    assert_snapshot!(verdict_on(bounce, init, "14.5: (switch-off)"), @"valid (x) = 1/4, (y) = 0");
     // The bounces come closer and closer to 16.
-    assert_snapshot!(said(bounce, init, "17: (switch-off)"), @"undecided: at about 16: events happen, or processes start and stop, more than 1000 times before anything of the plan does");
+    assert_snapshot!(verdict_on(bounce, init, "17: (switch-off)"), @"undecided: at about 16: events happen, or processes start and stop, more than 1000 times before anything of the plan does");
 }
 
 #[test]
 fn global_constraints_hold_in_each_state() {
     let limited = format!("{FILLING} (:constraint limit :parameters () :condition (<= (x) 5))");
     let init = "(:init (on) (= (x) 0)) (:goal (and))";
-    assert_snapshot!(said(&limited, init, "2.5: (switch-off)"), @"valid (x) = 5");
+    assert_snapshot!(verdict_on(&limited, init, "2.5: (switch-off)"), @"valid (x) = 5");
     assert_snapshot!(
-        said(&limited, init, "2.6: (switch-off)"),
+        verdict_on(&limited, init, "2.6: (switch-off)"),
         @"just after 2.500: the constraint (always (<= (x) 5)) is violated: (<= (x) 5) does not hold"
     );
     let event = format!(
@@ -219,13 +219,13 @@ fn global_constraints_hold_in_each_state() {
         (:constraint whole :condition (not (broken)))"
     );
     assert_snapshot!(
-        said(&event, init, "2.6: (switch-off)"),
+        verdict_on(&event, init, "2.6: (switch-off)"),
         @"at 2.000: the constraint (always (not (broken))) is violated: (not (broken)) does not hold"
     );
 }
 
 #[test]
-fn mistakes_in_processes_and_events_say_what_to_do() {
+fn errors_in_processes_and_events_suggest_a_fix() {
     let read = |text: &str| mistakes(read_actions(text));
     assert_snapshot!(read("(:process p :precondition (lit) :effect (lit))"), @"domain.pddl:6:41: error: `(lit)` is no change that goes on; effects of a process are `(increase (f) (* #t rate))`");
     assert_snapshot!(read("(:process p :effect (at start (lit)))"), @"domain.pddl:6:21: error: `(at …)` does not belong here; a process has no start and no end of its own");
@@ -239,7 +239,7 @@ fn mistakes_in_processes_and_events_say_what_to_do() {
 }
 
 #[test]
-fn what_happens_by_itself_stands_in_no_plan() {
+fn process_or_event_in_plan_is_refused() {
     let task = plus(
         "(:process fill :effect (increase (x) (* #t 1))) (:event e :precondition (p) :effect (not (p)))",
         "(:init (= (x) 0)) (:goal (and))",

@@ -59,7 +59,7 @@ const GO: &str = "(:durative-action go :parameters (?p ?q - place) :duration (= 
     :effect (and (at start (not (at ?p))) (at end (at ?q))))";
 
 #[test]
-fn one_drives_only_along_roads_that_one_gets_to() {
+fn only_drives_on_reachable_roads_are_instantiated() {
     let world = World {
         actions: GO,
         init: "(at a) (road a b) (road c b)",
@@ -122,7 +122,7 @@ fn a_derived_fact_is_reached_through_its_rules() {
 }
 
 #[test]
-fn an_action_may_need_what_another_brings_while_it_runs() {
+fn action_can_need_start_effect_of_running_action() {
     let world = World {
         actions: "(:durative-action mend :parameters () :duration (= ?duration 2)
         :condition (over all (lit)) :effect (at end (seen a)))
@@ -134,7 +134,7 @@ fn an_action_may_need_what_another_brings_while_it_runs() {
 }
 
 #[test]
-fn an_action_may_need_its_own_start_effects() {
+fn action_can_need_its_own_start_effects() {
     let world = World {
         actions: "(:durative-action burn :parameters () :duration (= ?duration 2)
             :condition (over all (lit)) :effect (and (at start (lit)) (at end (not (lit)))))",
@@ -144,7 +144,7 @@ fn an_action_may_need_its_own_start_effects() {
 }
 
 #[test]
-fn what_starts_and_never_ends_brings_nothing_about() {
+fn effects_of_action_that_cannot_end_are_unreachable() {
     let world = World {
         actions: "(:durative-action burn :parameters () :duration (= ?duration 2)
             :condition (at end (seen a)) :effect (at start (lit)))
@@ -186,7 +186,7 @@ fn an_existential_condition_needs_one_instance() {
 }
 
 #[test]
-fn a_conditional_effect_comes_about_once_its_condition_is_possible() {
+fn conditional_effect_is_reachable_once_its_condition_is() {
     let world = World {
         actions: "(:action push :parameters ()
                 :effect (forall (?p - place) (when (at ?p) (seen ?p))))
@@ -215,7 +215,7 @@ fn a_parameter_of_either_type_takes_objects_of_both() {
 }
 
 #[test]
-fn equality_leaves_out_what_is_equal() {
+fn inequality_condition_excludes_equal_objects() {
     let world = World {
         actions: "(:action swap :parameters (?p ?q - place)
             :precondition (and (at ?p) (at ?q) (not (= ?p ?q))) :effect (seen ?p))",
@@ -229,7 +229,7 @@ const FUEL: &str = "(:predicates (at ?p - place))
     (:functions (fuel) (length ?p ?q - place))";
 
 #[test]
-fn numbers_that_never_change_are_compared() {
+fn comparisons_of_constants_are_evaluated() {
     let world = World {
         declarations: FUEL,
         actions: "(:action hop :parameters (?p ?q - place)
@@ -243,7 +243,7 @@ fn numbers_that_never_change_are_compared() {
 }
 
 #[test]
-fn numbers_that_change_may_be_anything() {
+fn changing_numbers_can_have_any_value() {
     let world = World {
         declarations: FUEL,
         actions: "(:action hop :parameters (?q - place) :precondition (>= (fuel) 5)
@@ -273,7 +273,7 @@ fn a_duration_without_value_makes_an_action_impossible() {
 }
 
 #[test]
-fn too_many_actions_are_an_answer() {
+fn action_limit_is_reported() {
     let world = World {
         actions: "(:action meet :parameters (?p ?q ?r - place) :precondition (and)
             :effect (lit))",
@@ -291,7 +291,7 @@ fn too_many_actions_are_an_answer() {
 }
 
 #[test]
-fn too_much_work_is_an_answer() {
+fn work_limit_is_reported() {
     let world = World {
         actions: "(:action meet :parameters (?p ?q ?r - place) :precondition (and (at ?p) (not (= ?q ?q)))
             :effect (lit))",

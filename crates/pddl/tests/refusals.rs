@@ -68,7 +68,7 @@ fn strict_bounds_on_a_duration_are_refused() {
 }
 
 #[test]
-fn a_mistake_beside_a_refused_feature_is_still_a_mistake() {
+fn error_is_reported_in_addition_to_unsupported_feature() {
     let read = read_actions("(:modules m) (:action a :effect (opne hall))");
     assert!(!is_unsupported(&read.unwrap_err()));
 }

@@ -60,13 +60,13 @@ fn read_changed(which: usize, text: &[u8]) {
 }
 
 #[test]
-fn the_texts_that_are_changed_below_are_right() {
+fn unchanged_texts_are_read_without_errors() {
     let read = read_problem(&Source::new("d", DOMAIN), &Source::new("p", PROBLEM));
     assert_eq!(reading::mistakes(read), "none");
 }
 
 #[test]
-fn a_text_may_end_anywhere() {
+fn truncated_text_does_not_panic() {
     for (which, text) in [DOMAIN, PROBLEM, PLAN].iter().enumerate() {
         for end in 0..text.len() {
             read_changed(which, &text.as_bytes()[..end]);
@@ -75,7 +75,7 @@ fn a_text_may_end_anywhere() {
 }
 
 #[test]
-fn any_byte_may_be_missing() {
+fn deleted_byte_does_not_panic() {
     for (which, text) in [DOMAIN, PROBLEM, PLAN].iter().enumerate() {
         for at in 0..text.len() {
             let mut bytes = text.as_bytes().to_vec();
@@ -86,7 +86,7 @@ fn any_byte_may_be_missing() {
 }
 
 #[test]
-fn any_byte_may_be_nul() {
+fn nul_byte_does_not_panic() {
     for (which, text) in [DOMAIN, PROBLEM, PLAN].iter().enumerate() {
         for at in 0..text.len() {
             let mut bytes = text.as_bytes().to_vec();
@@ -131,7 +131,7 @@ fn the_deepest_nesting_that_is_read_does_not_overflow_the_stack() {
 }
 
 #[test]
-fn long_chains_of_types_and_rules_are_no_trouble() {
+fn long_chains_of_types_and_rules_are_read_quickly() {
     let types = repeated(0..5000, |i| format!("t{i} - t{} ", i + 1));
     read_changed(
         0,

@@ -26,7 +26,7 @@ const PROBLEM: &str = "(define (problem evening) (:domain flat) (:objects r1 - r
 const PLAN: &str = "0.1: (pour kettle 0.5) [1]\n4: (carry r1 kettle hall)\n";
 
 /// Returns the verdict, if the texts are understood.
-fn judged(domain: &str, problem: &str, plan: &str) -> Option<Verdict> {
+fn verdict_of(domain: &str, problem: &str, plan: &str) -> Option<Verdict> {
     let domain = Source::new("domain.pddl", domain);
     let problem = match read_problem(&domain, &Source::new("problem.pddl", problem)) {
         Ok((problem, _)) => problem,
@@ -62,7 +62,7 @@ fn each(change: &dyn Fn(&str, usize) -> Option<String>) -> usize {
             let mut all = texts.map(str::to_owned);
             all[which] = changed;
             let [domain, problem, plan] = &all;
-            understood += usize::from(judged(domain, problem, plan).is_some());
+            understood += usize::from(verdict_of(domain, problem, plan).is_some());
         }
     }
     understood
@@ -81,8 +81,8 @@ fn word_at(text: &str, at: usize) -> Option<&str> {
 }
 
 #[test]
-fn the_texts_are_right_before_they_are_changed() {
-    let verdict = judged(DOMAIN, PROBLEM, PLAN);
+fn unchanged_texts_are_read_and_valid() {
+    let verdict = verdict_of(DOMAIN, PROBLEM, PLAN);
     assert!(
         matches!(verdict, Some(Verdict::Valid(_))),
         "{:?}",
@@ -91,7 +91,7 @@ fn the_texts_are_right_before_they_are_changed() {
 }
 
 #[test]
-fn a_text_may_end_anywhere_and_any_byte_may_be_missing_or_another_one() {
+fn truncated_text_and_deleted_or_changed_bytes_do_not_panic() {
     each(&|text, at| Some(text[..at].to_owned()));
     let understood = each(&|text, at| Some(format!("{}{}", &text[..at], &text[at + 1..])));
     assert!(understood > 0, "most white space can be left out");
@@ -101,7 +101,7 @@ fn a_text_may_end_anywhere_and_any_byte_may_be_missing_or_another_one() {
 }
 
 #[test]
-fn any_word_may_be_missing_doubled_or_another_one() {
+fn deleted_doubled_or_changed_words_do_not_panic() {
     each(&|text, at| {
         let word = word_at(text, at)?;
         Some(format!("{}{}", &text[..at], &text[at + word.len()..]))

@@ -21,9 +21,9 @@ const STEPS: i64 = 512;
 const HORIZON: i64 = 6;
 
 /// Pseudo-random numbers with a fixed seed.
-struct Dice(u64);
+struct Rng(u64);
 
-impl Dice {
+impl Rng {
     fn below(&mut self, bound: u64) -> usize {
         self.0 = self
             .0
@@ -43,7 +43,7 @@ struct Condition {
 }
 
 impl Condition {
-    fn any(dice: &mut Dice, number: i64) -> Self {
+    fn any(dice: &mut Rng, number: i64) -> Self {
         Self {
             fluent: dice.below(FLUENTS as u64),
             is_above: dice.below(2) == 0,
@@ -86,9 +86,9 @@ struct World {
 }
 
 impl World {
-    fn any(dice: &mut Dice) -> Self {
+    fn any(dice: &mut Rng) -> Self {
         let mut number = 0;
-        let mut rule = |dice: &mut Dice| {
+        let mut rule = |dice: &mut Rng| {
             number += 1;
             let rate = [-2, -1, 1, 2][dice.below(4)];
             (
@@ -190,8 +190,8 @@ impl World {
 }
 
 #[test]
-fn the_judge_comes_to_the_state_that_small_steps_come_to() {
-    let mut dice = Dice(20_060_301);
+fn validator_agrees_with_small_step_simulation() {
+    let mut dice = Rng(20_060_301);
     let (mut compared, mut others) = (0, 0);
     for case in 0..150 {
         let world = World::any(&mut dice);

@@ -14,9 +14,9 @@ mod skipped;
 mod cases;
 #[path = "val_program/conditional.rs"]
 mod conditional;
-#[path = "val_program/course.rs"]
-mod course;
 #[path = "val_program/equal.rs"]
 mod equal;
 #[path = "val_program/program.rs"]
 mod program;
+#[path = "val_program/trajectory.rs"]
+mod trajectory;

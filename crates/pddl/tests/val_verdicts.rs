@@ -8,7 +8,7 @@ mod skipped;
 use std::path::PathBuf;
 
 use elbowroom_model::Task;
-use elbowroom_model::validate::{Mistake, Settings, Verdict, validate};
+use elbowroom_model::validate::{Settings, Verdict, ViolationKind, validate};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, is_unsupported, read_plan, read_problem};
 use skipped::skipped;
@@ -102,8 +102,8 @@ fn answer(reading: &Reading, tolerance: Rational) -> &'static str {
     };
     match validate(task, plan, &Settings::like_val(tolerance)) {
         Verdict::Valid(_) => "valid",
-        Verdict::Invalid(violation) => match violation.mistake {
-            Mistake::Undefined { .. } => "type-error",
+        Verdict::Invalid(violation) => match violation.kind {
+            ViolationKind::Undefined { .. } => "type-error",
             _ => "failed-to-execute",
         },
         Verdict::Undecided(_) => "undecided",
@@ -111,7 +111,7 @@ fn answer(reading: &Reading, tolerance: Rational) -> &'static str {
 }
 
 #[test]
-fn the_judge_agrees_with_val_up_to_what_the_document_explains() {
+fn verdicts_agree_with_val_except_documented_disagreements() {
     let Some(root) = benchmarks() else {
         skipped("no benchmark set; set ELBOWROOM_SHARED to where it is");
         return;

@@ -33,7 +33,7 @@ fn order(timed: &TimedInitial) -> (Rational, String) {
 }
 
 #[test]
-fn every_benchmark_is_the_same_problem_after_writing_and_reading() {
+fn benchmarks_round_trip() {
     let Some(folder) = survey::folder() else {
         skipped("there is no benchmark set; set ELBOWROOM_SHARED to its folder");
         return;
@@ -60,7 +60,7 @@ fn every_benchmark_is_the_same_problem_after_writing_and_reading() {
 
 /// Checks the property of the benchmark test on the cases of the repository.
 #[test]
-fn our_own_cases_are_the_same_problems_after_writing_and_reading() {
+fn own_cases_round_trip() {
     let cases = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases");
     let mut count = 0;
     for entry in std::fs::read_dir(cases).expect("the cases") {
@@ -113,7 +113,7 @@ fn rover() -> (Source, Task) {
 
 /// Returns the situation at `elapsed` after the start, at 0, of the plan line's action, with the
 /// changes of its start applied.
-fn under_way(task: &Task, line: &str, elapsed: i64, duration: Interval) -> Situation {
+fn running_situation(task: &Task, line: &str, elapsed: i64, duration: Interval) -> Situation {
     let (plan, _) = read_plan(&Source::new("plan", line), task).expect("a plan");
     let step = plan.steps.into_iter().next().expect("one step");
     let mut state = task.initial().clone();
@@ -150,10 +150,10 @@ fn written(task: &Task, situation: &Situation) -> String {
 }
 
 #[test]
-fn an_action_under_way_becomes_what_it_will_do_at_its_end() {
+fn running_action_becomes_timed_initials_at_its_end() {
     let (_, task) = rover();
     let duration = Interval::point(Rational::from(10));
-    let situation = under_way(&task, "0: (drive base rock) [10]", 4, duration);
+    let situation = running_situation(&task, "0: (drive base rock) [10]", 4, duration);
     assert_snapshot!(written(&task, &situation), @r"
     (define (problem trip)
     (:domain rover)
@@ -177,10 +177,10 @@ fn an_action_under_way_becomes_what_it_will_do_at_its_end() {
 }
 
 #[test]
-fn a_plan_for_the_written_problem_is_a_plan_from_the_situation() {
+fn plan_for_written_problem_is_valid_from_situation() {
     let (domain, task) = rover();
     let duration = Interval::point(Rational::from(10));
-    let situation = under_way(&task, "0: (drive base rock) [10]", 4, duration);
+    let situation = running_situation(&task, "0: (drive base rock) [10]", 4, duration);
     let text = written(&task, &situation);
     let rest = reading::task(&domain, &Source::new("rest.pddl", text));
     // The goal is evaluated at the end of the plan; the later closing of the base does not count.
@@ -208,7 +208,7 @@ fn a_plan_for_the_written_problem_is_a_plan_from_the_situation() {
 fn the_earliest_possible_end_is_chosen() {
     let (_, task) = rover();
     let ends = |task: &Task, elapsed, duration| {
-        let situation = under_way(task, "0: (dig base) [3]", elapsed, duration);
+        let situation = running_situation(task, "0: (dig base) [3]", elapsed, duration);
         end_times(&situation, &Rational::new(1, 1000)).map(|ends| ends[0].to_decimal(4))
     };
     let between = |low: i64, high: i64| Interval::closed(low.into(), high.into());
@@ -219,10 +219,10 @@ fn the_earliest_possible_end_is_chosen() {
 }
 
 #[test]
-fn what_timed_initials_cannot_say_is_refused_with_its_reason() {
+fn situation_inexpressible_by_timed_initials_is_refused_with_reason() {
     let (_, task) = rover();
     let refusal = |line: &str| {
-        let situation = under_way(&task, line, 1, Interval::point(Rational::from(5)));
+        let situation = running_situation(&task, line, 1, Interval::point(Rational::from(5)));
         let ends = vec![Rational::from(5)];
         let how = ProblemText { ends, digits: None };
         write_problem(&task, &situation, &how).unwrap_err()
@@ -230,7 +230,7 @@ fn what_timed_initials_cannot_say_is_refused_with_its_reason() {
     assert_snapshot!(refusal("0: (bask) [5]"), @"a problem file cannot say that (bask) is under way: it changes (charge) while it runs; the embedded planner takes it as it is");
     assert_snapshot!(refusal("0: (hope) [5]"), @"a problem file cannot say that (hope) is under way: whether it changes (free) at its end is still open; the embedded planner takes it as it is");
     let (_, task) = rover();
-    let situation = under_way(&task, "0: (bask) [5]", 1, Interval::point(5.into()));
+    let situation = running_situation(&task, "0: (bask) [5]", 1, Interval::point(5.into()));
     let without = write_problem(&task, &situation, &ProblemText::default()).unwrap_err();
     assert_snapshot!(without, @"1 actions are under way, but 0 ends are given for them");
     let ends = vec![Rational::from(7)];
@@ -257,7 +257,7 @@ fn numbers_without_a_finite_decimal_are_rounded_only_on_demand() {
 }
 
 #[test]
-fn quantified_variables_keep_apart() {
+fn quantified_variables_get_distinct_names() {
     let domain = "(define (domain d) (:predicates (p ?a ?b)) (:constants c))";
     let goal = "(exists (?x) (and (forall (?x) (p ?x ?x)) (p ?x c)))";
     let problem = format!("(define (problem e) (:domain d) (:init) (:goal {goal}))");

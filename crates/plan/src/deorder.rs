@@ -34,22 +34,24 @@
 //! their own ([`Reason::Side`](crate::Reason::Side)), and [`pin_until_sound`] drops those that are
 //! not needed.
 
-mod course;
 pub(crate) mod durations;
 mod implied;
-mod kept;
+mod lossless;
 mod order;
 mod over_all;
 mod pin;
 mod self_overlap;
+mod trajectory;
 
 use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_stn::ConsistentNetwork;
 
 pub use implied::without_implied;
-pub use kept::keeps_all_that_is_read;
-pub use pin::{pin_until_sound, pinned_to, with_all_sides, with_sides_one_way, without_sides};
+pub use lossless::keeps_all_that_is_read;
+pub use pin::{
+    pin_until_sound, with_compatible_sides, with_fixed_times, with_permanent_sides, without_sides,
+};
 
 use crate::network::{Schedule, network_node};
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, StnPlan};
@@ -74,7 +76,7 @@ pub struct Deordered {
 pub enum DeorderError {
     /// The plan violates a constraint on its course.
     #[error("the plan does not keep the constraint {constraint}")]
-    Broken {
+    ConstraintViolated {
         /// The constraint in PDDL notation.
         constraint: String,
     },
@@ -116,10 +118,10 @@ pub enum DeorderError {
 /// that conditional effects change), or it has processes or events, or numbers that the plan
 /// chooses.
 pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, DeorderError> {
-    if let Some(feature) = task.left_to_the_judge() {
+    if let Some(feature) = task.unsupported_by_analysis() {
         return Err(DeorderError::Unsupported { feature });
     }
-    deorder_the_plan_alone(task, plan)
+    deorder_ignoring_processes(task, plan)
 }
 
 /// Like [`deorder`], but ignores processes and events, and, if there are any, constraints on the
@@ -127,7 +129,7 @@ pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, Deord
 ///
 /// # Errors
 /// As for [`deorder`], except for these features.
-pub fn deorder_the_plan_alone(
+pub fn deorder_ignoring_processes(
     task: &Task,
     plan: &TimeTriggeredPlan,
 ) -> Result<Deordered, DeorderError> {
@@ -149,8 +151,8 @@ pub fn deorder_the_plan_alone(
     timeline
         .interference(&stn_plan, task.epsilon(), &mut order)
         .map_err(|(first, second)| DeorderError::Simultaneous {
-            first: stn_plan.node_words(task, first),
-            second: stn_plan.node_words(task, second),
+            first: stn_plan.describe_node(task, first),
+            second: stn_plan.describe_node(task, second),
             time: times[first].to_decimal(6),
         })?;
     self_overlap::order(&stn_plan, &times, &mut order);
@@ -161,7 +163,7 @@ pub fn deorder_the_plan_alone(
         .extend(durations::constraints(task, &stn_plan, &times));
     stn_plan.constraints.extend(order.into_constraints());
     if task.autonomous().is_empty() {
-        let course = course::constraints(task, &stn_plan, &footprints, &times)?;
+        let course = trajectory::constraints(task, &stn_plan, &footprints, &times)?;
         stn_plan.constraints.extend(course);
     }
     let sides: Vec<_> = sides.into_constraints().collect();
@@ -209,7 +211,7 @@ pub fn unordered(task: &Task, plan: &TimeTriggeredPlan) -> Unordered {
     } = labelled(task, plan);
     let footprints = plan.nodes().map(|(node, _)| plan.footprint(task, node));
     let footprints: Vec<Footprint> = footprints.collect();
-    let durations = durations::steady(task, &plan, &footprints);
+    let durations = durations::state_independent_bounds(task, &plan, &footprints);
     plan.constraints.extend(durations);
     Unordered {
         plan,
@@ -286,7 +288,7 @@ fn nominal(
                 .iter()
                 .map(|&id| NodeId(network.constraint(id).to.0))
                 .filter(|&node| node != NodeId::ZERO)
-                .map(|node| plan.node_words(task, node))
+                .map(|node| plan.describe_node(task, node))
                 .collect(),
             epsilon: task.epsilon().to_string(),
         })?;

@@ -46,11 +46,11 @@ use crate::parameter::ParametrizedPlan;
 ///
 /// # Errors
 /// All mistakes found, in syntax and in names that the task does not have. Also a feature of the
-/// problem that the boxes of networks do not support ([`Task::beyond_boxes`]).
+/// problem that the boxes of networks do not support ([`Task::unsupported_by_boxes`]).
 pub fn read(source: impl Into<Source>, task: &Task) -> Result<ParametrizedPlan, Diagnostics> {
     let source = source.into();
     let (file, mut mistakes) = syntax::parse(&source);
-    if let Some(feature) = task.beyond_boxes() {
+    if let Some(feature) = task.unsupported_by_boxes() {
         let message = format!("networks do not respect {feature} yet, which the problem has");
         mistakes.error(0..0, message);
     }

@@ -42,7 +42,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod decoupled;
+mod decoupled_envelope;
 pub mod deorder;
 mod durations;
 pub mod format;
@@ -58,7 +58,7 @@ pub mod uncertain;
 mod unknowns;
 mod valuation;
 
-pub use decoupled::{BoxEnd, DecoupledEnvelope};
+pub use decoupled_envelope::{BoxEnd, DecoupledEnvelope};
 pub use durations::with_bounds_of_conditions;
 pub use elbowroom_num::Side;
 pub use network::{Origin, Schedule, network_node};

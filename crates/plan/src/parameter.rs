@@ -55,7 +55,7 @@ pub struct ParametrizedPlan {
     pub initial: BTreeMap<FluentId, ParameterId>,
     /// Planned durations of the actions whose durations the executor chooses at their start:
     /// durations that are neither uncertain nor fixed by the domain.
-    pub told: BTreeMap<InstanceId, Rational>,
+    pub commanded_durations: BTreeMap<InstanceId, Rational>,
     /// The task's goal, with the domain's unknowns as parameters.
     pub goal: Condition,
 }
@@ -81,7 +81,7 @@ impl ParametrizedPlan {
             plan,
             parameters: Vec::new(),
             initial: BTreeMap::new(),
-            told: BTreeMap::new(),
+            commanded_durations: BTreeMap::new(),
             goal: task.goal().clone(),
         }
     }

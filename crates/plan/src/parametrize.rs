@@ -34,9 +34,9 @@
 //! # Ok::<(), elbowroom_plan::parametrize::ParametrizeError>(())
 //! ```
 
+mod builder;
 mod constants;
 mod error;
-mod opening;
 mod quantities;
 mod select;
 mod spec;
@@ -49,7 +49,7 @@ pub use spec::{ConstantTarget, Selection, Target, VarySpec};
 use crate::network::Schedule;
 use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::StnPlan;
-use opening::Opening;
+use builder::ParametrizationBuilder;
 
 /// Replaces quantities of a plan by parameters.
 ///
@@ -77,7 +77,7 @@ pub fn parametrize(
         return vary(task, plan, nominal, specs);
     }
     let all = [durations].into_iter().chain(specs.iter().cloned());
-    let mut opening = Opening::new(task, plan, nominal)?;
+    let mut opening = ParametrizationBuilder::new(task, plan, nominal)?;
     opening.apply_all(&all.collect::<Vec<_>>())?;
     opening.finish()
 }
@@ -92,12 +92,12 @@ pub fn vary(
     nominal: &Schedule,
     specs: &[VarySpec],
 ) -> Result<ParametrizedPlan, ParametrizeError> {
-    let mut opening = Opening::new(task, plan, nominal)?;
+    let mut opening = ParametrizationBuilder::new(task, plan, nominal)?;
     opening.apply_all(specs)?;
     opening.finish()
 }
 
-fn nothing(spec: &VarySpec, why: String) -> ParametrizeError {
+fn nothing_matches(spec: &VarySpec, why: String) -> ParametrizeError {
     ParametrizeError::NothingMatches {
         spec: spec.text.clone(),
         why,

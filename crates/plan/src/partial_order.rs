@@ -86,7 +86,7 @@ impl PartialOrderPlan {
             .map(|(node, _)| stn_plan.footprint(task, node))
             .collect();
         let bounded = with_all_bounds(&stn_plan);
-        let constraints = durations::steady(task, &bounded, &footprints);
+        let constraints = durations::state_independent_bounds(task, &bounded, &footprints);
         let links = constraints.into_iter().map(duration_link);
         Self {
             links: links.collect(),
@@ -153,7 +153,7 @@ pub fn partial_order(task: &Task, plan: &TimeTriggeredPlan) -> PartialOrderPlan 
         .collect();
     for &from in &happenings {
         for &to in &happenings {
-            if times[from] < times[to] && uses[to.index()].spoils(&uses[from.index()]) {
+            if times[from] < times[to] && uses[to.index()].threatens(&uses[from.index()]) {
                 links.push(Link {
                     from,
                     to,
@@ -284,7 +284,7 @@ impl Use {
 
     /// Returns `true` if this happening, which comes after `earlier` in the plan, would invalidate
     /// it if it came before.
-    fn spoils(&self, earlier: &Self) -> bool {
+    fn threatens(&self, earlier: &Self) -> bool {
         let meet = |a: &BTreeSet<_>, b: &BTreeSet<_>| !a.is_disjoint(b);
         let (own, other) = (&self.footprint, &earlier.footprint);
         let writes = |fluents: &BTreeSet<_>| {

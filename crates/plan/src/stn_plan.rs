@@ -141,7 +141,7 @@ pub enum Reason {
     /// one. Whether this constraint is needed depends on the numbers.
     Side,
     /// A constraint on the course of the plan keeps turns in their order, or bounds their times.
-    Course,
+    TrajectoryConstraint,
     /// Fixed at, or near, the difference in the original plan, because of numeric conditions.
     Pinned,
 }
@@ -246,13 +246,13 @@ impl StnPlan {
     /// Returns the node at which the instance starts, or happens.
     pub fn start(&self, id: InstanceId) -> NodeId {
         let is_it = |node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id);
-        self.node_where(Place::Instance(id), is_it)
+        self.find_node(Place::Instance(id), is_it)
     }
 
     /// Returns the node at which the instance ends, or happens.
     pub fn end(&self, id: InstanceId) -> NodeId {
         let is_it = |node| matches!(node, Node::End(i) | Node::Instant(i) if i == id);
-        self.node_where(Place::Instance(id), is_it)
+        self.find_node(Place::Instance(id), is_it)
     }
 
     /// Returns the instance whose duration a constraint bounds; `None` if it bounds another
@@ -267,13 +267,13 @@ impl StnPlan {
 
     /// Returns the node of a group of timed initials.
     pub fn timed(&self, index: usize) -> NodeId {
-        self.node_where(Place::Timed(index), |node| node == Node::Timed(index))
+        self.find_node(Place::Timed(index), |node| node == Node::Timed(index))
     }
 
     /// Finds a node by binary search, if nodes are in the order of
     /// [`unconstrained`](Self::unconstrained), as they mostly are. The field is public, so other
     /// orders are possible; these need a linear search.
-    fn node_where(&self, place: Place, is_it: impl Fn(Node) -> bool) -> NodeId {
+    fn find_node(&self, place: Place, is_it: impl Fn(Node) -> bool) -> NodeId {
         let first = self.nodes.partition_point(|&node| place_of(node) < place);
         let mut near = (first..self.nodes.len()).take(2);
         let near = near.find(|&index| is_it(self.nodes[index]));
@@ -302,7 +302,7 @@ impl StnPlan {
     }
 
     /// Returns the node in words: `start of (move a b)`, `(open w) becomes false`.
-    pub fn node_words(&self, task: &Task, node: NodeId) -> String {
+    pub fn describe_node(&self, task: &Task, node: NodeId) -> String {
         match self.nodes[node.index()] {
             Node::Zero => "the beginning of the plan".to_owned(),
             Node::Start(id) => format!("start of {}", self.instance(id).action.name),

@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{ContingentLink, UncertainNetwork};
 use elbowroom_stn::{ConstraintId, Network};
 
-use crate::decoupled::DecoupledEnvelope;
+use crate::decoupled_envelope::DecoupledEnvelope;
 use crate::network::network_node;
 use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, StnPlan};
@@ -12,7 +12,7 @@ use crate::valuation::ParameterId;
 
 /// Interpretation of a plan's constraint for an executor: a requirement or a contingent link.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Reading {
+pub enum ConstraintRole {
     /// The executor has to satisfy `lower <= to - from <= upper`; `None` is no bound.
     Requirement {
         /// Least difference.
@@ -33,7 +33,7 @@ pub enum Reading {
     Impossible,
 }
 
-impl Reading {
+impl ConstraintRole {
     /// Returns the requirement of exactly this difference.
     pub fn exactly(difference: &Rational) -> Self {
         Self::Requirement {
@@ -77,7 +77,7 @@ impl StnPlan {
     /// A constraint that cannot be satisfied.
     pub fn uncertain_network(
         &self,
-        reading: &dyn Fn(&Constraint) -> Reading,
+        reading: &dyn Fn(&Constraint) -> ConstraintRole,
     ) -> Result<PlanNetwork, Impossible> {
         let mut network = Network::with_nodes(self.nodes.len());
         let mut requirements = Vec::new();
@@ -87,9 +87,9 @@ impl StnPlan {
         for (index, constraint) in self.constraints.iter().enumerate() {
             let (from, to) = (network_node(constraint.from), network_node(constraint.to));
             let (lower, upper) = match reading(constraint) {
-                Reading::Impossible => return Err(Impossible(index)),
-                Reading::Contingent { lower, upper }
-                    if self.is_up_to_the_world(constraint) && !is_end[to.index()] =>
+                ConstraintRole::Impossible => return Err(Impossible(index)),
+                ConstraintRole::Contingent { lower, upper }
+                    if self.is_controlled_by_world(constraint) && !is_end[to.index()] =>
                 {
                     is_end[to.index()] = true;
                     links.push(ContingentLink {
@@ -101,8 +101,8 @@ impl StnPlan {
                     sources.push(index);
                     continue;
                 }
-                Reading::Contingent { lower, upper } => (Some(lower), upper),
-                Reading::Requirement { lower, upper } => (lower, upper),
+                ConstraintRole::Contingent { lower, upper } => (Some(lower), upper),
+                ConstraintRole::Requirement { lower, upper } => (lower, upper),
             };
             if let Some(lower) = lower {
                 network.add(elbowroom_stn::Constraint::at_least(from, to, lower));
@@ -135,7 +135,7 @@ impl StnPlan {
 
     /// Returns `true` if a constraint bounds a difference that the world can decide: the duration
     /// of an action, or the time of a timed initial.
-    pub fn is_up_to_the_world(&self, constraint: &Constraint) -> bool {
+    pub fn is_controlled_by_world(&self, constraint: &Constraint) -> bool {
         let node = |id: NodeId| self.nodes[id.index()];
         match (node(constraint.from), node(constraint.to)) {
             (Node::Start(start), Node::End(end)) => start == end,
@@ -153,19 +153,19 @@ impl ParametrizedPlan {
     ///
     /// A parameter that bounds several differences may have a different value in each. This is
     /// stricter than necessary.
-    pub fn reading(&self, constraint: &Constraint, envelope: &DecoupledEnvelope) -> Reading {
-        if let Some(planned) = self.told_by(constraint) {
-            return Reading::exactly(planned);
+    pub fn role(&self, constraint: &Constraint, envelope: &DecoupledEnvelope) -> ConstraintRole {
+        if let Some(planned) = self.commanded_duration(constraint) {
+            return ConstraintRole::exactly(planned);
         }
         let least = |id: ParameterId| envelope.interval(id).lower.value().cloned();
         let greatest = |id: ParameterId| envelope.interval(id).upper.value().cloned();
         if let (Bound::Parameter(lower), Bound::Parameter(upper)) =
             (&constraint.lower, &constraint.upper)
             && lower == upper
-            && self.plan.is_up_to_the_world(constraint)
+            && self.plan.is_controlled_by_world(constraint)
             && let Some(least) = least(*lower).filter(|least| !least.is_negative())
         {
-            return Reading::Contingent {
+            return ConstraintRole::Contingent {
                 lower: least,
                 upper: greatest(*lower),
             };
@@ -175,7 +175,7 @@ impl ParametrizedPlan {
             Bound::Infinite => None,
             Bound::Finite(value) => Some(value.clone()),
             Bound::Parameter(id) => match greatest(*id) {
-                None => return Reading::Impossible,
+                None => return ConstraintRole::Impossible,
                 greatest => greatest,
             },
         };
@@ -183,19 +183,21 @@ impl ParametrizedPlan {
             Bound::Infinite => None,
             Bound::Finite(value) => Some(value.clone()),
             Bound::Parameter(id) => match least(*id) {
-                None => return Reading::Impossible,
+                None => return ConstraintRole::Impossible,
                 least => least,
             },
         };
-        Reading::Requirement { lower, upper }
+        ConstraintRole::Requirement { lower, upper }
     }
 
     /// Returns the duration that the executor commands at the action's start, if the constraint
     /// bounds this duration. The executor cannot make the end depend on later events.
-    pub fn told_by(&self, constraint: &Constraint) -> Option<&Rational> {
+    pub fn commanded_duration(&self, constraint: &Constraint) -> Option<&Rational> {
         let node = |id: NodeId| self.plan.nodes[id.index()];
         match (node(constraint.from), node(constraint.to)) {
-            (Node::Start(start), Node::End(end)) if start == end => self.told.get(&start),
+            (Node::Start(start), Node::End(end)) if start == end => {
+                self.commanded_durations.get(&start)
+            }
             _ => None,
         }
     }
@@ -209,7 +211,7 @@ impl ParametrizedPlan {
         &self,
         envelope: &DecoupledEnvelope,
     ) -> Result<PlanNetwork, Impossible> {
-        let reading = |constraint: &Constraint| self.reading(constraint, envelope);
+        let reading = |constraint: &Constraint| self.role(constraint, envelope);
         self.plan.uncertain_network(&reading)
     }
 }

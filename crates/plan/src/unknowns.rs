@@ -78,7 +78,7 @@ pub(crate) fn mentioned(task: &Task, plan: &StnPlan) -> Vec<OpenNumber> {
 }
 
 /// Returns `true` if a rule of a derived predicate mentions an open number.
-pub(crate) fn occur_in_rules(task: &Task) -> bool {
+pub(crate) fn do_rules_mention_unknowns(task: &Task) -> bool {
     let mut found = false;
     for rule in task.rules().iter() {
         visit_condition(&rule.body, &mut |leaf| {
@@ -89,7 +89,7 @@ pub(crate) fn occur_in_rules(task: &Task) -> bool {
 }
 
 /// Replaces the open numbers in the plan's actions and in the goal by the parameters.
-pub(crate) fn fill(
+pub(crate) fn substitute_unknowns(
     plan: &mut StnPlan,
     goal: &mut Condition,
     parameters: &BTreeMap<OpenNumber, ParameterId>,

@@ -34,7 +34,7 @@ const PROBLEMS: &[(&str, &str)] = &[
 const SITUATIONS: usize = 1000;
 
 /// Maximum number of progress reports of a search from a situation before it counts as unanswered.
-const MOST_REPORTS: usize = 2000;
+const MAX_REPORTS: usize = 2000;
 
 fn main() {
     latencies();
@@ -61,7 +61,7 @@ fn first_plan(task: &Task, situation: &Situation) -> Answer {
         first_plan_only: true,
         ..Settings::default()
     };
-    let mut left = MOST_REPORTS;
+    let mut left = MAX_REPORTS;
     plan(task, situation, &settings, &mut |_| {
         left -= 1;
         if left == 0 {
@@ -84,9 +84,9 @@ fn time_to_first_plan(bencher: divan::Bencher<'_, '_>, problem: usize) {
 }
 
 /// Pseudo-random numbers with a fixed seed (Marsaglia's xorshift).
-struct Dice(u64);
+struct Rng(u64);
 
-impl Dice {
+impl Rng {
     fn below(&mut self, bound: u64) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -97,7 +97,7 @@ impl Dice {
 
 /// Prints the percentiles of the time to a plan or a proof from situations in mid-execution.
 fn latencies() {
-    let mut dice = Dice(0x9e37_79b9_7f4a_7c15);
+    let mut dice = Rng(0x9e37_79b9_7f4a_7c15);
     let (mut times, mut states): (Vec<f64>, Vec<u64>) = (Vec::new(), Vec::new());
     let (mut plans, mut proofs, mut unanswered) = (0, 0, 0);
     let mut starts: Vec<(Task, TimeTriggeredPlan)> = Vec::new();
@@ -172,7 +172,7 @@ fn situation_at(
     task: &Task,
     plan: &TimeTriggeredPlan,
     now: &Rational,
-    dice: &mut Dice,
+    dice: &mut Rng,
 ) -> Option<Situation> {
     let mut happened: Vec<(Rational, &[elbowroom_model::ground::Effect])> = Vec::new();
     let mut running = Vec::new();

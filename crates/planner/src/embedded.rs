@@ -18,30 +18,29 @@
 //! 6. `run` divides the time among searches: first for any plan, then for better ones.
 //! 7. `refine` improves the best plan.
 
+mod action_elimination;
 mod answer;
 mod apply;
 mod bound;
 mod compile;
-mod course;
+mod deadline_explanation;
+mod end_windows;
 mod expressions;
 mod extract;
 mod formula;
+mod h2;
 mod hash;
 mod landmarks;
+mod local_search;
 mod mutex;
 mod mutex_pairs;
-mod needless;
 mod network;
-mod pairs;
-mod reasons;
-mod refine;
 mod relaxed;
 mod relevance;
 mod root;
 mod run;
 mod search;
 mod self_overlap;
-mod spans;
 mod state;
 mod step_costs;
 mod symbolic;
@@ -49,6 +48,7 @@ mod symmetry;
 #[cfg(test)]
 mod testing;
 mod time;
+mod trajectory;
 mod tuning;
 mod windows;
 
@@ -59,12 +59,12 @@ use elbowroom_model::reachability::{self, Grounding};
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::work;
 
-pub use answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Settings, Stopped};
+pub use answer::{Answer, Counts, FoundPlan, Objective, Phase, Progress, Proof, Settings, Stopped};
 pub use compile::Unsupported;
 pub use tuning::{Member, Technique, Tuning, TuningError};
 
-use compile::{Failure, Wanted};
-use reasons::Names;
+use compile::{CompileInput, Failure};
+use deadline_explanation::Names;
 use run::{Frame, Planner, none_found};
 use symmetry::Symmetry;
 
@@ -84,7 +84,7 @@ pub fn plan(
     settings: &Settings,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Answer {
-    if let Some(feature) = task.left_to_the_judge() {
+    if let Some(feature) = task.unsupported_by_analysis() {
         return Answer::Unsupported(Unsupported {
             feature: feature.to_owned(),
             place: format!("domain {}", task.problem().domain),
@@ -99,10 +99,10 @@ pub fn plan(
         }
     };
     // Threads of this search count for this one.
-    work::counted_as(
+    work::with_fixed_cost(
         || {
-            if course::concerns(task, situation, settings) {
-                course::plan(task, situation, settings, observe)
+            if trajectory::is_responsible_for(task, situation, settings) {
+                trajectory::plan(task, situation, settings, observe)
             } else {
                 search_for_plans(task, None, situation, settings, observe)
             }
@@ -129,7 +129,7 @@ fn search_for_plans(
     let grounded = if *situation == Situation::initial(task) {
         task
     } else {
-        continued = task.beginning_at(situation);
+        continued = task.starting_from(situation);
         &continued
     };
     let limits = reachability::Settings::default();
@@ -164,7 +164,7 @@ fn search_for_plans(
     }
     progress.counts.actions = grounding.actions.len() as u64;
     let mut goes_on = || observe(&progress).is_continue();
-    let wanted = Wanted {
+    let wanted = CompileInput {
         situation,
         tuning,
         metric: !settings.first_plan_only && settings.objective == Objective::Metric,
@@ -179,7 +179,7 @@ fn search_for_plans(
     }
     let names = Names::of(grounded, &compiled);
     if compiled.is_relaxation_exact()
-        && let Some(proof) = reasons::relaxed_proof(&names, &compiled)
+        && let Some(proof) = deadline_explanation::relaxed_proof(&names, &compiled)
     {
         return Answer::Unsolvable {
             proof,

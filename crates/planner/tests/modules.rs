@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 #[test]
-fn the_modules_of_the_embedded_planner_form_no_circle() {
+fn modules_of_embedded_planner_are_acyclic() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/embedded");
     let mut imports: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for file in files_below(&root) {
@@ -30,11 +30,11 @@ fn the_modules_of_the_embedded_planner_form_no_circle() {
     for (name, imported) in &mut imports {
         imported.retain(|import| import != name && names.contains(import));
     }
-    assert_eq!(circle(imports), BTreeSet::new());
+    assert_eq!(cyclic_modules(imports), BTreeSet::new());
 }
 
 #[test]
-fn a_circle_is_found_whatever_the_imports_look_like() {
+fn cycle_is_found_for_every_form_of_import() {
     let imports = |place: &[&str], text: &str| {
         let place: Vec<String> = place.iter().map(|&part| part.to_owned()).collect();
         imports_of(&place, text)
@@ -58,7 +58,7 @@ fn a_circle_is_found_whatever_the_imports_look_like() {
             .or_default()
             .insert(to.to_owned());
     }
-    assert_eq!(circle(graph), names(&["b", "c"]));
+    assert_eq!(cyclic_modules(graph), names(&["b", "c"]));
 }
 
 fn files_below(folder: &Path) -> Vec<PathBuf> {
@@ -136,7 +136,7 @@ fn first_names(tail: &str) -> Vec<String> {
 
 /// Removes the modules that import no remaining module, or that no remaining module imports, until
 /// nothing changes. Returns the remaining modules: none if there is no cycle.
-fn circle(mut imports: BTreeMap<String, BTreeSet<String>>) -> BTreeSet<String> {
+fn cyclic_modules(mut imports: BTreeMap<String, BTreeSet<String>>) -> BTreeSet<String> {
     loop {
         let left: BTreeSet<String> = imports.keys().cloned().collect();
         for imported in imports.values_mut() {

@@ -18,7 +18,7 @@ const NUMERIC_SEEDS: u64 = 300;
 const NUMERIC_STATES: u64 = 20_000;
 
 /// Maximum number of problems without a plan found, including unsupported ones.
-const MOST_MISSED: usize = 2;
+const MAX_MISSED: usize = 2;
 
 /// Plans for these problems. Returns the number of plans found, and the seeds of the other
 /// problems. Panics if a problem is called unsolvable, or a plan is invalid.
@@ -44,17 +44,17 @@ fn tried(seeds: u64, states: u64, problem: impl Fn(u64) -> Option<Solvable>) -> 
 #[test]
 fn solvable_problems_are_never_called_unsolvable_and_rarely_missed() {
     let (tally, missed) = tried(SEEDS, STATES, problem);
-    assert!(missed.len() <= MOST_MISSED, "{tally:?}, {missed:?}");
+    assert!(missed.len() <= MAX_MISSED, "{tally:?}, {missed:?}");
 }
 
 #[test]
 fn solvable_problems_about_one_changing_number_are_rarely_missed() {
     let (tally, missed) = tried(NUMERIC_SEEDS, NUMERIC_STATES, numeric_problem);
-    assert!(missed.len() <= MOST_MISSED, "{tally:?}, {missed:?}");
+    assert!(missed.len() <= MAX_MISSED, "{tally:?}, {missed:?}");
 }
 
 #[test]
-fn without_self_overlap_no_claim_is_false_and_no_plan_has_it() {
+fn search_without_self_overlap_makes_no_false_claim() {
     let (mut needing, mut found) = (0, 0);
     for seed in 0..SEEDS {
         let problem = problem(seed).unwrap_or_else(|| panic!("seed {seed} gives no problem"));

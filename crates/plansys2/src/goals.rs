@@ -9,14 +9,14 @@ use crate::interface::{
 use crate::message::Stamp;
 
 /// Number of results kept for late requests.
-const KEPT: usize = 16;
+const MAX_KEPT: usize = 16;
 
 /// The open goal and the last ones that have ended. `R` identifies a client.
 #[derive(Debug)]
 pub struct Goals<R> {
     open: Option<GoalInfo>,
     is_canceling: bool,
-    asked: Vec<R>,
+    waiting: Vec<R>,
     ended: VecDeque<(GoalInfo, ResultResponse)>,
 }
 
@@ -25,7 +25,7 @@ impl<R> Default for Goals<R> {
         Self {
             open: None,
             is_canceling: false,
-            asked: Vec::new(),
+            waiting: Vec::new(),
             ended: VecDeque::new(),
         }
     }
@@ -74,9 +74,9 @@ impl<R> Goals<R> {
 
     /// Requests a result. Returns the client and the result, or `None` if the goal is open. Its
     /// result is then returned by [`Self::end`].
-    pub fn ask(&mut self, goal_id: GoalId, who: R) -> Option<(R, ResultResponse)> {
+    pub fn request_result(&mut self, goal_id: GoalId, who: R) -> Option<(R, ResultResponse)> {
         if self.open() == Some(goal_id) {
-            self.asked.push(who);
+            self.waiting.push(who);
             return None;
         }
         let ended = self.ended.iter().find(|(it, _)| it.goal_id == goal_id);
@@ -111,10 +111,10 @@ impl<R> Goals<R> {
             action_execution_status: infos,
         };
         self.ended.push_back((info, result.clone()));
-        if self.ended.len() > KEPT {
+        if self.ended.len() > MAX_KEPT {
             self.ended.pop_front();
         }
-        self.asked
+        self.waiting
             .drain(..)
             .map(|who| (who, result.clone()))
             .collect()
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn one_goal_is_pursued_at_a_time() {
+    fn second_goal_is_rejected_while_one_is_active() {
         let mut goals = Goals::<u8>::default();
         assert!(goals.accept(FIRST, at(5)));
         assert!(!goals.accept(SECOND, at(6)));
@@ -174,18 +174,18 @@ mod tests {
     }
 
     #[test]
-    fn a_result_is_told_when_the_goal_has_ended_and_to_who_asks_late() {
+    fn result_is_sent_at_goal_end_and_on_late_request() {
         let mut goals = Goals::default();
         goals.accept(FIRST, at(5));
-        assert_eq!(goals.ask(FIRST, 'a'), None);
+        assert_eq!(goals.request_result(FIRST, 'a'), None);
         let answers = goals.end(false, vec![]);
         assert_eq!(
             (answers.len(), answers[0].0, answers[0].1.status),
             (1, 'a', goal::ABORTED)
         );
-        let (_, late) = goals.ask(FIRST, 'b').expect("it has ended");
+        let (_, late) = goals.request_result(FIRST, 'b').expect("it has ended");
         assert_eq!((late.status, late.success), (goal::ABORTED, false));
-        let (_, unknown) = goals.ask(SECOND, 'c').expect("there is none");
+        let (_, unknown) = goals.request_result(SECOND, 'c').expect("there is none");
         assert_eq!(unknown.status, goal::UNKNOWN);
     }
 
@@ -206,7 +206,7 @@ mod tests {
                 expected,
                 "{goal_id:?}, {stamp:?}"
             );
-            goals.ask(FIRST, 7);
+            goals.request_result(FIRST, 7);
             let answers = goals.end(false, vec![]);
             let status = if expected.0 {
                 goal::CANCELED

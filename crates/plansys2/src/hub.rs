@@ -7,23 +7,23 @@ use std::time::Duration;
 use crate::message::{ActionExecution, ActionPerformerStatus, kind, state};
 
 /// Interval between repetitions of a request, which may be lost during discovery.
-const ASK_EVERY: Duration = Duration::from_secs(1);
+const REQUEST_INTERVAL: Duration = Duration::from_secs(1);
 /// Time limit for an answer to a request. Then the action has failed.
-const GIVE_UP_ASKING: Duration = Duration::from_secs(30);
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(30);
 /// Time without a status after which a performer is lost. It reports once a second.
-const LOST_AFTER: Duration = Duration::from_secs(5);
+const PERFORMER_TIMEOUT: Duration = Duration::from_secs(5);
 /// Time for which a performer must report that it is idle until its action has failed. Either it
 /// never received the confirmation, or its result was lost.
-const IDLE_AFTER: Duration = Duration::from_secs(3);
+const IDLE_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Number of a start, unique within a run.
-pub type Ticket = u64;
+pub type ActionHandle = u64;
 
 /// Action to execute.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Action {
     /// Number of this start.
-    pub ticket: Ticket,
+    pub ticket: ActionHandle,
     /// Its name.
     pub name: String,
     /// Its arguments.
@@ -38,14 +38,14 @@ pub enum Effect {
     /// Message to publish on `actions_hub`.
     Send(ActionExecution),
     /// Report about an action.
-    Tell(Ticket, Told),
+    Report(ActionHandle, ActionUpdate),
     /// Message for the user.
     Remark(String),
 }
 
 /// Report about an action.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
+pub enum ActionUpdate {
     /// It has started. An instantaneous action is also done.
     Started,
     /// It is running.
@@ -67,10 +67,10 @@ pub enum Told {
 type Key = (String, Vec<String>);
 
 #[derive(Debug)]
-struct Deal {
+struct ActionRequest {
     action: Action,
     /// Time of the last request.
-    asked: Option<Duration>,
+    last_request: Option<Duration>,
     /// Time of the last event.
     since: Duration,
     performer: Option<String>,
@@ -81,7 +81,7 @@ struct Deal {
 
 /// Last status of a performer.
 #[derive(Debug)]
-struct Heard {
+struct PerformerState {
     at: Duration,
     action: String,
 }
@@ -91,8 +91,8 @@ struct Heard {
 #[derive(Debug)]
 pub struct Hub {
     name: String,
-    deals: BTreeMap<Key, Deal>,
-    heard: BTreeMap<String, Heard>,
+    requests: BTreeMap<Key, ActionRequest>,
+    performer_states: BTreeMap<String, PerformerState>,
     others: BTreeSet<String>,
     effects: Vec<Effect>,
 }
@@ -102,8 +102,8 @@ impl Hub {
     pub fn new(name: &str) -> Self {
         Self {
             name: name.to_owned(),
-            deals: BTreeMap::new(),
-            heard: BTreeMap::new(),
+            requests: BTreeMap::new(),
+            performer_states: BTreeMap::new(),
             others: BTreeSet::new(),
             effects: Vec::new(),
         }
@@ -118,42 +118,43 @@ impl Hub {
     /// could not distinguish the two.
     pub fn begin(&mut self, action: Action, now: Duration) {
         let key = (lower(&action.name), lower_all(&action.arguments));
-        if let Some(there) = self.deals.get(&key) {
+        if let Some(there) = self.requests.get(&key) {
             let performer = there.performer.as_deref().unwrap_or("a performer");
             let why = if there.is_cancelled {
                 format!("{performer} has not confirmed that it has stopped the same action")
             } else {
                 format!("{performer} is still busy with the same action")
             };
-            return self.tell(action.ticket, Told::Failed(why));
+            return self.report(action.ticket, ActionUpdate::Failed(why));
         }
-        let deal = Deal {
+        let deal = ActionRequest {
             action,
-            asked: None,
+            last_request: None,
             since: now,
             performer: None,
             idle: None,
             is_cancelled: false,
         };
-        self.deals.insert(key, deal);
+        self.requests.insert(key, deal);
         self.tick(now);
     }
 
     /// Asks the performer to stop. It sends no answer; its status shows when it has stopped.
-    pub fn cancel(&mut self, ticket: Ticket) {
-        let mut deals = self.deals.iter_mut();
-        let its = |(_, it): &(&Key, &mut Deal)| it.action.ticket == ticket && !it.is_cancelled;
+    pub fn cancel(&mut self, ticket: ActionHandle) {
+        let mut deals = self.requests.iter_mut();
+        let its =
+            |(_, it): &(&Key, &mut ActionRequest)| it.action.ticket == ticket && !it.is_cancelled;
         let Some((key, deal)) = deals.find(its) else {
             return;
         };
         if let Some(performer) = &deal.performer {
             deal.is_cancelled = true;
-            let message = say(kind::CANCEL, performer, &deal.action);
+            let message = build_message(kind::CANCEL, performer, &deal.action);
             self.effects.push(Effect::Send(message));
         } else {
             let key = key.clone();
-            self.deals.remove(&key);
-            self.tell(ticket, Told::Cancelled);
+            self.requests.remove(&key);
+            self.report(ticket, ActionUpdate::Cancelled);
         }
     }
 
@@ -161,16 +162,16 @@ impl Hub {
     pub fn message(&mut self, message: &ActionExecution, now: Duration) {
         let key = key_of(message);
         match message.kind {
-            kind::REQUEST => self.asked_by_others(message),
-            kind::RESPONSE => self.answered(&key, message, now),
-            kind::FEEDBACK => self.went_on(&key, message, now),
-            kind::FINISH => self.finished(&key, message),
+            kind::REQUEST => self.warn_of_other_executor(message),
+            kind::RESPONSE => self.on_response(&key, message, now),
+            kind::FEEDBACK => self.on_feedback(&key, message, now),
+            kind::FINISH => self.on_finish(&key, message),
             _ => {}
         }
     }
 
     /// Warns about another executor. Both would choose performers independently.
-    fn asked_by_others(&mut self, message: &ActionExecution) {
+    fn warn_of_other_executor(&mut self, message: &ActionExecution) {
         if message.node_id != self.name && self.others.insert(message.node_id.clone()) {
             self.effects.push(Effect::Remark(format!(
                 "another executor, {}, is asking performers too: PlanSys2's own must be off",
@@ -179,19 +180,19 @@ impl Hub {
         }
     }
 
-    fn answered(&mut self, key: &Key, message: &ActionExecution, now: Duration) {
+    fn on_response(&mut self, key: &Key, message: &ActionExecution, now: Duration) {
         let node = &message.node_id;
-        let deal = self.deals.get_mut(key);
+        let deal = self.requests.get_mut(key);
         match deal.map(|it| (it.performer.is_some(), it)) {
             Some((true, deal)) if deal.performer.as_ref() == Some(node) => {}
             Some((false, deal)) => {
                 deal.performer = Some(node.clone());
                 deal.since = now;
-                let message = say(kind::CONFIRM, node, &deal.action);
+                let message = build_message(kind::CONFIRM, node, &deal.action);
                 let (ticket, has_started) = (deal.action.ticket, !deal.action.is_instantaneous);
                 self.effects.push(Effect::Send(message));
                 if has_started {
-                    self.tell(ticket, Told::Started);
+                    self.report(ticket, ActionUpdate::Started);
                 }
             }
             // A performer that has answered waits for a decision, even if the action was abandoned.
@@ -205,8 +206,8 @@ impl Hub {
         }
     }
 
-    fn went_on(&mut self, key: &Key, message: &ActionExecution, now: Duration) {
-        let Some(deal) = self.deal_of(key, &message.node_id) else {
+    fn on_feedback(&mut self, key: &Key, message: &ActionExecution, now: Duration) {
+        let Some(deal) = self.request_of(key, &message.node_id) else {
             return;
         };
         deal.since = now;
@@ -214,37 +215,38 @@ impl Hub {
         if !deal.is_cancelled {
             let ticket = deal.action.ticket;
             let (completion, note) = (message.completion, message.status.clone());
-            self.tell(ticket, Told::Feedback { completion, note });
+            self.report(ticket, ActionUpdate::Feedback { completion, note });
         }
     }
 
-    fn finished(&mut self, key: &Key, message: &ActionExecution) {
-        let Some(deal) = self.deal_of(key, &message.node_id) else {
+    fn on_finish(&mut self, key: &Key, message: &ActionExecution) {
+        let Some(deal) = self.request_of(key, &message.node_id) else {
             return;
         };
         let ticket = deal.action.ticket;
         let told = if !message.success {
-            Told::Failed(if message.status.is_empty() {
+            ActionUpdate::Failed(if message.status.is_empty() {
                 format!("{} has not said why", message.node_id)
             } else {
                 message.status.clone()
             })
         } else if deal.action.is_instantaneous {
-            Told::Started
+            ActionUpdate::Started
         } else {
-            Told::Succeeded
+            ActionUpdate::Succeeded
         };
-        self.deals.remove(key);
-        self.tell(ticket, told);
+        self.requests.remove(key);
+        self.report(ticket, told);
     }
 
     /// Takes a message of `performers_status`.
     pub fn status(&mut self, status: &ActionPerformerStatus, now: Duration) {
         let node = &status.node_name;
         let action = status.action.clone();
-        self.heard.insert(node.clone(), Heard { at: now, action });
+        self.performer_states
+            .insert(node.clone(), PerformerState { at: now, action });
         let mut over: Vec<(Key, Option<String>)> = Vec::new();
-        for (key, deal) in &mut self.deals {
+        for (key, deal) in &mut self.requests {
             if deal.performer.as_ref() != Some(node) {
                 continue;
             }
@@ -260,7 +262,7 @@ impl Hub {
                 }
                 state::RUNNING => deal.idle = None,
                 _ => {
-                    if now.saturating_sub(*deal.idle.get_or_insert(now)) >= IDLE_AFTER {
+                    if now.saturating_sub(*deal.idle.get_or_insert(now)) >= IDLE_TIMEOUT {
                         let why =
                             format!("{node} does nothing, and has not said how this has ended");
                         over.push((key.clone(), Some(why)));
@@ -270,10 +272,10 @@ impl Hub {
         }
         for (key, why) in over {
             match why {
-                Some(why) => self.lose(&key, why),
+                Some(why) => self.fail_request(&key, why),
                 None => {
-                    if let Some(deal) = self.deals.remove(&key) {
-                        self.tell(deal.action.ticket, Told::Cancelled);
+                    if let Some(deal) = self.requests.remove(&key) {
+                        self.report(deal.action.ticket, ActionUpdate::Cancelled);
                     }
                 }
             }
@@ -282,9 +284,9 @@ impl Hub {
 
     /// Returns the performers with a recent status, each with its action.
     pub fn performers(&self, now: Duration) -> Vec<(&str, &str)> {
-        let lately = self.heard.iter();
+        let lately = self.performer_states.iter();
         lately
-            .filter(|(_, heard)| now.saturating_sub(heard.at) <= LOST_AFTER)
+            .filter(|(_, heard)| now.saturating_sub(heard.at) <= PERFORMER_TIMEOUT)
             .map(|(name, heard)| (name.as_str(), heard.action.as_str()))
             .collect()
     }
@@ -292,37 +294,40 @@ impl Hub {
     /// Repeats requests, and detects lost performers. To be called a few times a second.
     pub fn tick(&mut self, now: Duration) {
         let mut lost = Vec::new();
-        for (key, deal) in &mut self.deals {
+        for (key, deal) in &mut self.requests {
             if let Some(performer) = &deal.performer {
-                let heard = self.heard.get(performer).map(|it| it.at.max(deal.since));
-                if heard.is_some_and(|at| now.saturating_sub(at) > LOST_AFTER) {
+                let heard = self
+                    .performer_states
+                    .get(performer)
+                    .map(|it| it.at.max(deal.since));
+                if heard.is_some_and(|at| now.saturating_sub(at) > PERFORMER_TIMEOUT) {
                     let why = format!(
                         "{performer} is lost: nothing was heard of it for {} s",
-                        LOST_AFTER.as_secs()
+                        PERFORMER_TIMEOUT.as_secs()
                     );
                     lost.push((key.clone(), Some(why)));
                 }
-            } else if now.saturating_sub(deal.since) > GIVE_UP_ASKING {
+            } else if now.saturating_sub(deal.since) > REQUEST_TIMEOUT {
                 lost.push((key.clone(), None));
             } else if deal
-                .asked
-                .is_none_or(|at| now.saturating_sub(at) >= ASK_EVERY)
+                .last_request
+                .is_none_or(|at| now.saturating_sub(at) >= REQUEST_INTERVAL)
             {
-                deal.asked = Some(now);
-                let message = say(kind::REQUEST, &self.name, &deal.action);
+                deal.last_request = Some(now);
+                let message = build_message(kind::REQUEST, &self.name, &deal.action);
                 self.effects.push(Effect::Send(message));
             }
         }
         for (key, why) in lost {
-            let why = why.unwrap_or_else(|| self.nobody(now));
-            self.lose(&key, why);
+            let why = why.unwrap_or_else(|| self.no_performer_message(now));
+            self.fail_request(&key, why);
         }
     }
 
-    fn nobody(&self, now: Duration) -> String {
+    fn no_performer_message(&self, now: Duration) -> String {
         format!(
             "no performer answered within {} s; performers that were heard: {}",
-            GIVE_UP_ASKING.as_secs(),
+            REQUEST_TIMEOUT.as_secs(),
             self.listed(now)
         )
     }
@@ -342,29 +347,29 @@ impl Hub {
     }
 
     /// Returns the deal if its performer is `node`.
-    fn deal_of(&mut self, key: &Key, node: &str) -> Option<&mut Deal> {
-        let deal = self.deals.get_mut(key);
+    fn request_of(&mut self, key: &Key, node: &str) -> Option<&mut ActionRequest> {
+        let deal = self.requests.get_mut(key);
         deal.filter(|deal| deal.performer.as_deref() == Some(node))
     }
 
-    fn lose(&mut self, key: &Key, why: String) {
-        let Some(deal) = self.deals.remove(key) else {
+    fn fail_request(&mut self, key: &Key, why: String) {
+        let Some(deal) = self.requests.remove(key) else {
             return;
         };
         if let Some(performer) = &deal.performer {
             // The performer may still be running.
-            let message = say(kind::CANCEL, performer, &deal.action);
+            let message = build_message(kind::CANCEL, performer, &deal.action);
             self.effects.push(Effect::Send(message));
         }
-        self.tell(deal.action.ticket, Told::Failed(why));
+        self.report(deal.action.ticket, ActionUpdate::Failed(why));
     }
 
-    fn tell(&mut self, ticket: Ticket, told: Told) {
-        self.effects.push(Effect::Tell(ticket, told));
+    fn report(&mut self, ticket: ActionHandle, told: ActionUpdate) {
+        self.effects.push(Effect::Report(ticket, told));
     }
 }
 
-fn say(kind: i16, node: &str, action: &Action) -> ActionExecution {
+fn build_message(kind: i16, node: &str, action: &Action) -> ActionExecution {
     ActionExecution {
         kind,
         node_id: node.to_owned(),

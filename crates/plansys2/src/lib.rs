@@ -7,7 +7,7 @@
 //! `actions_hub`. The program `elbowroom-plansys2` connects the two with standard input and output
 //! and with DDS. It is built with the feature `dds`.
 //!
-//! [`Mirror`] synchronizes `PlanSys2`'s problem expert with a run, in both directions. [`Goals`],
+//! [`ProblemSync`] synchronizes `PlanSys2`'s problem expert with a run, in both directions. [`Goals`],
 //! [`Lifecycle`], [`Progress`] and [`sub_goal`] are for the replacement of `PlanSys2`'s planner and
 //! executor.
 //!
@@ -34,20 +34,20 @@ pub mod interface;
 pub mod knowledge;
 pub mod message;
 
-mod census;
+mod discovery;
 mod goals;
 mod hub;
 mod lifecycle;
-mod mirror;
+mod problem_sync;
 mod progress;
 mod tree;
 mod world;
 
-pub use census::Census;
+pub use discovery::PerformerDiscovery;
 pub use goals::Goals;
-pub use hub::{Action, Effect, Hub, Ticket, Told};
+pub use hub::{Action, ActionHandle, ActionUpdate, Effect, Hub};
 pub use lifecycle::Lifecycle;
-pub use mirror::{Answer, Call, CallId, Key, Mirror, Seen};
+pub use problem_sync::{Answer, Call, CallId, ExternalChange, Key, ProblemSync};
 pub use progress::{Progress, plan_text};
 pub use tree::sub_goal;
 pub use world::{Command, World};

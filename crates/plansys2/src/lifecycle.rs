@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_managed_serves_while_active() {
+    fn managed_node_serves_only_while_active() {
         let mut node = Lifecycle::default();
         assert!(node.serves());
         assert!(!change(&mut node, 3, ""), "not from unconfigured");

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use crate::interface::{ActionExecutionInfo, Plan, PlanItem, execution};
 use crate::message::Stamp;
-use crate::{Action, Ticket, Told};
+use crate::{Action, ActionHandle, ActionUpdate};
 
 /// Actions of a plan with their status. Actions of later plans are appended.
 #[derive(Clone, Debug, Default)]
 pub struct Progress {
     infos: Vec<ActionExecutionInfo>,
     /// Entry of each start.
-    entries: BTreeMap<Ticket, usize>,
+    entries: BTreeMap<ActionHandle, usize>,
 }
 
 impl Progress {
@@ -41,7 +41,7 @@ impl Progress {
 
     /// Returns the remaining steps of `plan`, whose progress this is: the actions that have not
     /// succeeded.
-    pub fn rest_of(&self, plan: &Plan) -> Plan {
+    pub fn remaining_plan(&self, plan: &Plan) -> Plan {
         let with_infos = plan.items.iter().zip(&self.infos);
         let left = with_infos.filter(|(_, info)| info.status != execution::SUCCEEDED);
         Plan {
@@ -77,31 +77,31 @@ impl Progress {
     }
 
     /// Takes a report about an action.
-    pub fn tell(&mut self, ticket: Ticket, told: &Told, now: Stamp) {
+    pub fn update(&mut self, ticket: ActionHandle, told: &ActionUpdate, now: Stamp) {
         let Some(&entry) = self.entries.get(&ticket) else {
             return;
         };
         let info = &mut self.infos[entry];
         info.status_stamp = now;
         info.status = match told {
-            Told::Started => {
+            ActionUpdate::Started => {
                 info.start_stamp = now;
                 execution::EXECUTING
             }
-            Told::Feedback { completion, note } => {
+            ActionUpdate::Feedback { completion, note } => {
                 info.completion = *completion;
                 info.message_status.clone_from(note);
                 execution::EXECUTING
             }
-            Told::Succeeded => {
+            ActionUpdate::Succeeded => {
                 info.completion = 1.0;
                 execution::SUCCEEDED
             }
-            Told::Failed(why) => {
+            ActionUpdate::Failed(why) => {
                 info.message_status.clone_from(why);
                 execution::FAILED
             }
-            Told::Cancelled => execution::CANCELLED,
+            ActionUpdate::Cancelled => execution::CANCELLED,
         };
     }
 }
@@ -163,7 +163,7 @@ mod tests {
         }
     }
 
-    fn action(ticket: Ticket, text: &str) -> Action {
+    fn action(ticket: ActionHandle, text: &str) -> Action {
         let (name, arguments) = words(text);
         Action {
             ticket,
@@ -174,18 +174,21 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_of_a_plan_is_what_has_not_ended_well() {
+    fn remaining_plan_has_unsuccessful_actions() {
         let mut progress = Progress::new(&plan());
         let now = Stamp { sec: 9, nanosec: 0 };
-        let left = |progress: &Progress| progress.rest_of(&plan()).items;
+        let left = |progress: &Progress| progress.remaining_plan(&plan()).items;
         assert_eq!(left(&progress), plan().items);
-        for (ticket, told) in [(1, Told::Succeeded), (2, Told::Failed("it slips".into()))] {
+        for (ticket, told) in [
+            (1, ActionUpdate::Succeeded),
+            (2, ActionUpdate::Failed("it slips".into())),
+        ] {
             progress.begin(&action(ticket, "(move r a b)"));
-            progress.tell(ticket, &told, now);
+            progress.update(ticket, &told, now);
         }
         // An action outside the plan does not count.
         progress.begin(&action(3, "(jump r)"));
-        progress.tell(3, &Told::Succeeded, now);
+        progress.update(3, &ActionUpdate::Succeeded, now);
         assert_eq!(left(&progress), plan().items[1..]);
     }
 
@@ -202,12 +205,12 @@ mod tests {
         );
         let now = Stamp { sec: 9, nanosec: 0 };
         progress.begin(&action(1, "(move r a b)"));
-        progress.tell(1, &Told::Started, now);
+        progress.update(1, &ActionUpdate::Started, now);
         progress.begin(&action(2, "(move r a b)"));
-        progress.tell(2, &Told::Failed("it slips".into()), now);
+        progress.update(2, &ActionUpdate::Failed("it slips".into()), now);
         progress.begin(&action(3, "(jump r)"));
-        progress.tell(3, &Told::Succeeded, now);
-        progress.tell(99, &Told::Succeeded, now);
+        progress.update(3, &ActionUpdate::Succeeded, now);
+        progress.update(99, &ActionUpdate::Succeeded, now);
         let statuses: Vec<_> = progress.infos().iter().map(|it| it.status).collect();
         assert_eq!(statuses, [EXECUTING, NOT_EXECUTED, FAILED, SUCCEEDED]);
         assert_eq!(progress.infos()[2].message_status, "it slips");
@@ -215,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plan_is_written_as_it_is_read() {
+    fn plan_text_round_trips() {
         let lines = "0: (move r a b) [2.5]\n2.501: (move r b a) [2.5]\n5.002: (move r a b) [2.5]\n";
         assert_eq!(plan_text(&plan()), lines);
     }

@@ -9,9 +9,9 @@ const EXPRESSIONS: [&str; 9] = ["=", ">=", ">", "<=", "<", "*", "/", "+", "-"];
 const FIRST_EXPRESSION: u8 = 13;
 
 /// Parsed PDDL text.
-enum Form {
+enum SExpression {
     Word(String),
-    List(Vec<Form>),
+    List(Vec<SExpression>),
 }
 
 /// Returns a subgoal in the form of `PlanSys2`'s executor: `(and PART)`. Returns `None` if the text
@@ -29,17 +29,19 @@ pub fn sub_goal(text: &str) -> Option<Tree> {
     Some(tree)
 }
 
-fn read(text: &str) -> Option<Form> {
+fn read(text: &str) -> Option<SExpression> {
     let spaced = text.replace('(', " ( ").replace(')', " ) ");
-    let mut open: Vec<Vec<Form>> = vec![Vec::new()];
+    let mut open: Vec<Vec<SExpression>> = vec![Vec::new()];
     for word in spaced.split_whitespace() {
         match word {
             "(" => open.push(Vec::new()),
             ")" => {
-                let list = Form::List(open.pop()?);
+                let list = SExpression::List(open.pop()?);
                 open.last_mut()?.push(list);
             }
-            word => open.last_mut()?.push(Form::Word(word.to_lowercase())),
+            word => open
+                .last_mut()?
+                .push(SExpression::Word(word.to_lowercase())),
         }
     }
     let mut forms = open.pop().filter(|_| open.is_empty())?;
@@ -47,7 +49,7 @@ fn read(text: &str) -> Option<Form> {
 }
 
 /// Adds a condition with its parts, and returns its position.
-fn condition(form: &Form, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u32> {
+fn condition(form: &SExpression, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u32> {
     let (name, parts) = headed(form)?;
     let node_type = match name {
         "and" => node::AND,
@@ -67,8 +69,8 @@ fn condition(form: &Form, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u32
     Some(place)
 }
 
-fn expression(form: &Form, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u32> {
-    if let Form::Word(word) = form {
+fn expression(form: &SExpression, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u32> {
+    if let SExpression::Word(word) = form {
         let value: f64 = word.parse().ok()?;
         let place = add(nodes, node::NUMBER, is_negated)?;
         nodes[place as usize].value = value;
@@ -88,14 +90,19 @@ fn expression(form: &Form, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u3
 }
 
 /// Adds a fact or a fluent.
-fn named(form: &Form, node_type: u8, is_negated: bool, nodes: &mut Vec<Node>) -> Option<u32> {
+fn named(
+    form: &SExpression,
+    node_type: u8,
+    is_negated: bool,
+    nodes: &mut Vec<Node>,
+) -> Option<u32> {
     let (name, objects) = headed(form)?;
-    let object = |form: &Form| match form {
-        Form::Word(name) => Some(Param {
+    let object = |form: &SExpression| match form {
+        SExpression::Word(name) => Some(Param {
             name: name.clone(),
             ..Param::default()
         }),
-        Form::List(_) => None,
+        SExpression::List(_) => None,
     };
     let parameters = objects.iter().map(object).collect::<Option<Vec<_>>>()?;
     let place = add(nodes, node_type, is_negated)?;
@@ -104,13 +111,13 @@ fn named(form: &Form, node_type: u8, is_negated: bool, nodes: &mut Vec<Node>) ->
     Some(place)
 }
 
-fn headed(form: &Form) -> Option<(&str, &[Form])> {
+fn headed(form: &SExpression) -> Option<(&str, &[SExpression])> {
     match form {
-        Form::List(parts) => match parts.split_first()? {
-            (Form::Word(name), rest) => Some((name, rest)),
-            (Form::List(_), _) => None,
+        SExpression::List(parts) => match parts.split_first()? {
+            (SExpression::Word(name), rest) => Some((name, rest)),
+            (SExpression::List(_), _) => None,
         },
-        Form::Word(_) => None,
+        SExpression::Word(_) => None,
     }
 }
 
@@ -175,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_condition_is_no_tree() {
+    fn invalid_condition_has_no_tree() {
         for part in [
             "",
             "done",

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::{Action, Seen, Ticket, Told};
+use crate::{Action, ActionHandle, ActionUpdate, ExternalChange};
 
 /// Command of Elbowroom.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,7 +13,7 @@ pub enum Command {
     /// Start this action.
     Begin(Action),
     /// Cancel this action.
-    Cancel(Ticket),
+    Cancel(ActionHandle),
     /// Beliefs: all of them at first, changes later. Names are in brackets.
     Believe {
         /// Facts.
@@ -33,23 +33,23 @@ pub struct World {
     /// Seconds of the world per real second.
     speed: f64,
     zero: Option<Duration>,
-    speaks: u64,
-    begun: BTreeMap<Ticket, Begun>,
-    news: Vec<Value>,
-    question: Option<Question>,
+    protocol_version: u64,
+    started: BTreeMap<ActionHandle, StartedAction>,
+    pending_reports: Vec<Value>,
+    pending_wait: Option<PendingWait>,
     /// `true` if beliefs are requested and changes by others reported.
-    is_following: bool,
+    reports_beliefs: bool,
 }
 
 #[derive(Debug)]
-struct Begun {
+struct StartedAction {
     is_instantaneous: bool,
     has_started: bool,
     has_ended: bool,
 }
 
 #[derive(Debug)]
-struct Question {
+struct PendingWait {
     number: Value,
     /// Time limit in seconds of the world; `None` if the answer is due at once.
     until: Option<f64>,
@@ -63,19 +63,19 @@ impl World {
             name: name.to_owned(),
             speed,
             zero: None,
-            speaks: 1,
-            begun: BTreeMap::new(),
-            news: Vec::new(),
-            question: None,
-            is_following: false,
+            protocol_version: 1,
+            started: BTreeMap::new(),
+            pending_reports: Vec::new(),
+            pending_wait: None,
+            reports_beliefs: false,
         }
     }
 
     /// Requests the beliefs of the run, and announces that facts may change by themselves.
     #[must_use]
-    pub fn following(self) -> Self {
+    pub fn with_beliefs(self) -> Self {
         Self {
-            is_following: true,
+            reports_beliefs: true,
             ..self
         }
     }
@@ -85,7 +85,7 @@ impl World {
     ///
     /// # Errors
     /// The line is not a JSON object.
-    pub fn hear(
+    pub fn handle_line(
         &mut self,
         line: &str,
         now: Duration,
@@ -100,14 +100,16 @@ impl World {
                 None
             }
             Some("stop") => Some(Command::Stop),
-            Some("believed") => Some(believed(&message)),
+            Some("believed") => Some(belief_command(&message)),
             Some("start") => self
                 .begin_time(now)
                 .start(ticket, &message)
                 .map(Command::Begin),
             Some("cancel") => {
                 self.begin_time(now);
-                let runs = |ticket: &Ticket| self.begun.get(ticket).is_some_and(|it| !it.has_ended);
+                let runs = |ticket: &ActionHandle| {
+                    self.started.get(ticket).is_some_and(|it| !it.has_ended)
+                };
                 ticket.filter(runs).map(Command::Cancel)
             }
             Some(what @ ("wait" | "look")) => {
@@ -117,7 +119,7 @@ impl World {
                     .and_then(number)
                     .filter(|_| what == "wait");
                 let number = message.get("question").cloned().unwrap_or(Value::Null);
-                self.question = Some(Question { number, until });
+                self.pending_wait = Some(PendingWait { number, until });
                 None
             }
             _ => None,
@@ -127,9 +129,9 @@ impl World {
     fn greet(&mut self, message: &serde_json::Map<String, Value>, said: &mut Vec<String>) {
         let versions = message.get("versions").and_then(Value::as_array);
         if versions.is_some_and(|all| all.iter().any(|it| it.as_u64() == Some(2))) {
-            self.speaks = 2;
+            self.protocol_version = 2;
             let mut can = vec!["cancel", "feedback"];
-            if self.is_following {
+            if self.reports_beliefs {
                 can.extend(["facts", "beliefs"]);
             }
             said.push(
@@ -149,7 +151,7 @@ impl World {
         ticket: Option<u64>,
         message: &serde_json::Map<String, Value>,
     ) -> Option<Action> {
-        let ticket = ticket.filter(|it| !self.begun.contains_key(it))?;
+        let ticket = ticket.filter(|it| !self.started.contains_key(it))?;
         let text = message.get("action").and_then(Value::as_str)?;
         let mut words = text
             .trim_matches(|it: char| it == '(' || it == ')' || it.is_whitespace())
@@ -161,67 +163,67 @@ impl World {
             arguments: words.collect(),
             is_instantaneous: message.get("duration").is_none_or(Value::is_null),
         };
-        let begun = Begun {
+        let begun = StartedAction {
             is_instantaneous: action.is_instantaneous,
             has_started: false,
             has_ended: false,
         };
-        self.begun.insert(ticket, begun);
+        self.started.insert(ticket, begun);
         Some(action)
     }
 
     /// Takes a report about an action. Each start and each end is reported once, in this order.
-    pub fn tell(&mut self, ticket: Ticket, told: &Told, now: Duration) {
+    pub fn report(&mut self, ticket: ActionHandle, told: &ActionUpdate, now: Duration) {
         let time = self.time(now);
-        let speaks = self.speaks;
-        let Some(begun) = self.begun.get_mut(&ticket).filter(|it| !it.has_ended) else {
+        let speaks = self.protocol_version;
+        let Some(begun) = self.started.get_mut(&ticket).filter(|it| !it.has_ended) else {
             return;
         };
         let ended = |outcome: &str| json!({"type": "ended", "ticket": ticket, "time": time, "outcome": outcome});
         let started = json!({"type": "started", "ticket": ticket, "time": time});
         match told {
-            Told::Started => {
+            ActionUpdate::Started => {
                 if !begun.has_started {
                     begun.has_started = true;
                     begun.has_ended = begun.is_instantaneous;
-                    self.news.push(started);
+                    self.pending_reports.push(started);
                 }
                 return;
             }
-            Told::Feedback { completion, note } => {
+            ActionUpdate::Feedback { completion, note } => {
                 // Version 1 has no feedback.
                 if speaks >= 2 {
                     let part = completion
                         .is_finite()
                         .then(|| f64::from(*completion).clamp(0.0, 1.0));
-                    self.news.push(json!({"type": "feedback", "ticket": ticket, "time": time, "completion": part, "note": note}));
+                    self.pending_reports.push(json!({"type": "feedback", "ticket": ticket, "time": time, "completion": part, "note": note}));
                 }
                 return;
             }
-            Told::Succeeded => {
+            ActionUpdate::Succeeded => {
                 if !begun.has_started {
-                    self.news.push(started);
+                    self.pending_reports.push(started);
                 }
-                self.news.push(ended("succeeded"));
+                self.pending_reports.push(ended("succeeded"));
             }
-            Told::Cancelled => self.news.push(ended("cancelled")),
-            Told::Failed(why) => {
+            ActionUpdate::Cancelled => self.pending_reports.push(ended("cancelled")),
+            ActionUpdate::Failed(why) => {
                 let mut report = ended("failed");
                 report["why"] = json!(why);
-                self.news.push(report);
+                self.pending_reports.push(report);
             }
         }
         begun.has_ended = true;
     }
 
     /// Takes a change that others have made.
-    pub fn see(&mut self, seen: &Seen, now: Duration) {
+    pub fn report_change(&mut self, seen: &ExternalChange, now: Duration) {
         let time = self.time(now);
-        self.news.push(match seen {
-            Seen::Fact(fact, becomes) => {
+        self.pending_reports.push(match seen {
+            ExternalChange::Fact(fact, becomes) => {
                 json!({"type": "fact", "fact": fact, "becomes": becomes, "time": time})
             }
-            Seen::Value(fluent, value) => {
+            ExternalChange::Value(fluent, value) => {
                 json!({"type": "value", "fluent": fluent, "value": value, "time": time})
             }
         });
@@ -232,12 +234,16 @@ impl World {
         if self.due_in(now) != Some(Duration::ZERO) {
             return Vec::new();
         }
-        let Some(question) = self.question.take() else {
+        let Some(question) = self.pending_wait.take() else {
             return Vec::new();
         };
-        let mut lines: Vec<_> = self.news.drain(..).map(|it| it.to_string()).collect();
+        let mut lines: Vec<_> = self
+            .pending_reports
+            .drain(..)
+            .map(|it| it.to_string())
+            .collect();
         let mut time = json!({"type": "time", "now": self.time(now)});
-        if self.speaks >= 2 && !question.number.is_null() {
+        if self.protocol_version >= 2 && !question.number.is_null() {
             time["question"] = question.number;
         }
         lines.push(time.to_string());
@@ -247,11 +253,11 @@ impl World {
     /// Returns the real time until the answer to the open question is due if nothing happens, or
     /// `None` if no question is open.
     pub fn due_in(&self, now: Duration) -> Option<Duration> {
-        let question = self.question.as_ref()?;
+        let question = self.pending_wait.as_ref()?;
         let left = question
             .until
             .map_or(0.0, |until| (until - self.time(now)) / self.speed);
-        Some(if !self.news.is_empty() || left <= 0.0 {
+        Some(if !self.pending_reports.is_empty() || left <= 0.0 {
             Duration::ZERO
         } else {
             // Rounded up, so that the time limit has passed. At most a year.
@@ -260,8 +266,8 @@ impl World {
     }
 
     /// Returns the tickets of the running actions.
-    pub fn running(&self) -> Vec<Ticket> {
-        let open = self.begun.iter().filter(|(_, it)| !it.has_ended);
+    pub fn running(&self) -> Vec<ActionHandle> {
+        let open = self.started.iter().filter(|(_, it)| !it.has_ended);
         open.map(|(ticket, _)| *ticket).collect()
     }
 
@@ -273,7 +279,7 @@ impl World {
     }
 }
 
-fn believed(message: &serde_json::Map<String, Value>) -> Command {
+fn belief_command(message: &serde_json::Map<String, Value>) -> Command {
     let entries = |name: &str| message.get(name).and_then(Value::as_object);
     let facts = entries("facts").into_iter().flatten();
     let values = entries("values").into_iter().flatten();

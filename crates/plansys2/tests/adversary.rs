@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use elbowroom_plansys2::message::{ActionExecution, ActionPerformerStatus, kind, state};
-use elbowroom_plansys2::{Action, Effect, Hub, Ticket, Told};
+use elbowroom_plansys2::{Action, ActionHandle, ActionUpdate, Effect, Hub};
 use rand::{Rng as _, SeedableRng as _, seq::IndexedRandom as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -39,13 +39,13 @@ struct Performer {
     name: String,
     action: &'static str,
     promised: bool,
-    doing: Option<(ActionExecution, u64)>,
+    running: Option<(ActionExecution, u64)>,
     is_dead: bool,
     is_deaf: bool,
 }
 
 /// Fault rates of the network and the performers in a run.
-struct Misery {
+struct FaultRates {
     loss: f64,
     doubling: f64,
     delay: u64,
@@ -55,7 +55,7 @@ struct Misery {
 
 struct Adversary {
     rng: ChaCha8Rng,
-    misery: Misery,
+    misery: FaultRates,
     performers: Vec<Performer>,
     flying: Vec<(u64, Packet)>,
 }
@@ -63,7 +63,7 @@ struct Adversary {
 impl Adversary {
     fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let misery = Misery {
+        let misery = FaultRates {
             loss: rng.random_range(0.0..0.4),
             doubling: rng.random_range(0.0..0.3),
             delay: rng.random_range(1..4_000),
@@ -74,7 +74,7 @@ impl Adversary {
             name: format!("robot{number}"),
             action: ["move", "pick", "move", "beep", "pick"][number],
             promised: false,
-            doing: None,
+            running: None,
             is_dead: false,
             is_deaf: rng.random_bool(0.2),
         });
@@ -107,23 +107,23 @@ impl Adversary {
     }
 
     /// Delivers a message of the executor to the performers.
-    fn told(&mut self, message: &ActionExecution, now: u64) {
+    fn deliver(&mut self, message: &ActionExecution, now: u64) {
         let mut said = vec![];
         for it in self.performers.iter_mut().filter(|it| !it.is_dead) {
             let is_its = message.node_id == it.name;
             match message.kind {
                 kind::REQUEST
-                    if message.action == it.action && it.doing.is_none() && !it.promised =>
+                    if message.action == it.action && it.running.is_none() && !it.promised =>
                 {
                     it.promised = true;
                     said.push(said_by(&it.name, kind::RESPONSE, message));
                 }
-                kind::CONFIRM if is_its && it.doing.is_none() => {
+                kind::CONFIRM if is_its && it.running.is_none() => {
                     it.promised = false;
-                    it.doing = Some((message.clone(), now + self.rng.random_range(100..12_000)));
+                    it.running = Some((message.clone(), now + self.rng.random_range(100..12_000)));
                 }
                 kind::REJECT if is_its => it.promised = false,
-                kind::CANCEL if is_its && !it.is_deaf => it.doing = None,
+                kind::CANCEL if is_its && !it.is_deaf => it.running = None,
                 _ => {}
             }
         }
@@ -141,15 +141,15 @@ impl Adversary {
                 continue;
             }
             if now > 2_000 && self.rng.random_bool(self.misery.death) {
-                (it.is_dead, it.promised, it.doing) = (true, false, None);
+                (it.is_dead, it.promised, it.running) = (true, false, None);
                 continue;
             }
             // A performer whose offer is never answered would be blocked forever. PlanSys2 has no
             // time-out for offers, but a rejection may be lost here.
             it.promised &= !self.rng.random_bool(0.01);
-            if let Some((action, until)) = it.doing.clone() {
+            if let Some((action, until)) = it.running.clone() {
                 if now >= until {
-                    it.doing = None;
+                    it.running = None;
                     let mut finish = said_by(&it.name, kind::FINISH, &action);
                     finish.success = self.rng.random_bool(0.8);
                     said.push(Packet::ToHub(finish));
@@ -158,7 +158,7 @@ impl Adversary {
                 }
             }
             if now.is_multiple_of(1_000) {
-                let is_running = it.doing.is_some();
+                let is_running = it.running.is_some();
                 said.push(Packet::Status(ActionPerformerStatus {
                     state: if is_running {
                         state::RUNNING
@@ -188,22 +188,22 @@ fn said_by(name: &str, kind: i16, about: &ActionExecution) -> ActionExecution {
 
 /// Known events of a start.
 #[derive(Debug, Default)]
-struct Course {
+struct ActionHistory {
     confirmed: Option<String>,
     has_started: bool,
-    outcome: Option<Told>,
+    outcome: Option<ActionUpdate>,
 }
 
 /// Checks the outputs of the hub.
 #[derive(Default)]
-struct Judge {
-    names: BTreeMap<Ticket, String>,
-    courses: BTreeMap<Ticket, Course>,
+struct OutputChecker {
+    names: BTreeMap<ActionHandle, String>,
+    courses: BTreeMap<ActionHandle, ActionHistory>,
     /// Running start of each ground action.
-    open: BTreeMap<String, Ticket>,
+    open: BTreeMap<String, ActionHandle>,
 }
 
-impl Judge {
+impl OutputChecker {
     fn sent(&mut self, message: &ActionExecution) {
         let name = joined(&message.action, &message.arguments);
         if message.kind == kind::CONFIRM {
@@ -220,17 +220,17 @@ impl Judge {
         }
     }
 
-    fn told(&mut self, ticket: Ticket, told: Told) {
+    fn check_update(&mut self, ticket: ActionHandle, told: ActionUpdate) {
         let course = self.courses.get_mut(&ticket).expect("it was begun");
         assert_eq!(course.outcome, None, "after its outcome: {told:?}");
         match told {
-            Told::Started => {
+            ActionUpdate::Started => {
                 assert!(!course.has_started && course.confirmed.is_some());
                 course.has_started = true;
             }
-            Told::Feedback { .. } => assert!(course.has_started),
+            ActionUpdate::Feedback { .. } => assert!(course.has_started),
             outcome => {
-                assert!(course.has_started || outcome != Told::Succeeded);
+                assert!(course.has_started || outcome != ActionUpdate::Succeeded);
                 course.outcome = Some(outcome);
                 self.open.retain(|_, it| *it != ticket);
             }
@@ -246,7 +246,7 @@ fn joined(name: &str, arguments: &[String]) -> String {
 fn run(seed: u64) -> BTreeMap<&'static str, u64> {
     let mut adversary = Adversary::new(seed);
     let mut hub = Hub::new("elbowroom");
-    let mut judge = Judge::default();
+    let mut judge = OutputChecker::default();
     for it in 0..adversary.performers.len() {
         // Each performer has reported once. `docs/plansys2.md` describes the behaviour for unknown
         // ones.
@@ -267,7 +267,7 @@ fn run(seed: u64) -> BTreeMap<&'static str, u64> {
         for packet in adversary.landed(now) {
             let answered = match &packet {
                 Packet::ToPerformers(message) => {
-                    adversary.told(message, now);
+                    adversary.deliver(message, now);
                     None
                 }
                 Packet::Status(status) => {
@@ -305,13 +305,13 @@ fn run(seed: u64) -> BTreeMap<&'static str, u64> {
             .as_ref()
             .unwrap_or_else(|| panic!("{ticket}, {:?}: {course:?}", judge.names[ticket]));
         let end = match outcome {
-            Told::Succeeded => "succeeded",
-            Told::Cancelled => "cancelled",
-            Told::Failed(why) if why.contains("no performer answered") => "unanswered",
-            Told::Failed(why) if why.contains("is lost") => "lost",
-            Told::Failed(why) if why.contains("does nothing") => "idle",
-            Told::Failed(why) if why.contains("same action") => "twice",
-            Told::Failed(_) => "failed",
+            ActionUpdate::Succeeded => "succeeded",
+            ActionUpdate::Cancelled => "cancelled",
+            ActionUpdate::Failed(why) if why.contains("no performer answered") => "unanswered",
+            ActionUpdate::Failed(why) if why.contains("is lost") => "lost",
+            ActionUpdate::Failed(why) if why.contains("does nothing") => "idle",
+            ActionUpdate::Failed(why) if why.contains("same action") => "twice",
+            ActionUpdate::Failed(_) => "failed",
             other => panic!("{other:?} is no end"),
         };
         *ends.entry(end).or_default() += 1;
@@ -320,14 +320,14 @@ fn run(seed: u64) -> BTreeMap<&'static str, u64> {
 }
 
 /// Begins or cancels a random action now and then, as the executor.
-fn act(adversary: &mut Adversary, hub: &mut Hub, judge: &mut Judge, now: u64) {
+fn act(adversary: &mut Adversary, hub: &mut Hub, judge: &mut OutputChecker, now: u64) {
     let rng = &mut adversary.rng;
     if now < BUSY && rng.random_bool(0.1) {
         let (name, arguments) = *ACTIONS.choose(rng).expect("some");
         let arguments: Vec<_> = arguments.iter().map(|&it| it.to_owned()).collect();
-        let ticket = judge.courses.len() as Ticket + 1;
+        let ticket = judge.courses.len() as ActionHandle + 1;
         let full = joined(name, &arguments);
-        judge.courses.insert(ticket, Course::default());
+        judge.courses.insert(ticket, ActionHistory::default());
         judge.open.entry(full.clone()).or_insert(ticket);
         judge.names.insert(ticket, full);
         let action = Action {
@@ -349,7 +349,7 @@ fn act(adversary: &mut Adversary, hub: &mut Hub, judge: &mut Judge, now: u64) {
 fn settle(
     adversary: &mut Adversary,
     hub: &mut Hub,
-    judge: &mut Judge,
+    judge: &mut OutputChecker,
     now: u64,
 ) -> Vec<ActionExecution> {
     let mut sent = vec![];
@@ -360,7 +360,7 @@ fn settle(
                 adversary.fly(&Packet::ToPerformers(message.clone()), now);
                 sent.push(message);
             }
-            Effect::Tell(ticket, told) => judge.told(ticket, told),
+            Effect::Report(ticket, told) => judge.check_update(ticket, told),
             Effect::Remark(text) => panic!("nobody else asks: {text}"),
         }
     }
@@ -368,7 +368,7 @@ fn settle(
 }
 
 #[test]
-fn whatever_peers_do_nothing_begins_twice_and_everything_ends_once() {
+fn each_action_starts_and_ends_once_under_faults() {
     let mut ends = BTreeMap::new();
     let given = std::env::var("ELBOWROOM_BAD_PEERS");
     let runs = given.map_or(RUNS, |it| {
@@ -398,6 +398,6 @@ fn whatever_peers_do_nothing_begins_twice_and_everything_ends_once() {
 }
 
 #[test]
-fn the_same_peers_lead_to_the_same_ends() {
+fn same_seed_gives_same_outcomes() {
     assert_eq!(run(17), run(17));
 }

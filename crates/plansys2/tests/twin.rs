@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use elbowroom_plansys2::message::{ActionExecution, ActionPerformerStatus};
-use elbowroom_plansys2::{Action, Effect, Hub, Told};
+use elbowroom_plansys2::{Action, ActionUpdate, Effect, Hub};
 use rand::{Rng as _, SeedableRng as _, seq::IndexedRandom as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -132,14 +132,14 @@ fn written(effect: Effect, names: &[String]) -> Value {
             it.node_id
         ]),
         Effect::Remark(text) => panic!("nobody else speaks in these scripts: {text}"),
-        Effect::Tell(ticket, told) => {
+        Effect::Report(ticket, told) => {
             let name = &names[usize::try_from(ticket).expect("small")];
             match told {
-                Told::Started => json!([name, "tell", ticket, "started"]),
-                Told::Succeeded => json!([name, "tell", ticket, "succeeded"]),
-                Told::Cancelled => json!([name, "tell", ticket, "cancelled"]),
-                Told::Failed(why) => json!([name, "tell", ticket, "failed", why]),
-                Told::Feedback { completion, note } => {
+                ActionUpdate::Started => json!([name, "tell", ticket, "started"]),
+                ActionUpdate::Succeeded => json!([name, "tell", ticket, "succeeded"]),
+                ActionUpdate::Cancelled => json!([name, "tell", ticket, "cancelled"]),
+                ActionUpdate::Failed(why) => json!([name, "tell", ticket, "failed", why]),
+                ActionUpdate::Feedback { completion, note } => {
                     json!([name, "tell", ticket, "feedback", completion, note])
                 }
             }
@@ -181,7 +181,7 @@ fn played_by_python(scripts: &[Vec<Value>]) -> Option<Vec<Vec<Vec<Value>>>> {
 }
 
 #[test]
-fn the_hub_does_what_that_of_the_example_does() {
+fn hub_agrees_with_python_example() {
     let scripts: Vec<_> = (0..SCRIPTS).map(script).collect();
     let Some(theirs) = played_by_python(&scripts) else {
         return skipping::skipped("there is no python3");

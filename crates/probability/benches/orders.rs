@@ -9,10 +9,10 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use elbowroom_plan::NodeId;
-use elbowroom_probability::dispatch::patient;
+use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::likelihoods::read;
 use elbowroom_probability::{
-    Circumstances, Model, OrderSearch, PrunedNetwork, SearchSettings, Semantics,
+    Model, OrderSearch, PrunedNetwork, SearchSettings, SearchState, Semantics,
 };
 
 fn main() {
@@ -21,7 +21,7 @@ fn main() {
 
 /// Returns a plan that screws in `count` lamps, in any order and also simultaneously. Unless
 /// `are_alike`, the lamps become loose with different probabilities.
-fn lamps(count: usize, are_alike: bool) -> (Model, Circumstances) {
+fn lamps(count: usize, are_alike: bool) -> (Model, SearchState) {
     let domain =
         "(define (domain lamps) (:types lamp) (:predicates (whole ?l - lamp) (lit ?l - lamp))
         (:durative-action screw :parameters (?l - lamp) :duration (= ?duration 1)
@@ -63,7 +63,7 @@ fn lamps(count: usize, are_alike: bool) -> (Model, Circumstances) {
 }
 
 /// Returns a plan that cleans `count` rooms one after the other and moves between them.
-fn rooms(count: usize) -> (Model, Circumstances) {
+fn rooms(count: usize) -> (Model, SearchState) {
     let domain = "(define (domain rooms) (:types room)
         (:predicates (in ?r - room) (open ?r - room) (clean ?r - room))
         (:durative-action sweep :parameters (?r - room) :duration (= ?duration 2)
@@ -97,18 +97,18 @@ fn rooms(count: usize) -> (Model, Circumstances) {
     model(domain, &problem, &plan, likelihoods)
 }
 
-fn model(domain: &str, problem: &str, plan: &str, likelihoods: &str) -> (Model, Circumstances) {
+fn model(domain: &str, problem: &str, plan: &str, likelihoods: &str) -> (Model, SearchState) {
     let (task, plan) = shared::read_task(domain, problem, plan);
     let likelihoods = read(likelihoods.as_bytes(), &task).expect("well-formed");
-    let initial = Circumstances::initial(&task);
+    let initial = SearchState::initial(&task);
     let model = Model::new(Arc::new(task), plan, &likelihoods, Semantics::Paper);
     (model.expect("complete"), initial)
 }
 
-fn first_order(bencher: divan::Bencher<'_, '_>, model: &Model, initial: &Circumstances) {
+fn first_order(bencher: divan::Bencher<'_, '_>, model: &Model, initial: &SearchState) {
     bencher
         .with_inputs(|| OrderSearch::new(model.clone(), SearchSettings::default()))
-        .bench_local_refs(|search| search.best_order(initial, &mut patient));
+        .bench_local_refs(|search| search.best_order(initial, &mut never_interrupt));
 }
 
 #[divan::bench(args = [1, 3, 6, 8, 9])]
@@ -116,7 +116,7 @@ fn sf3(bencher: divan::Bencher<'_, '_>, number: usize) {
     let Some(world) = shared::sf3().into_iter().nth(number - 1) else {
         return;
     };
-    let initial = Circumstances::initial(&world.task);
+    let initial = SearchState::initial(&world.task);
     first_order(bencher, &world.model(Semantics::Paper), &initial);
 }
 
@@ -125,7 +125,7 @@ fn af3(bencher: divan::Bencher<'_, '_>, number: usize) {
     let Some(world) = shared::af3().into_iter().nth(number - 1) else {
         return;
     };
-    let initial = Circumstances::initial(&world.task);
+    let initial = SearchState::initial(&world.task);
     first_order(bencher, &world.model(Semantics::Paper), &initial);
 }
 

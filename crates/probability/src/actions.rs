@@ -31,7 +31,7 @@ pub fn all_actions(task: &Task) -> Result<Vec<Action>, Unsupported> {
 }
 
 /// Limit on the number of facts that may change by themselves.
-const MOST_SPONTANEOUS: usize = 100_000;
+const MAX_SPONTANEOUS: usize = 100_000;
 
 /// Returns all ground actions that can be started in the world of the likelihoods, in the same
 /// order.
@@ -67,7 +67,7 @@ pub fn all_actions_under(
         problem.timed.extend(new.into_iter().map(timed));
         let instances = grounding(&Task::new(problem.clone()))?.instances();
         let actions = of(task, instances)?;
-        new = left_behind(task, &actions, likelihoods);
+        new = failure_changes(task, &actions, likelihoods);
         new.retain(|change| problem.timed.iter().all(|timed| timed.change != *change));
         if new.is_empty() {
             let world = problem.timed.iter().map(|timed| &timed.change);
@@ -90,7 +90,7 @@ fn spontaneous(task: &Task, likelihoods: &Likelihoods) -> Result<Vec<TimedChange
             if becomes_false {
                 changes.push(TimedChange::Delete(id, objects.to_vec()));
             }
-            changes.len() <= MOST_SPONTANEOUS
+            changes.len() <= MAX_SPONTANEOUS
         };
         let is_within_limit = if likelihoods.may_change_any(id) {
             let domains = predicate.parameters.iter();
@@ -105,7 +105,7 @@ fn spontaneous(task: &Task, likelihoods: &Likelihoods) -> Result<Vec<TimedChange
             let name = &predicate.name;
             return Err(Unsupported {
                 what: format!(
-                    "more than {MOST_SPONTANEOUS} facts change by themselves, those of `{name}` among them"
+                    "more than {MAX_SPONTANEOUS} facts change by themselves, those of `{name}` among them"
                 ),
             });
         }
@@ -142,7 +142,7 @@ fn startable<'c>(
     actions: Vec<Action>,
     world: impl Iterator<Item = &'c TimedChange>,
 ) -> Vec<Action> {
-    let mut seen = Seen {
+    let mut seen = PossibleTruths {
         initially: &task.initial().facts,
         changed: BTreeSet::new(),
     };
@@ -160,11 +160,11 @@ fn startable<'c>(
         let before = (seen.changed.len(), starts.iter().filter(|it| **it).count());
         for (action, starts) in actions.iter().zip(&mut starts) {
             match &action.body {
-                Body::Instantaneous(snap) => *starts |= seen.happens(snap),
+                Body::Instantaneous(snap) => *starts |= seen.apply_if_possible(snap),
                 Body::Durative(body) => {
-                    *starts |= seen.happens(&body.start);
+                    *starts |= seen.apply_if_possible(&body.start);
                     if *starts {
-                        seen.happens(&body.end);
+                        seen.apply_if_possible(&body.end);
                     }
                 }
             }
@@ -180,14 +180,14 @@ fn startable<'c>(
 }
 
 /// Possible truth values of facts.
-struct Seen<'t> {
+struct PossibleTruths<'t> {
     initially: &'t BTreeSet<FactId>,
     changed: BTreeSet<(FactId, bool)>,
 }
 
-impl Seen<'_> {
+impl PossibleTruths<'_> {
     /// Adds the effects of a snap action if it is possible, and returns whether it is.
-    fn happens(&mut self, snap: &SnapAction) -> bool {
+    fn apply_if_possible(&mut self, snap: &SnapAction) -> bool {
         let is_possible = self.allows(&snap.condition, true);
         if is_possible {
             let effects = snap.effects.iter();
@@ -219,13 +219,13 @@ impl Seen<'_> {
 }
 
 /// Returns the possible changes of facts by failures of these actions.
-fn left_behind(task: &Task, actions: &[Action], likelihoods: &Likelihoods) -> Vec<TimedChange> {
+fn failure_changes(task: &Task, actions: &[Action], likelihoods: &Likelihoods) -> Vec<TimedChange> {
     let mut left = Vec::new();
     for action in actions {
-        if likelihoods.lasts(action, 1.0) >= 1.0 {
+        if likelihoods.success_probability(action, 1.0) >= 1.0 {
             continue;
         }
-        for aftermath in likelihoods.aftermaths(task, action) {
+        for aftermath in likelihoods.failure_outcomes(task, action) {
             for (fact, becomes) in aftermath.changes {
                 let (predicate, objects) = task.atom(fact);
                 let change = if becomes {
@@ -244,7 +244,7 @@ fn left_behind(task: &Task, actions: &[Action], likelihoods: &Likelihoods) -> Ve
 
 fn check(task: &Task) -> Result<(), Unsupported> {
     let refuse = |what: String| Err(Unsupported { what });
-    if let Some(feature) = task.only_judged() {
+    if let Some(feature) = task.validator_only_feature() {
         return refuse(format!("the problem has {feature}"));
     }
     if !task.timed().is_empty() {

@@ -10,8 +10,8 @@
 //! less: for an end, that its action is running. But then the executor could continue an order
 //! after the end of an action that is still running, which would never be ended.)
 
-mod demands;
-mod following;
+mod layer_requirements;
+mod order_tracking;
 
 use std::ops::ControlFlow;
 
@@ -19,12 +19,12 @@ use elbowroom_model::ground::Expression;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use crate::circumstances::Circumstances;
 use crate::model::evaluate;
 use crate::network::{Happenings, TooCoupled};
 use crate::search::{OrderSearch, Progress};
+use crate::search_state::SearchState;
 use crate::total_order::{Slot, TotalOrderPlan};
-use following::Following;
+use order_tracking::OrderTracker;
 
 /// Next step of an order's execution.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,9 +75,9 @@ pub struct LayerDispatch {
     reconsider: Reconsider,
     order: Option<TotalOrderPlan>,
     /// Number of timed initials before the order's beginning.
-    passed: usize,
+    passed_timed: usize,
     /// Cached data of the order, created on first use.
-    following: Option<Following>,
+    tracker: Option<OrderTracker>,
 }
 
 impl LayerDispatch {
@@ -87,8 +87,8 @@ impl LayerDispatch {
             search,
             reconsider,
             order: None,
-            passed: 0,
-            following: None,
+            passed_timed: 0,
+            tracker: None,
         }
     }
 
@@ -106,7 +106,7 @@ impl LayerDispatch {
     /// Drops the current order, so that the next choice comes from a new search.
     pub fn drop_order(&mut self) {
         self.order = None;
-        self.following = None;
+        self.tracker = None;
     }
 
     /// Returns the search.
@@ -120,7 +120,7 @@ impl LayerDispatch {
     /// When a condition couples too many uncertain facts.
     pub fn choose(
         &mut self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Choice, TooCoupled> {
         if circumstances.running.is_empty() && self.holds_goal(circumstances) {
@@ -137,17 +137,18 @@ impl LayerDispatch {
         } else if self.reconsider == Reconsider::WhenNoLayerFits
             && let Some(order) = &self.order
         {
-            let new = || Following::new(&self.search, order, self.passed);
-            let following = self.following.get_or_insert_with(new);
-            if let Some((position, slot)) = following.lattermost(&self.search, order, circumstances)
+            let new = || OrderTracker::new(&self.search, order, self.passed_timed);
+            let following = self.tracker.get_or_insert_with(new);
+            if let Some((position, slot)) =
+                following.last_fitting_layer(&self.search, order, circumstances)
             {
                 return Ok(next(order, position, slot, false));
             }
         }
         let found = self.search.best_order(circumstances, watch)?;
         self.order = found.order;
-        self.passed = self.search.timed_passed(&circumstances.now);
-        self.following = None;
+        self.passed_timed = self.search.passed_timed_count(&circumstances.now);
+        self.tracker = None;
         let Some(order) = &self.order else {
             return Ok(Choice::Replan);
         };
@@ -159,14 +160,14 @@ impl LayerDispatch {
         }
     }
 
-    fn holds_goal(&self, circumstances: &Circumstances) -> bool {
+    fn holds_goal(&self, circumstances: &SearchState) -> bool {
         self.search.is_goal_settled(&circumstances.now)
             && goal_holds(self.search.model(), circumstances)
     }
 }
 
 /// Returns `true` if the goal holds in the most likely state.
-pub fn goal_holds(model: &crate::Model, circumstances: &Circumstances) -> bool {
+pub fn goal_holds(model: &crate::Model, circumstances: &SearchState) -> bool {
     let truth = |fact| circumstances.belief.probability(fact) >= 0.5;
     let value = |leaf: &Expression| circumstances.value(leaf);
     let task = model.task();
@@ -182,7 +183,7 @@ pub fn goal_holds(model: &crate::Model, circumstances: &Circumstances) -> bool {
 pub fn lattermost_layer(
     search: &OrderSearch,
     order: &TotalOrderPlan,
-    circumstances: &Circumstances,
+    circumstances: &SearchState,
 ) -> Option<(usize, Slot)> {
     (0..order.sequence.len()).rev().find_map(|position| {
         let happened = |node: &NodeId| has_just_happened(search, *node, circumstances);
@@ -191,14 +192,14 @@ pub fn lattermost_layer(
         {
             return None;
         }
-        let rest = Happenings::from(order).rest(position);
+        let rest = Happenings::from(order).suffix(position);
         let slots = search.windows_of(circumstances, rest)?;
         slots.into_iter().next().map(|slot| (position, slot))
     })
 }
 
 /// Returns `true` if a happening is at this moment.
-fn has_just_happened(search: &OrderSearch, node: NodeId, circumstances: &Circumstances) -> bool {
+fn has_just_happened(search: &OrderSearch, node: NodeId, circumstances: &SearchState) -> bool {
     let now = &circumstances.now;
     let mut recent = circumstances.recent.iter();
     let mut running = circumstances.running.iter();
@@ -225,7 +226,7 @@ fn next(order: &TotalOrderPlan, position: usize, slot: Slot, is_new_order: bool)
 }
 
 /// Never interrupts a search; a callback.
-pub fn patient(_: &Progress) -> ControlFlow<()> {
+pub fn never_interrupt(_: &Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 

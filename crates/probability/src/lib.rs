@@ -8,7 +8,7 @@
 //!    changes that failures leave behind; read from files by [`likelihoods`].
 //! 2. [`Model`]: a plan's happenings as steps of a stochastic process.
 //! 3. [`PrunedNetwork`]: P(A) and P(A ∩ G) of an order, happening by happening.
-//! 4. [`OrderSearch`] (`PGen`): the best order, from [`Circumstances`].
+//! 4. [`OrderSearch`] (`PGen`): the best order, from [`SearchState`].
 //! 5. [`LayerDispatch`] (`PExec`): the next happening, in the present state.
 //! 6. [`account`]: where an order's probability is lost, and the gains of certainty and retrying;
 //!    [`search::Lattice`]: all orders of a short plan at once.
@@ -63,24 +63,24 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod account;
 mod actions;
 mod belief;
-mod circumstances;
 pub mod dispatch;
 pub mod likelihoods;
+pub mod loss_analysis;
 mod model;
 mod network;
 pub mod optimum;
 pub mod search;
+mod search_state;
 mod total_order;
 
 pub use actions::{Unsupported, all_actions, all_actions_under};
 pub use belief::Belief;
-pub use circumstances::{Circumstances, Running};
 pub use dispatch::{Choice, LayerDispatch, NextHappening, Reconsider};
-pub use likelihoods::{Flip, Likelihoods, Rate};
+pub use likelihoods::{Likelihoods, Rate, SpontaneousChange};
 pub use model::{Model, Semantics};
 pub use network::{Happenings, Loss, LossCause, PrunedNetwork, Reading, TooCoupled};
-pub use search::{Candidates, Found, OrderSearch, SearchSettings, SearchStop};
+pub use search::{Candidates, OrderSearch, SearchResult, SearchSettings, SearchStop};
+pub use search_state::{Running, SearchState};
 pub use total_order::{Layer, Slot, TotalOrderPlan};

@@ -1,9 +1,9 @@
 //! Probabilities of failures and spontaneous changes: [`Likelihoods`].
 
-mod authors;
-mod failing;
+mod failure_model;
 mod file;
 mod names;
+mod olisipo_format;
 mod write;
 
 use std::collections::BTreeMap;
@@ -16,8 +16,8 @@ use elbowroom_text::{Diagnostics, Source};
 
 use crate::belief::Belief;
 
-pub use authors::read as read_authors;
-pub use failing::{Aftermath, Argument, Failing, Outcome, OutcomeChange};
+pub use failure_model::{Argument, FailureModel, FailureOutcome, Outcome, OutcomeChange};
+pub use olisipo_format::read as read_authors;
 pub use write::write;
 
 /// Reads a likelihood file, in Elbowroom's format or in that of Olisipo's authors. The authors'
@@ -29,7 +29,7 @@ pub use write::write;
 pub fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagnostics> {
     let source = source.into();
     if source.text().lines().any(|line| line.trim() == "-") {
-        authors::read(source, task)
+        olisipo_format::read(source, task)
     } else {
         file::read(source, task)
     }
@@ -37,14 +37,14 @@ pub fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagn
 
 /// Probabilities of a spontaneous change of a fact in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Flip {
+pub struct SpontaneousChange {
     /// Probability that it becomes true, if it is false.
     pub becomes_true: f64,
     /// Probability that it becomes false, if it is true.
     pub becomes_false: f64,
 }
 
-impl Flip {
+impl SpontaneousChange {
     /// A fact that never changes by itself.
     pub const NEVER: Self = Self {
         becomes_true: 0.0,
@@ -76,7 +76,7 @@ impl Rate {
 
     /// Returns the probabilities of being true `seconds` later, if it is true now and if it is
     /// false now.
-    pub fn later(self, seconds: f64) -> (f64, f64) {
+    pub fn probabilities_after(self, seconds: f64) -> (f64, f64) {
         let sum = self.becomes_true + self.becomes_false;
         if sum <= 0.0 {
             return (1.0, 0.0);
@@ -87,7 +87,7 @@ impl Rate {
     }
 
     /// Returns the probability that it does not change for `seconds`.
-    pub fn lasting(self, truth: bool, seconds: f64) -> f64 {
+    pub fn unchanged_probability(self, truth: bool, seconds: f64) -> f64 {
         let away = if truth {
             self.becomes_false
         } else {
@@ -107,7 +107,7 @@ pub struct Success {
     /// The same for effects that make facts false, if it differs.
     pub deletions: BTreeMap<PredicateId, f64>,
     /// Failures after its start.
-    pub failing: Failing,
+    pub failing: FailureModel,
 }
 
 /// Default probabilities, used without a more specific entry.
@@ -126,12 +126,12 @@ pub struct Defaults {
     /// For effects.
     pub effect: Option<f64>,
     /// For failures of actions after their start.
-    pub failing: Failing,
+    pub failing: FailureModel,
 }
 
 /// Parts of a [`Flip`] and of a [`Rate`] that an entry contains.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PartialFlip {
+pub struct PartialChange {
     /// See [`Flip::becomes_true`].
     pub becomes_true: Option<f64>,
     /// See [`Flip::becomes_false`].
@@ -142,7 +142,7 @@ pub struct PartialFlip {
     pub becomes_false_per_second: Option<f64>,
 }
 
-impl PartialFlip {
+impl PartialChange {
     /// Entry for facts that never change by themselves.
     pub(crate) const NEVER: Self = Self {
         becomes_true: Some(0.0),
@@ -164,9 +164,9 @@ pub struct Likelihoods {
     /// Defaults.
     pub defaults: Defaults,
     /// By predicate.
-    pub predicates: BTreeMap<PredicateId, PartialFlip>,
+    pub predicates: BTreeMap<PredicateId, PartialChange>,
     /// By ground fact.
-    pub facts: BTreeMap<(PredicateId, Vec<ObjectId>), PartialFlip>,
+    pub facts: BTreeMap<(PredicateId, Vec<ObjectId>), PartialChange>,
     /// By schema.
     pub schemas: BTreeMap<SchemaId, Success>,
     /// By ground action.
@@ -202,7 +202,7 @@ impl Likelihoods {
     ///
     /// A fact that neither an action nor the goal mentions has no number in the task, and is
     /// irrelevant.
-    pub fn believed(&self, task: &Task) -> Vec<(FactId, f64)> {
+    pub fn uncertain_facts(&self, task: &Task) -> Vec<(FactId, f64)> {
         let known = self
             .beliefs
             .iter()
@@ -216,21 +216,30 @@ impl Likelihoods {
     ///
     /// # Errors
     /// When there is no entry.
-    pub fn flip(&self, task: &Task, fact: FactId) -> Result<Flip, Missing> {
+    pub fn spontaneous_change(
+        &self,
+        task: &Task,
+        fact: FactId,
+    ) -> Result<SpontaneousChange, Missing> {
         let (predicate, arguments) = task.atom(fact);
-        self.flip_of(predicate, &arguments).ok_or_else(|| Missing {
-            what: task.fact_name(fact),
-        })
+        self.spontaneous_change_of(predicate, &arguments)
+            .ok_or_else(|| Missing {
+                what: task.fact_name(fact),
+            })
     }
 
-    pub(crate) fn flip_of(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<Flip> {
-        let said = self.said_of(predicate, arguments);
+    pub(crate) fn spontaneous_change_of(
+        &self,
+        predicate: PredicateId,
+        arguments: &[ObjectId],
+    ) -> Option<SpontaneousChange> {
+        let said = self.merged_entry(predicate, arguments);
         // With a rate per second, the probability per step is optional and defaults to 0.
         let by_time = |rate: Option<f64>| rate.map(|_| 0.0);
         let up = said.becomes_true.or(self.defaults.becomes_true);
         let down = said.becomes_false.or(self.defaults.becomes_false);
         let (up_by_time, down_by_time) = self.rates_of(said);
-        Some(Flip {
+        Some(SpontaneousChange {
             becomes_true: up.or(by_time(up_by_time))?,
             becomes_false: down.or(by_time(down_by_time))?,
         })
@@ -242,7 +251,7 @@ impl Likelihoods {
         predicate: PredicateId,
         arguments: &[ObjectId],
     ) -> (bool, bool) {
-        self.possible_changes(self.said_of(predicate, arguments))
+        self.possible_changes(self.merged_entry(predicate, arguments))
     }
 
     /// Returns `true` if facts of the predicate without an entry of their own may change by themselves.
@@ -252,7 +261,7 @@ impl Likelihoods {
         becomes_true || becomes_false
     }
 
-    fn possible_changes(&self, said: PartialFlip) -> (bool, bool) {
+    fn possible_changes(&self, said: PartialChange) -> (bool, bool) {
         let some = |p: Option<f64>| p.is_some_and(|p| p > 0.0);
         let (up, down) = self.rates_of(said);
         (
@@ -264,7 +273,7 @@ impl Likelihoods {
     /// Returns the rates of spontaneous changes of a fact, per second; 0 without an entry.
     pub fn rate(&self, task: &Task, fact: FactId) -> Rate {
         let (predicate, arguments) = task.atom(fact);
-        let (up, down) = self.rates_of(self.said_of(predicate, &arguments));
+        let (up, down) = self.rates_of(self.merged_entry(predicate, &arguments));
         Rate {
             becomes_true: up.unwrap_or(0.0),
             becomes_false: down.unwrap_or(0.0),
@@ -290,11 +299,11 @@ impl Likelihoods {
     }
 
     /// Returns the merged entries of a fact and of its predicate.
-    fn said_of(&self, predicate: PredicateId, arguments: &[ObjectId]) -> PartialFlip {
+    fn merged_entry(&self, predicate: PredicateId, arguments: &[ObjectId]) -> PartialChange {
         let own = self.facts.get(&(predicate, arguments.to_vec())).copied();
         let own = own.unwrap_or_default();
         let all = self.predicates.get(&predicate).copied().unwrap_or_default();
-        PartialFlip {
+        PartialChange {
             becomes_true: own.becomes_true.or(all.becomes_true),
             becomes_false: own.becomes_false.or(all.becomes_false),
             becomes_true_per_second: own.becomes_true_per_second.or(all.becomes_true_per_second),
@@ -304,7 +313,7 @@ impl Likelihoods {
         }
     }
 
-    fn rates_of(&self, said: PartialFlip) -> (Option<f64>, Option<f64>) {
+    fn rates_of(&self, said: PartialChange) -> (Option<f64>, Option<f64>) {
         let defaults = &self.defaults;
         (
             said.becomes_true_per_second
@@ -370,7 +379,7 @@ impl Likelihoods {
     }
 
     /// Returns `true` if the entries are complete for all instances of a schema with these effects.
-    fn says_enough_of(&self, schema: SchemaId, affected: &[(PredicateId, bool)]) -> bool {
+    fn is_complete_for(&self, schema: SchemaId, affected: &[(PredicateId, bool)]) -> bool {
         let none = Success::default();
         let all = self.schemas.get(&schema).unwrap_or(&none);
         let is_stated = |predicate: &PredicateId, makes_true: bool| {

@@ -15,7 +15,7 @@ use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
 
-use crate::likelihoods::{Flip, Likelihoods, Missing, Rate};
+use crate::likelihoods::{Likelihoods, Missing, Rate, SpontaneousChange};
 
 pub(crate) use requirement::{Requirement, Value, evaluate, visit_facts};
 
@@ -40,7 +40,7 @@ pub struct Model {
     /// Relevant facts, sorted; then one memory for each guard that is read before its effect, with
     /// ids that no task assigns.
     pub(crate) facts: Vec<FactId>,
-    pub(crate) flips: Vec<Flip>,
+    pub(crate) spontaneous_changes: Vec<SpontaneousChange>,
     /// Rates of changes of facts with time.
     pub(crate) rates: Vec<Rate>,
     /// `true` if any rate is above 0, or actions fail with time.
@@ -65,13 +65,13 @@ pub(crate) struct Event {
     pub(crate) failures_per_second: f64,
     /// Possible outcomes of a failure of this end; empty for all other happenings, whose failures
     /// change nothing.
-    pub(crate) aftermaths: Vec<Leftover>,
+    pub(crate) failure_outcomes: Vec<CompiledOutcome>,
     /// `true` for a snap action, after which facts change by themselves.
     pub(crate) is_step: bool,
     /// Conditions from right after this start to the end of its action.
     pub(crate) over_all: Requirement,
     /// Memories that become false when their condition does, from this start to the end.
-    pub(crate) watches: Vec<(usize, Condition)>,
+    pub(crate) guard_memories: Vec<(usize, Condition)>,
     /// Effects on facts, sorted by fact.
     pub(crate) effects: Vec<FactEffect>,
     pub(crate) updates: Vec<Update>,
@@ -96,7 +96,7 @@ pub(crate) struct FactEffect {
 
 /// A possible outcome of a failed end.
 #[derive(Clone, Debug)]
-pub(crate) struct Leftover {
+pub(crate) struct CompiledOutcome {
     /// Probability, given the failure.
     pub(crate) probability: f64,
     /// Facts that are set, each once, sorted.
@@ -150,7 +150,7 @@ impl Model {
         let updates = self.events.iter().flat_map(|event| &event.updates);
         let guards = effects.map(|it| &it.guard);
         let guards = guards.chain(updates.map(|it| &it.guard)).flatten();
-        let watched = self.events.iter().flat_map(|event| &event.watches);
+        let watched = self.events.iter().flat_map(|event| &event.guard_memories);
         for condition in guards.chain(watched.map(|(_, condition)| condition)) {
             visit_facts(&self.task, condition, &mut |fact| {
                 if let Ok(position) = self.facts.binary_search(&fact) {
@@ -158,7 +158,7 @@ impl Model {
                 }
             });
         }
-        for (flip, [needed_false, needed_true]) in self.flips.iter_mut().zip(needed) {
+        for (flip, [needed_false, needed_true]) in self.spontaneous_changes.iter_mut().zip(needed) {
             if needed_true {
                 flip.becomes_true = 0.0;
             }
@@ -203,9 +203,9 @@ impl Model {
 
     /// Returns a failed end as a happening of its own: it has none of its end effects, and the
     /// effects of the failure. Returns `None` if the failure has several possible outcomes.
-    pub(crate) fn failed_end(&self, node: NodeId) -> Option<Event> {
+    pub(crate) fn failed_end_event(&self, node: NodeId) -> Option<Event> {
         let event = self.event(node);
-        let [aftermath] = event.aftermaths.as_slice() else {
+        let [aftermath] = event.failure_outcomes.as_slice() else {
             return None;
         };
         let Node::End(id) = self.plan.nodes[node.index()] else {
@@ -235,7 +235,7 @@ impl Model {
     }
 
     /// Returns the least duration of an action, in seconds.
-    pub(crate) fn shortest(&self, id: InstanceId) -> f64 {
+    pub(crate) fn min_duration(&self, id: InstanceId) -> f64 {
         self.plan.duration(id).0.to_f64()
     }
 
@@ -279,7 +279,7 @@ impl Model {
 
     /// Returns the plan's happenings at their planned times, moment by moment. `steps` are in the
     /// order of the plan's instances.
-    pub(crate) fn moments(&self, steps: &[Step]) -> Vec<Vec<NodeId>> {
+    pub(crate) fn planned_moments(&self, steps: &[Step]) -> Vec<Vec<NodeId>> {
         let timed = self.task.timed();
         let nodes = self.plan.nodes.iter().enumerate();
         let mut happenings: Vec<_> = nodes
@@ -300,7 +300,7 @@ impl Model {
     }
 
     /// Returns the happening in words.
-    pub fn node_words(&self, node: NodeId) -> String {
+    pub fn describe_node(&self, node: NodeId) -> String {
         match self.plan.nodes[node.index()] {
             Node::Zero => "the beginning of the plan".to_owned(),
             Node::Start(id) => format!("start of {}", self.plan.instance(id).action.name),

@@ -12,8 +12,8 @@ use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement};
+use crate::search_state::SearchState;
 use clock::Clock;
 use facts::Facts;
 pub(crate) use facts::Snapshot;
@@ -66,7 +66,7 @@ impl<'a> From<&'a Vec<NodeId>> for Happenings<'a> {
 
 impl<'a> Happenings<'a> {
     /// Returns the happenings from a position on.
-    pub(crate) fn rest(self, position: usize) -> Self {
+    pub(crate) fn suffix(self, position: usize) -> Self {
         Self {
             sequence: &self.sequence[position..],
             joined: self.joined.get(position..).unwrap_or_default(),
@@ -74,7 +74,7 @@ impl<'a> Happenings<'a> {
     }
 
     /// Returns each happening, with `true` if the next one comes at the same moment.
-    pub(crate) fn each(self) -> impl Iterator<Item = (NodeId, bool)> + 'a {
+    pub(crate) fn nodes(self) -> impl Iterator<Item = (NodeId, bool)> + 'a {
         let is_open = move |at: usize| self.joined.get(at + 1) == Some(&true);
         let happenings = self.sequence.iter().enumerate();
         happenings.map(move |(at, node)| (*node, is_open(at)))
@@ -133,13 +133,13 @@ impl<'m> PrunedNetwork<'m> {
     ///
     /// # Errors
     /// When over-all conditions of running actions couple too many facts.
-    pub fn new(model: &'m Model, circumstances: &Circumstances) -> Result<Self, TooCoupled> {
+    pub fn new(model: &'m Model, circumstances: &SearchState) -> Result<Self, TooCoupled> {
         Self::with(model, circumstances, Ledger::default())
     }
 
     fn with(
         model: &'m Model,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         ledger: Ledger,
     ) -> Result<Self, TooCoupled> {
         let mut network = Self {
@@ -163,15 +163,15 @@ impl<'m> PrunedNetwork<'m> {
             let remaining = event.duration.as_ref().map(|duration| duration - &elapsed);
             network.remaining.push((running.instance, remaining));
             network.running.push(running.instance);
-            let end = running.start.to_f64() + model.shortest(running.instance);
+            let end = running.start.to_f64() + model.min_duration(running.instance);
             network.clock.ends.push(end);
             for (fluent, _) in &event.continuous {
                 let number = &mut network.numbers.changing[*fluent];
-                *number = Numbers::begun(number);
+                *number = Numbers::after_effect_start(number);
             }
             // The parts of guards about the start have been decided: the action does not contain
             // effects that will not take place, and the others will.
-            for (memory, _) in &event.watches {
+            for (memory, _) in &event.guard_memories {
                 network.facts.set_certain(*memory, true);
             }
             for effect in event.effects.iter().filter(|effect| effect.is_certain) {
@@ -216,7 +216,7 @@ impl<'m> PrunedNetwork<'m> {
         let model = self.model;
         let required = self.require(&model.goal, NodeId::ZERO, Reading::Goal);
         let probability = self.probability;
-        self.go_back_to(before);
+        self.restore(before);
         required.map(|()| probability)
     }
 
@@ -227,10 +227,10 @@ impl<'m> PrunedNetwork<'m> {
     /// When a condition couples too many facts.
     pub fn losses(
         model: &'m Model,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         happenings: Happenings<'_>,
     ) -> Result<Vec<Loss>, TooCoupled> {
-        let mut network = Self::with(model, circumstances, Ledger::kept())?;
+        let mut network = Self::with(model, circumstances, Ledger::recording())?;
         network.push_all(happenings)?;
         network.require(&model.goal, NodeId::ZERO, Reading::Goal)?;
         Ok(network.ledger.close())
@@ -286,7 +286,7 @@ impl<'m> PrunedNetwork<'m> {
     /// # Errors
     /// When one of them couples too many facts.
     pub fn push_all(&mut self, happenings: Happenings<'_>) -> Result<(), TooCoupled> {
-        for (node, is_open) in happenings.each() {
+        for (node, is_open) in happenings.nodes() {
             self.push_as(node, is_open)?;
         }
         Ok(())
@@ -294,8 +294,8 @@ impl<'m> PrunedNetwork<'m> {
 
     pub(crate) fn push_as(&mut self, node: NodeId, is_open: bool) -> Result<f64, TooCoupled> {
         let before = self.mark();
-        if let Err(error) = self.happen(node, self.model.event(node), is_open) {
-            self.go_back_to(before);
+        if let Err(error) = self.apply_event(node, self.model.event(node), is_open) {
+            self.restore(before);
             return Err(error);
         }
         self.marks.push(before);
@@ -349,13 +349,13 @@ impl<'m> PrunedNetwork<'m> {
     ///
     /// # Errors
     /// When its condition couples too many facts.
-    pub(crate) fn fail(&mut self, node: NodeId) -> Result<f64, TooCoupled> {
+    pub(crate) fn push_failure(&mut self, node: NodeId) -> Result<f64, TooCoupled> {
         if let Node::End(id) = self.model.plan().nodes[node.index()] {
-            let Some(failed) = self.model.failed_end(node) else {
+            let Some(failed) = self.model.failed_end_event(node) else {
                 self.probability = 0.0;
                 return Ok(0.0);
             };
-            self.happen(node, &failed, false)?;
+            self.apply_event(node, &failed, false)?;
             // The remaining duration is only valid for the first run.
             self.remaining.retain(|(running, _)| *running != id);
             return Ok(self.probability);
@@ -373,15 +373,20 @@ impl<'m> PrunedNetwork<'m> {
         if let Some(mark) = self.marks.pop() {
             self.sequence.pop();
             self.is_open.pop();
-            self.go_back_to(mark);
+            self.restore(mark);
         }
     }
 
     /// Applies a happening, given as an event.
-    fn happen(&mut self, node: NodeId, event: &Event, is_open: bool) -> Result<(), TooCoupled> {
+    fn apply_event(
+        &mut self,
+        node: NodeId,
+        event: &Event,
+        is_open: bool,
+    ) -> Result<(), TooCoupled> {
         let model = self.model;
         if !self.is_open() {
-            self.pass(node)?;
+            self.advance_to(node)?;
         }
         self.require(&event.condition, node, Reading::OnArrival)?;
         let is_end = matches!(model.plan().nodes[node.index()], Node::End(_));
@@ -393,14 +398,16 @@ impl<'m> PrunedNetwork<'m> {
             }
         });
         let updates = self.updates(node, event);
-        self.facts_change(node, event)?;
+        self.apply_fact_effects(node, event)?;
         for (fluent, number) in updates {
             self.set_number(fluent, number);
         }
         match model.plan().nodes[node.index()] {
             Node::Start(id) => {
                 self.running.push(id);
-                self.clock.ends.push(self.clock.now + model.shortest(id));
+                self.clock
+                    .ends
+                    .push(self.clock.now + model.min_duration(id));
                 self.undo.push(Undo::Started);
             }
             Node::End(id) => {
@@ -432,7 +439,7 @@ impl<'m> PrunedNetwork<'m> {
             _ => (node != NodeId::ZERO).then_some(self.sequence.len()),
         };
         let masses = (before, self.probability);
-        self.ledger.note(position, reading, masses, cause);
+        self.ledger.record(position, reading, masses, cause);
     }
 
     /// Requires, in the present layer, the over-all conditions of the running actions.
@@ -442,7 +449,7 @@ impl<'m> PrunedNetwork<'m> {
             let id = self.running[place];
             let start = model.event(model.start(id));
             self.require(&start.over_all, node, Reading::Throughout(id))?;
-            for (memory, condition) in &start.watches {
+            for (memory, condition) in &start.guard_memories {
                 let forget = Outcome {
                     fact: *memory,
                     makes_true: false,
@@ -455,7 +462,7 @@ impl<'m> PrunedNetwork<'m> {
                     Some(true) => self.facts.set_certain_later(*memory, false),
                     None => {
                         let guarded = [(Some(unless), forget)];
-                        self.facts_transform(node, &guarded, false)?;
+                        self.transform_facts(node, &guarded, false)?;
                     }
                 }
             }
@@ -515,9 +522,9 @@ impl<'m> PrunedNetwork<'m> {
 
     fn too_coupled(&self, node: NodeId, count: usize) -> TooCoupled {
         TooCoupled {
-            happening: self.model.node_words(node),
+            happening: self.model.describe_node(node),
             count,
-            most: facts::MOST_COUPLED,
+            most: facts::MAX_COUPLED,
         }
     }
 
@@ -531,7 +538,7 @@ impl<'m> PrunedNetwork<'m> {
         }
     }
 
-    fn go_back_to(&mut self, mark: Mark) {
+    fn restore(&mut self, mark: Mark) {
         while self.undo.len() > mark.undo {
             match self.undo.pop() {
                 Some(Undo::Number(fluent, number)) => self.numbers.changing[fluent] = number,

@@ -8,7 +8,7 @@
 //!   probability, deletions first. Otherwise nothing happens.
 //! - *End* a running action whose end condition holds. With the probability of its end, its end
 //!   effects take place likewise. Otherwise it has failed, none of them takes place, and facts
-//!   change by one of the outcomes of its failure ([`Aftermath`](crate::likelihoods::Aftermath)).
+//!   change by one of the outcomes of its failure ([`FailureOutcome`](crate::likelihoods::Aftermath)).
 //!   In both cases, it is no longer running. Instantaneous actions are tried like starts, and are
 //!   not running afterwards.
 //! - *Abandon* a running action: its end effects will not take place. This is not a step.
@@ -28,18 +28,18 @@
 
 mod process;
 mod small_world;
-mod sweeps;
 mod table;
+mod value_iteration;
 
 use elbowroom_model::State;
 use elbowroom_plan::{InstanceId, NodeId};
 
-use crate::circumstances::Circumstances;
 use crate::dispatch::{Choice, NextHappening, goal_holds};
+use crate::search_state::SearchState;
 use crate::total_order::Slot;
 
 pub use process::Perturbed;
-pub use small_world::{Table, best_value};
+pub use small_world::{PolicyTable, best_value};
 
 /// Limit on the number of steps of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +90,7 @@ impl Default for Settings {
 
 /// Reason why the world cannot be tabulated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NotSmall {
+pub enum TabulationError {
     /// Too many states.
     #[error("{facts} facts and {actions} actions make more states than can be tabulated")]
     TooManyStates {
@@ -114,7 +114,7 @@ pub enum NotSmall {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Move {
     /// Tries a start or an instantaneous action, or ends an action; a node of the plan.
-    Do(NodeId),
+    Try(NodeId),
     /// Abandons an action.
     Abandon(InstanceId),
     /// Stops.
@@ -124,7 +124,7 @@ pub enum Move {
 /// Values of all states under an optimal policy, and the moves of the policy.
 #[derive(Clone, Debug)]
 pub struct Optimum {
-    values: sweeps::Values,
+    values: value_iteration::Values,
     moves: Vec<Vec<Vec<Move>>>,
     /// Number of sweeps.
     pub sweeps: usize,
@@ -136,14 +136,14 @@ impl Optimum {
     pub fn choice(
         &self,
         process: &Perturbed,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         slot: impl FnOnce(NodeId) -> Slot,
     ) -> Choice {
         if circumstances.running.is_empty() && goal_holds(process.model(), circumstances) {
             return Choice::GoalReached;
         }
         match self.choose(process, circumstances) {
-            Move::Do(node) => Choice::Next(NextHappening {
+            Move::Try(node) => Choice::Next(NextHappening {
                 node,
                 position: 0,
                 together: Vec::new(),
@@ -159,7 +159,7 @@ impl Optimum {
     ///
     /// With [`Horizon::Unlimited`], it is approximated from below; the sweeps stop when none of
     /// them adds more than 1e-12 to any state.
-    pub fn value(&self, process: &Perturbed, circumstances: &Circumstances) -> f64 {
+    pub fn value(&self, process: &Perturbed, circumstances: &SearchState) -> f64 {
         let values = self.values.last().map_or(&[][..], Vec::as_slice);
         process
             .weights(circumstances)
@@ -171,7 +171,7 @@ impl Optimum {
     /// Returns the best move, with all steps of the horizon and full patience remaining.
     ///
     /// For an uncertain belief, the most likely state is used.
-    pub fn choose(&self, process: &Perturbed, circumstances: &Circumstances) -> Move {
+    pub fn choose(&self, process: &Perturbed, circumstances: &SearchState) -> Move {
         let mut weights = process.weights(circumstances);
         weights.sort_by(|(.., a), (.., b)| b.total_cmp(a));
         let likeliest = weights.first();

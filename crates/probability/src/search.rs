@@ -25,10 +25,10 @@ mod memo;
 mod nominal;
 mod postponed;
 mod queue;
-mod room;
 mod run;
 mod separations;
 mod symmetry;
+mod time_slack;
 mod timing;
 
 use std::ops::ControlFlow;
@@ -38,20 +38,20 @@ use elbowroom_model::Step;
 use elbowroom_num::Rational;
 use elbowroom_plan::{Node, NodeId};
 
-use crate::circumstances::Circumstances;
 use crate::model::Model;
 use crate::network::{Happenings, PrunedNetwork, TooCoupled};
+use crate::search_state::SearchState;
 use crate::total_order::{Slot, TotalOrderPlan};
 use bound::Bounds;
 use cache::Cache;
 use coupling::Couplings;
 pub use lattice::{Lattice, LatticeEdge, LatticeLimits, LatticeNode, TooLarge};
 use nominal::Nominal;
-use room::Rooms;
-pub(crate) use room::{First, Rests};
 use run::{Best, Run};
 use separations::Separations;
 use symmetry::Symmetry;
+use time_slack::TimeSlacks;
+pub(crate) use time_slack::{FirstWindow, Suffixes};
 use timing::Timing;
 
 /// Sequences that count as orders of the plan.
@@ -98,7 +98,7 @@ pub enum SearchStop {
 
 /// Result of a search.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct SearchResult {
     /// The most likely order; `None` if no order can succeed.
     pub order: Option<TotalOrderPlan>,
     /// `Complete` if the order is proven to be the best.
@@ -175,13 +175,13 @@ impl OrderSearch {
     /// Returns a plan's happenings at their planned times, as an order. Irrelevant timed initials
     /// are left out. Of those after all actions, only those up to the last one that changes a fact
     /// or number of the goal are included. `steps` are in the order of the plan's instances.
-    pub fn as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
+    pub fn timed_sequence(&self, steps: &[Step]) -> Vec<NodeId> {
         let is_timed =
             |node: NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
         let matters = |node: NodeId| self.separations.timed.iter().any(|(own, _)| *own == node);
         let until_goal = &self.separations.timed[..self.separations.timed_until_goal];
         let is_for_goal = |node: NodeId| until_goal.iter().any(|(own, _)| *own == node);
-        let mut order = self.happenings_as_timed(steps);
+        let mut order = self.timed_happenings(steps);
         order.retain(|&node| !is_timed(node) || matters(node));
         let last = order
             .iter()
@@ -192,9 +192,9 @@ impl OrderSearch {
 
     /// Returns all happenings at their planned times. At one moment ends come first, and each
     /// happening comes after those that it needs.
-    fn happenings_as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
+    fn timed_happenings(&self, steps: &[Step]) -> Vec<NodeId> {
         let mut order = Vec::new();
-        for mut moment in self.model.moments(steps) {
+        for mut moment in self.model.planned_moments(steps) {
             self.couplings.sort(&self.model, &mut moment);
             order.append(&mut moment);
         }
@@ -234,14 +234,14 @@ impl OrderSearch {
     /// When a condition couples too many uncertain facts.
     pub fn best_order(
         &mut self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-    ) -> Result<Found, TooCoupled> {
+    ) -> Result<SearchResult, TooCoupled> {
         let has_deadlines = self.separations.has_deadlines(&circumstances.now);
         let key = cache::key(&self.model, circumstances, has_deadlines);
         if let Some(known) = self.cache.get(&key) {
-            return Ok(Found {
-                order: known.from(&circumstances.now),
+            return Ok(SearchResult {
+                order: known.order_at(&circumstances.now),
                 stop: SearchStop::Complete,
                 sequences: 0,
             });
@@ -256,16 +256,16 @@ impl OrderSearch {
 
     fn search(
         &self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-    ) -> Result<Found, TooCoupled> {
+    ) -> Result<SearchResult, TooCoupled> {
         let model = &*self.model;
-        let nothing = |sequences| Found {
+        let nothing = |sequences| SearchResult {
             order: None,
             stop: SearchStop::Complete,
             sequences,
         };
-        let Some(rooms) = Rooms::new(&self.separations, circumstances) else {
+        let Some(rooms) = TimeSlacks::new(&self.separations, circumstances) else {
             return Ok(nothing(0));
         };
         let must_work = self.settings.candidates == Candidates::Working;
@@ -274,7 +274,7 @@ impl OrderSearch {
             return Ok(nothing(0));
         }
         let mut run = Run::new(self, circumstances, nominal, rooms, watch)?;
-        run.try_first(&self.first)?;
+        run.try_sequence(&self.first)?;
         let stop = match run.explore()? {
             ControlFlow::Continue(()) => SearchStop::Complete,
             ControlFlow::Break(()) => SearchStop::Interrupted,
@@ -299,7 +299,7 @@ impl OrderSearch {
                 Some(self.order(circumstances, happenings, probability)?)
             }
         };
-        Ok(Found {
+        Ok(SearchResult {
             order,
             stop,
             sequences,
@@ -315,7 +315,7 @@ impl OrderSearch {
     /// When a condition couples too many uncertain facts.
     pub fn order_of(
         &self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         sequence: &[NodeId],
     ) -> Result<TotalOrderPlan, TooCoupled> {
         let joined = self.joined(circumstances, sequence)?;
@@ -333,7 +333,7 @@ impl OrderSearch {
     /// previous one: coupled happenings do if they would fail one after the other.
     fn joined(
         &self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         sequence: &[NodeId],
     ) -> Result<Vec<bool>, TooCoupled> {
         if self.couplings.is_empty() {
@@ -361,7 +361,7 @@ impl OrderSearch {
     /// Returns the order with its layers and its times.
     fn order(
         &self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         happenings: Happenings<'_>,
         probability: f64,
     ) -> Result<TotalOrderPlan, TooCoupled> {
@@ -380,19 +380,19 @@ impl OrderSearch {
 
     /// Returns the time window of each happening of a sequence that begins now; `None` if the
     /// sequence has no schedule.
-    pub fn windows(&self, circumstances: &Circumstances, sequence: &[NodeId]) -> Option<Vec<Slot>> {
+    pub fn windows(&self, circumstances: &SearchState, sequence: &[NodeId]) -> Option<Vec<Slot>> {
         self.windows_of(circumstances, sequence.into())
     }
 
     /// Like [`Self::windows`], with joined happenings. A first one that is joined comes now.
     pub fn windows_of(
         &self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         happenings: Happenings<'_>,
     ) -> Option<Vec<Slot>> {
         let Happenings { sequence, joined } = happenings;
         let mut timing = Timing::new(&self.separations, circumstances)?;
-        let mut next_timed = self.timed_passed(&circumstances.now);
+        let mut next_timed = self.passed_timed_count(&circumstances.now);
         for (at, &node) in sequence.iter().enumerate() {
             let is_joined = joined.get(at) == Some(&true);
             timing.push(&self.model, (node, is_joined), next_timed)?;
@@ -408,16 +408,16 @@ impl OrderSearch {
     }
 
     /// Returns the number of relevant timed initials that have passed.
-    pub(crate) fn timed_passed(&self, now: &Rational) -> usize {
+    pub(crate) fn passed_timed_count(&self, now: &Rational) -> usize {
         let timed = self.separations.timed.iter();
         timed.take_while(|(_, time)| time <= now).count()
     }
 
     /// Returns the rests of an order from a position on, after `passed` timed initials.
-    pub(crate) fn rests(&self, order: &TotalOrderPlan, from: usize, passed: usize) -> Rests {
+    pub(crate) fn suffixes(&self, order: &TotalOrderPlan, from: usize, passed: usize) -> Suffixes {
         let running = order.layers.last().map_or(&[][..], |layer| &layer.running);
         let sequence = &order.sequence[..];
-        Rests::of(
+        Suffixes::of(
             &self.model,
             &self.separations,
             (sequence, from),
@@ -430,11 +430,11 @@ impl OrderSearch {
     /// first one of [`OrderSearch::windows`], without the others.
     pub(crate) fn first_of(
         &self,
-        rests: &Rests,
+        rests: &Suffixes,
         order: &TotalOrderPlan,
         position: usize,
-        circumstances: &Circumstances,
-    ) -> First {
+        circumstances: &SearchState,
+    ) -> FirstWindow {
         let sequence = &order.sequence[..];
         rests.first(&self.separations, (sequence, position), circumstances)
     }

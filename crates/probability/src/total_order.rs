@@ -6,9 +6,9 @@ use elbowroom_model::ground::{Condition, Expression, FactId};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use crate::circumstances::Circumstances;
 use crate::model::{Model, evaluate};
 use crate::network::{Happenings, PrunedNetwork};
+use crate::search_state::SearchState;
 
 /// A sequence of happenings, and the layers of the pruned network between them.
 #[doc(alias = "Γ")]
@@ -68,7 +68,7 @@ impl TotalOrderPlan {
     /// Returns the order of a network that begins in these circumstances.
     pub(crate) fn new(
         model: &Model,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         network: &PrunedNetwork<'_>,
         probability: f64,
         slots: Vec<Slot>,
@@ -138,7 +138,7 @@ impl Layer {
     /// Returns `true` if the layer fits the circumstances: each fact is more likely to have the
     /// required value than not, all conditions hold in the most likely state, and the running
     /// actions are the same.
-    pub fn fits(&self, model: &Model, circumstances: &Circumstances) -> bool {
+    pub fn fits(&self, model: &Model, circumstances: &SearchState) -> bool {
         let mut running: Vec<InstanceId> =
             circumstances.running.iter().map(|r| r.instance).collect();
         running.sort_unstable();
@@ -146,7 +146,7 @@ impl Layer {
     }
 
     /// Like [`Self::fits`], for any running actions.
-    pub fn holds(&self, model: &Model, circumstances: &Circumstances) -> bool {
+    pub fn holds(&self, model: &Model, circumstances: &SearchState) -> bool {
         let is_likely = |fact: FactId| circumstances.belief.probability(fact) >= 0.5;
         self.literals
             .iter()
@@ -155,7 +155,7 @@ impl Layer {
     }
 
     /// Returns `true` if the conditions on numbers and on several facts hold.
-    pub(crate) fn conditions_hold(&self, model: &Model, circumstances: &Circumstances) -> bool {
+    pub(crate) fn conditions_hold(&self, model: &Model, circumstances: &SearchState) -> bool {
         let is_likely = |fact: FactId| circumstances.belief.probability(fact) >= 0.5;
         let value = |leaf: &Expression| circumstances.value(leaf);
         let task = model.task();

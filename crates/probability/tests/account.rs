@@ -8,8 +8,8 @@ mod twin;
 use std::collections::BTreeMap;
 
 use elbowroom_plan::{Node, NodeId};
-use elbowroom_probability::account::Account;
-use elbowroom_probability::likelihoods::{Failing, PartialFlip, Success};
+use elbowroom_probability::likelihoods::{FailureModel, PartialChange, Success};
+use elbowroom_probability::loss_analysis::LossAnalysis;
 use elbowroom_probability::search::{LatticeLimits, TooLarge};
 use elbowroom_probability::{
     Likelihoods, LossCause, Model, OrderSearch, Reading, SearchSettings, Semantics,
@@ -70,7 +70,7 @@ fn assert_close(found: f64, expected: f64, what: &str) {
 }
 
 #[test]
-fn what_is_lost_and_what_is_left_are_all_worlds() {
+fn losses_and_success_sum_to_one() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut lossy = 0;
     for round in 0..400 {
@@ -78,7 +78,7 @@ fn what_is_lost_and_what_is_left_are_all_worlds() {
         for semantics in BOTH {
             let order = order(&mut rng, &case);
             let model = model(&case, semantics);
-            let account = Account::of(&model, &case.circumstances, &order).unwrap();
+            let account = LossAnalysis::of(&model, &case.circumstances, &order).unwrap();
             let lost: f64 = account.losses.iter().map(|loss| loss.mass).sum();
             assert_close(lost + account.probability, 1.0, &case.text);
             // The loss at each position is the decrease of the worlds' total probability.
@@ -111,7 +111,7 @@ fn what_is_lost_and_what_is_left_are_all_worlds() {
 }
 
 #[test]
-fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
+fn gain_of_certainty_equals_certain_world() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     let (mut actions, mut facts) = (0, 0);
     for round in 0..400 {
@@ -119,7 +119,7 @@ fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
         for semantics in BOTH {
             let order = order(&mut rng, &case);
             let model = model(&case, semantics);
-            let account = Account::of(&model, &case.circumstances, &order).unwrap();
+            let account = LossAnalysis::of(&model, &case.circumstances, &order).unwrap();
             for share in &account.actions {
                 let own = &case.plan.instance(share.instance).action;
                 let same = case
@@ -136,10 +136,10 @@ fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
                     start: Some(1.0),
                     effects: all.clone(),
                     deletions: all,
-                    failing: Failing {
+                    failing: FailureModel {
                         end: Some(1.0),
                         during_per_second: Some(0.0),
-                        ..Failing::default()
+                        ..FailureModel::default()
                     },
                 };
                 let mut likelihoods = case.likelihoods.clone();
@@ -151,7 +151,7 @@ fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
             }
             for fact in model.facts() {
                 let mut likelihoods = case.likelihoods.clone();
-                let never = PartialFlip {
+                let never = PartialChange {
                     becomes_true: Some(0.0),
                     becomes_false: Some(0.0),
                     becomes_true_per_second: Some(0.0),
@@ -176,7 +176,7 @@ fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
 }
 
 #[test]
-fn retrying_gains_the_sum_over_all_numbers_of_failed_attempts() {
+fn gain_of_retries_equals_sum_over_attempts() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
     let mut gains = 0;
     for _ in 0..40 {
@@ -184,7 +184,7 @@ fn retrying_gains_the_sum_over_all_numbers_of_failed_attempts() {
         for semantics in BOTH {
             let order = order(&mut rng, &case);
             let model = model(&case, semantics);
-            let account = Account::of(&model, &case.circumstances, &order).unwrap();
+            let account = LossAnalysis::of(&model, &case.circumstances, &order).unwrap();
             let starts = order.iter().enumerate().filter(|(_, node)| {
                 matches!(
                     case.plan.nodes[node.index()],
@@ -215,7 +215,7 @@ fn retrying_gains_the_sum_over_all_numbers_of_failed_attempts() {
 }
 
 #[test]
-fn doing_again_gains_the_sum_over_all_numbers_of_failed_ends() {
+fn gain_of_restarts_equals_sum_over_failed_ends() {
     let mut rng = ChaCha8Rng::seed_from_u64(15);
     let (mut gains, mut shares) = (0, 0);
     for round in 0..200 {
@@ -227,7 +227,7 @@ fn doing_again_gains_the_sum_over_all_numbers_of_failed_ends() {
         for semantics in BOTH {
             let order = order(&mut rng, &case);
             let model = model(&case, semantics);
-            let account = Account::of(&model, &case.circumstances, &order).unwrap();
+            let account = LossAnalysis::of(&model, &case.circumstances, &order).unwrap();
             for share in &account.actions {
                 let place = |node| order.iter().position(|other| *other == node).unwrap();
                 let start = place(model.start(share.instance));
@@ -235,8 +235,8 @@ fn doing_again_gains_the_sum_over_all_numbers_of_failed_ends() {
                 let schema = case.plan.instance(share.instance).action.schema;
                 let success = case.likelihoods.schemas[&schema].failing.end.unwrap();
                 let is_durative = start != end;
-                assert_eq!(share.if_done_again.is_some(), is_durative && success < 1.0);
-                let Some(found) = share.if_done_again else {
+                assert_eq!(share.if_restarted.is_some(), is_durative && success < 1.0);
+                let Some(found) = share.if_restarted else {
                     continue;
                 };
                 shares += 1;
@@ -266,7 +266,7 @@ fn doing_again_gains_the_sum_over_all_numbers_of_failed_ends() {
 }
 
 #[test]
-fn a_lattice_has_all_orders_in_it() {
+fn lattice_contains_all_orders() {
     let mut rng = ChaCha8Rng::seed_from_u64(14);
     let mut many = 0;
     for _ in 0..150 {
@@ -336,7 +336,7 @@ fn a_lattice_beyond_its_limits_is_refused() {
         (:goal (and (lit a) (lit b) (lit c))))";
     let plan = "0: (light a) [1]\n0: (light b) [1]\n0: (light c) [1]";
     let (task, plan) = shared::read_task(domain, problem, plan);
-    let initial = elbowroom_probability::Circumstances::initial(&task);
+    let initial = elbowroom_probability::SearchState::initial(&task);
     let model = Model::new(task, plan, &Likelihoods::certain(), Semantics::Paper).unwrap();
     let search = OrderSearch::new(model, SearchSettings::default());
     let lattice = search.lattice(&initial, LatticeLimits::default()).unwrap();
@@ -360,7 +360,7 @@ fn a_lattice_beyond_its_limits_is_refused() {
 }
 
 #[test]
-fn a_loss_names_what_was_not_so() {
+fn loss_names_violated_condition() {
     let domain = "(define (domain d) (:predicates (whole) (lit))
         (:durative-action screw :parameters () :duration (= ?duration 5)
           :condition (over all (whole)) :effect (at end (lit))))";
@@ -370,12 +370,12 @@ fn a_loss_names_what_was_not_so() {
     likelihoods.defaults.start = Some(0.5);
     likelihoods.defaults.effect = Some(0.9);
     likelihoods.defaults.becomes_false = Some(0.25);
-    let initial = elbowroom_probability::Circumstances::initial(&task);
+    let initial = elbowroom_probability::SearchState::initial(&task);
     let fact = |name| task.fact_named(name).unwrap();
     let (whole, lit) = (fact("(whole)"), fact("(lit)"));
     let model = Model::new(task, plan, &likelihoods, Semantics::Paper).unwrap();
     let order = [NodeId::from(1), NodeId::from(2)];
-    let account = Account::of(&model, &initial, order.as_slice()).unwrap();
+    let account = LossAnalysis::of(&model, &initial, order.as_slice()).unwrap();
     let instance = account.actions[0].instance;
     let fact = |fact, truth| LossCause::Fact { fact, truth };
     let found = account.losses.into_iter();

@@ -11,11 +11,11 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::FactId;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
-use elbowroom_probability::dispatch::patient;
+use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::likelihoods;
-use elbowroom_probability::search::Found;
+use elbowroom_probability::search::SearchResult;
 use elbowroom_probability::{
-    Candidates, Circumstances, Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings,
+    Candidates, Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings, SearchState,
     Semantics, TotalOrderPlan,
 };
 use rand::{Rng, SeedableRng};
@@ -40,7 +40,7 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
     );
     let mut search = OrderSearch::new(model.unwrap(), settings);
     let found = search
-        .best_order(&case.circumstances, &mut patient)
+        .best_order(&case.circumstances, &mut never_interrupt)
         .unwrap();
     let orders = twin::orders::all(case, semantics, &search);
     let best = twin::orders::best(&orders, true);
@@ -107,7 +107,9 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
     let mut begun = plain.beginning_with(first.clone());
     let hasty = begun.best_order(&case.circumstances, &mut |_| ControlFlow::Break(()));
     let hasty = hasty.unwrap().order;
-    let patiently = begun.best_order(&case.circumstances, &mut patient).unwrap();
+    let patiently = begun
+        .best_order(&case.circumstances, &mut never_interrupt)
+        .unwrap();
     let probability =
         |order: &Option<TotalOrderPlan>| order.as_ref().map_or(0.0, |o| o.probability);
     let (hasty, patiently) = (probability(&hasty), probability(&patiently.order));
@@ -119,7 +121,7 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
     assert!(hasty <= best_known * (1.0 + 1e-9), "{words}");
     // The second query is answered from the cache.
     let again = search
-        .best_order(&case.circumstances, &mut patient)
+        .best_order(&case.circumstances, &mut never_interrupt)
         .unwrap();
     assert_eq!((again.order, again.sequences), (found.order.clone(), 0));
     Compared {
@@ -140,7 +142,7 @@ const EASY: Taste = Taste {
 };
 
 #[test]
-fn no_order_is_more_likely_to_succeed_than_the_one_found() {
+fn found_order_is_optimal() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let (mut long, mut hasty) = (0, 0);
     for round in 0..700 {
@@ -167,7 +169,7 @@ fn no_order_is_more_likely_to_succeed_than_the_one_found() {
         settings.candidates = Candidates::Working;
         // The reference implementation determines nominal states from certain facts only.
         let running = std::mem::take(&mut case.circumstances.running);
-        case.circumstances = Circumstances::initial(&case.task);
+        case.circumstances = SearchState::initial(&case.task);
         case.circumstances.running = running;
         compare(&case, settings);
     }
@@ -230,7 +232,7 @@ fn coupled(rng: &mut ChaCha8Rng, has_numbers: bool, is_certain: bool) -> Case {
     Case {
         text: format!("{domain}\n{problem}"),
         likelihoods: likelihoods::read(text.as_bytes(), &task).unwrap(),
-        circumstances: Circumstances::initial(&task),
+        circumstances: SearchState::initial(&task),
         task: Arc::new(task),
         plan,
     }
@@ -238,7 +240,7 @@ fn coupled(rng: &mut ChaCha8Rng, has_numbers: bool, is_certain: bool) -> Case {
 
 /// Happenings of one moment that need each other, in worlds where facts do not change by themselves.
 #[test]
-fn no_order_is_more_likely_to_succeed_where_happenings_need_each_other() {
+fn found_order_is_optimal_with_coupled_happenings() {
     let mut rng = ChaCha8Rng::seed_from_u64(21);
     let mut joined = 0;
     for round in 0..600 {
@@ -254,7 +256,7 @@ fn no_order_is_more_likely_to_succeed_where_happenings_need_each_other() {
 }
 
 #[test]
-fn no_order_is_more_likely_to_succeed_where_facts_change_with_time() {
+fn found_order_is_optimal_with_timed_changes() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut long = 0;
     for round in 0..300 {
@@ -277,7 +279,7 @@ fn no_order_is_more_likely_to_succeed_where_facts_change_with_time() {
 }
 
 #[test]
-fn no_order_is_more_likely_to_succeed_where_actions_fail_after_their_start() {
+fn found_order_is_optimal_with_failing_actions() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let mut long = 0;
     for round in 0..400 {
@@ -304,7 +306,7 @@ fn no_order_is_more_likely_to_succeed_where_actions_fail_after_their_start() {
 }
 
 #[test]
-fn waiting_costs_where_facts_change_with_time_so_actions_stay_parallel() {
+fn timed_changes_keep_actions_parallel() {
     let (task, plan) = lamps(3);
     let text = "format = \"elbowroom-likelihoods\"\nversion = 1
         [defaults]\nbecomes_true = 0.0\nbecomes_false = 0.0\nstart = 1.0\neffect = 1.0
@@ -348,16 +350,16 @@ fn frail(task: &Task) -> Likelihoods {
 }
 
 /// Returns the best order, and the number of examined sequences.
-fn search((task, plan): (Task, PartialOrderPlan), likelihoods: &Likelihoods) -> Found {
-    let initial = Circumstances::initial(&task);
+fn search((task, plan): (Task, PartialOrderPlan), likelihoods: &Likelihoods) -> SearchResult {
+    let initial = SearchState::initial(&task);
     let model = Model::new(Arc::new(task), plan, likelihoods, Semantics::Paper).unwrap();
     let mut search = OrderSearch::new(model, SearchSettings::default());
-    search.best_order(&initial, &mut patient).unwrap()
+    search.best_order(&initial, &mut never_interrupt).unwrap()
 }
 
 /// Without uncertainty, every order is as likely and as long as the first one.
 #[test]
-fn a_world_where_nothing_is_uncertain_is_not_searched() {
+fn certain_world_is_not_searched() {
     let found = search(lamps(12), &Likelihoods::certain());
     let order = found.order.unwrap();
     assert_eq!((order.probability, order.sequence.len()), (1.0, 24));
@@ -377,7 +379,7 @@ fn many_instances_of_one_kind_are_searched_to_the_end() {
 /// Of orders that differ only in the choice of lamps, one is tried, and it is as good as the
 /// others. The same holds if one of the three lamps may be broken.
 #[test]
-fn of_instances_that_can_stand_for_each_other_one_is_tried() {
+fn one_of_interchangeable_instances_is_tried() {
     for candidates in [Candidates::Working, Candidates::All] {
         for broken in [None, Some("(whole l1)")] {
             // The reference implementation determines nominal states from certain facts only.
@@ -385,7 +387,7 @@ fn of_instances_that_can_stand_for_each_other_one_is_tried() {
                 continue;
             }
             let (task, plan) = lamps(3);
-            let mut circumstances = Circumstances::initial(&task);
+            let mut circumstances = SearchState::initial(&task);
             if let Some(broken) = broken {
                 let count = u32::try_from(task.fact_count()).unwrap();
                 let mut facts = (0..count).map(FactId);

@@ -9,10 +9,10 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node};
-use elbowroom_probability::dispatch::patient;
+use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::{
-    Choice, Circumstances, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running,
-    SearchSettings, Semantics,
+    Choice, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running, SearchSettings,
+    SearchState, Semantics,
 };
 
 const DOMAIN: &str = "(define (domain letters)
@@ -27,13 +27,13 @@ const DOMAIN: &str = "(define (domain letters)
 
 const PLAN: &str = "0: (write) [10]\n11: (stamp) [2]\n14: (post) [5]";
 
-struct Desk {
+struct Fixture {
     task: Arc<Task>,
     dispatch: LayerDispatch,
-    now: Circumstances,
+    now: SearchState,
 }
 
-impl Desk {
+impl Fixture {
     fn new(init: &str) -> Self {
         let problem = format!(
             "(define (problem p) (:domain letters) (:init (at-desk) {init}) (:goal (posted)))"
@@ -46,7 +46,7 @@ impl Desk {
         let model = Model::new(task.clone(), plan, &likelihoods, Semantics::Paper).unwrap();
         let search = OrderSearch::new(model, SearchSettings::default());
         Self {
-            now: Circumstances::initial(&task),
+            now: SearchState::initial(&task),
             dispatch: LayerDispatch::new(search, Reconsider::WhenNoLayerFits),
             task,
         }
@@ -75,7 +75,11 @@ impl Desk {
 
     /// Returns the next step in words; a star marks a new order.
     fn next(&mut self) -> String {
-        match self.dispatch.choose(&self.now, &mut patient).unwrap() {
+        match self
+            .dispatch
+            .choose(&self.now, &mut never_interrupt)
+            .unwrap()
+        {
             Choice::GoalReached => "goal reached".to_owned(),
             Choice::Replan => "replan".to_owned(),
             Choice::Abandon(_) => unreachable!("orders end what they start"),
@@ -83,15 +87,15 @@ impl Desk {
                 let model = self.dispatch.search().model();
                 let star = if next.is_new_order { "*" } else { "" };
                 let from = next.slot.earliest.to_decimal(3);
-                format!("{}{star} from {from}", model.node_words(next.node))
+                format!("{}{star} from {from}", model.describe_node(next.node))
             }
         }
     }
 }
 
 #[test]
-fn what_is_superfluous_is_skipped_and_what_failed_is_repeated() {
-    let mut desk = Desk::new("(open)");
+fn superfluous_steps_are_skipped_and_failed_steps_repeated() {
+    let mut desk = Fixture::new("(open)");
     // Writing takes long, so the stamp can come off in both orders.
     let first = desk.next();
     assert!(first.ends_with("* from 0"), "{first}");
@@ -119,8 +123,8 @@ fn what_is_superfluous_is_skipped_and_what_failed_is_repeated() {
 }
 
 #[test]
-fn an_end_that_the_order_does_not_have_asks_for_a_new_order() {
-    let mut desk = Desk::new("(open) (written)");
+fn unexpected_end_requests_new_order() {
+    let mut desk = Fixture::new("(open) (written)");
     assert_eq!(desk.next(), "start of (stamp)* from 0");
     // The action `write` was started, though the order does not contain it.
     desk.start(0, 0);
@@ -134,7 +138,7 @@ fn an_end_that_the_order_does_not_have_asks_for_a_new_order() {
 
 #[test]
 fn without_an_order_the_answer_is_to_replan() {
-    let mut desk = Desk::new("(written)");
+    let mut desk = Fixture::new("(written)");
     assert_eq!(desk.next(), "replan");
     desk.believe("open", 0.6);
     assert_eq!(desk.next(), "start of (stamp)* from 0");
@@ -143,7 +147,7 @@ fn without_an_order_the_answer_is_to_replan() {
 #[test]
 fn an_order_that_misses_its_deadline_is_not_chosen() {
     // The post office opens at 16 and closes at 21.
-    let mut desk = Desk::new("(at 16 (open)) (at 21 (not (open)))");
+    let mut desk = Fixture::new("(at 16 (open)) (at 21 (not (open)))");
     assert!(desk.next().contains('*'));
     // Posting takes 5, so it must begin before 16, after 10 of writing and 2 of stamping.
     desk.believe("stamped", 1.0);

@@ -49,7 +49,7 @@ fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
             worlds.push(node);
             let actions = worlds.actions_probability();
             let story = || {
-                let order = order[..=at].iter().map(|&node| model.node_words(node));
+                let order = order[..=at].iter().map(|&node| model.describe_node(node));
                 format!("{}\n{:?}", case.text, order.collect::<Vec<_>>())
             };
             assert!(

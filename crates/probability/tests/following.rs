@@ -8,16 +8,16 @@ use std::sync::Arc;
 
 use elbowroom_num::Rational;
 use elbowroom_plan::NodeId;
-use elbowroom_probability::dispatch::{goal_holds, lattermost_layer, patient};
+use elbowroom_probability::dispatch::{goal_holds, lattermost_layer, never_interrupt};
 use elbowroom_probability::{
-    Choice, Circumstances, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running,
-    SearchSettings, Semantics, TotalOrderPlan,
+    Choice, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, Running, SearchSettings,
+    SearchState, Semantics, TotalOrderPlan,
 };
 
 /// Pseudorandom numbers.
-struct Dice(u64);
+struct Random(u64);
 
-impl Dice {
+impl Random {
     fn below(&mut self, count: usize) -> usize {
         self.0 = self
             .0
@@ -26,7 +26,7 @@ impl Dice {
         usize::try_from(self.0 >> 33).unwrap() % count
     }
 
-    fn often(&mut self, percent: usize) -> bool {
+    fn chance(&mut self, percent: usize) -> bool {
         self.below(100) < percent
     }
 
@@ -39,14 +39,14 @@ const FACTS: usize = 6;
 
 /// Generates a random plan of a random domain. Some have a counter, and some have facts that change
 /// at absolute times, often for just one of the actions.
-fn random_search(dice: &mut Dice) -> OrderSearch {
-    let fact = |dice: &mut Dice| format!("(f{})", dice.below(FACTS));
-    let has_number = dice.often(30);
+fn random_search(dice: &mut Random) -> OrderSearch {
+    let fact = |dice: &mut Random| format!("(f{})", dice.below(FACTS));
+    let has_number = dice.chance(30);
     let (mut actions, mut plan) = (String::new(), String::new());
     let count = 2 + dice.below(4);
     for index in 0..count {
         let (least, more) = (1 + dice.below(6), dice.below(8));
-        let duration = if dice.often(60) {
+        let duration = if dice.chance(60) {
             format!("(= ?duration {least})")
         } else {
             format!(
@@ -56,9 +56,9 @@ fn random_search(dice: &mut Dice) -> OrderSearch {
         };
         let mut conditions = String::new();
         for when in ["at start", "over all", "at end"] {
-            if dice.often(35) {
+            if dice.chance(35) {
                 let own = fact(dice);
-                let own = if dice.often(25) {
+                let own = if dice.chance(25) {
                     format!("(not {own})")
                 } else {
                     own
@@ -66,14 +66,14 @@ fn random_search(dice: &mut Dice) -> OrderSearch {
                 write!(conditions, "({when} {own})").unwrap();
             }
         }
-        if has_number && dice.often(40) {
+        if has_number && dice.chance(40) {
             write!(conditions, "(at start (<= (n) {}))", 2 + dice.below(4)).unwrap();
         }
         let mut effects = format!("(at end (f{}))", dice.below(FACTS));
         for when in ["at start", "at end"] {
-            if dice.often(40) {
+            if dice.chance(40) {
                 let own = fact(dice);
-                let own = if dice.often(50) {
+                let own = if dice.chance(50) {
                     format!("(not {own})")
                 } else {
                     own
@@ -93,10 +93,10 @@ fn random_search(dice: &mut Dice) -> OrderSearch {
         writeln!(plan, "{}: (a{index}) [{least}]", index * 20).unwrap();
     }
     let facts: Vec<String> = (0..FACTS).map(|index| format!("(f{index})")).collect();
-    let mut init: String = facts.iter().filter(|_| dice.often(60)).cloned().collect();
+    let mut init: String = facts.iter().filter(|_| dice.chance(60)).cloned().collect();
     for index in 0..dice.below(3) {
         let own = fact(dice);
-        let own = if dice.often(50) {
+        let own = if dice.chance(50) {
             format!("(not {own})")
         } else {
             own
@@ -120,9 +120,9 @@ fn random_search(dice: &mut Dice) -> OrderSearch {
 }
 
 /// Generates circumstances that fit one of the layers, or nearly.
-fn near_a_layer(dice: &mut Dice, search: &OrderSearch, order: &TotalOrderPlan) -> Circumstances {
+fn near_a_layer(dice: &mut Random, search: &OrderSearch, order: &TotalOrderPlan) -> SearchState {
     let model = search.model();
-    let mut now = Circumstances::initial(model.task());
+    let mut now = SearchState::initial(model.task());
     let epsilon = model.task().epsilon();
     let second = Rational::from(i64::try_from(dice.below(30)).unwrap());
     let a_little = [
@@ -138,10 +138,10 @@ fn near_a_layer(dice: &mut Dice, search: &OrderSearch, order: &TotalOrderPlan) -
     }
     for &(fact, truth) in &layer.literals {
         now.belief
-            .set(fact, f64::from(u8::from(truth != dice.often(4))));
+            .set(fact, f64::from(u8::from(truth != dice.chance(4))));
     }
     for &instance in &layer.running {
-        if dice.often(97) {
+        if dice.chance(97) {
             let ago = Rational::new(i64::try_from(dice.below(12)).unwrap(), 2);
             let start = (&now.now - ago + dice.pick(&a_little)).min(now.now.clone());
             now.running.push(Running { instance, start });
@@ -167,14 +167,14 @@ fn near_a_layer(dice: &mut Dice, search: &OrderSearch, order: &TotalOrderPlan) -
 }
 
 #[test]
-fn what_is_kept_of_an_order_says_what_looking_anew_says() {
-    let mut dice = Dice(20_261_123);
+fn cached_layers_equal_recomputed_layers() {
+    let mut dice = Random(20_261_123);
     let (mut plans, mut fitting, mut windowed, mut unfit) = (0, 0, 0, 0);
     while plans < 200 {
         let search = random_search(&mut dice);
-        let start = Circumstances::initial(search.model().task());
+        let start = SearchState::initial(search.model().task());
         let mut dispatch = LayerDispatch::new(search.clone(), Reconsider::WhenNoLayerFits);
-        dispatch.choose(&start, &mut patient).unwrap();
+        dispatch.choose(&start, &mut never_interrupt).unwrap();
         if dispatch
             .order()
             .is_none_or(|order| order.sequence.is_empty())
@@ -192,8 +192,8 @@ fn what_is_kept_of_an_order_says_what_looking_anew_says() {
                 && search.is_goal_settled(&now.now)
                 && goal_holds(search.model(), &now);
             // A copy, so that both continue from the same order.
-            let chosen = dispatch.clone().choose(&now, &mut patient).unwrap();
-            let followed = dispatch.choose(&now, &mut patient).unwrap();
+            let chosen = dispatch.clone().choose(&now, &mut never_interrupt).unwrap();
+            let followed = dispatch.choose(&now, &mut never_interrupt).unwrap();
             assert_eq!(chosen, followed);
             match (followed, expected) {
                 (Choice::GoalReached, _) => assert!(is_over),

@@ -27,7 +27,7 @@ fn mistakes(text: &str) -> String {
 const HEAD: &str = "format = \"elbowroom-likelihoods\"\nversion = 1\n";
 
 #[test]
-fn the_more_specific_entry_counts() {
+fn more_specific_entry_takes_precedence() {
     let task = doors();
     let text = format!(
         "{HEAD}
@@ -53,7 +53,7 @@ fn the_more_specific_entry_counts() {
     let object = |name: &str| task.problem().object(name).unwrap();
     let flip = |name: &str| {
         let fact = task.find_fact(open, &[object(name)]).unwrap();
-        let flip = likelihoods.flip(&task, fact).unwrap();
+        let flip = likelihoods.spontaneous_change(&task, fact).unwrap();
         (flip.becomes_true, flip.becomes_false)
     };
     assert_eq!(flip("a"), (0.1, 0.5));
@@ -67,7 +67,7 @@ fn the_more_specific_entry_counts() {
     assert_eq!(known.unwrap(), likelihoods);
     assert_eq!(likelihoods.start(&b), Ok(0.5));
     let fact = task.find_fact(open, &[object("b")]).unwrap();
-    let flip = likelihoods.flip(&task, fact).unwrap();
+    let flip = likelihoods.spontaneous_change(&task, fact).unwrap();
     assert_eq!((flip.becomes_true, flip.becomes_false), (0.2, 0.5));
     assert_eq!(likelihoods.effect(&task, &b, fact, false), Ok(0.25));
     let fact = task.find_fact(open, &[object("a")]).unwrap();
@@ -88,7 +88,7 @@ fn the_more_specific_entry_counts() {
 }
 
 #[test]
-fn rates_per_second_stand_beside_likelihoods_per_step() {
+fn rates_and_step_likelihoods_combine() {
     let task = doors();
     let text = format!(
         "{HEAD}
@@ -109,7 +109,7 @@ fn rates_per_second_stand_beside_likelihoods_per_step() {
     assert!(likelihoods.has_rates());
     let fact = |name: &str| task.fact_named(name).unwrap();
     let said = |name: &str| {
-        let flip = likelihoods.flip(&task, fact(name)).unwrap();
+        let flip = likelihoods.spontaneous_change(&task, fact(name)).unwrap();
         let rate = likelihoods.rate(&task, fact(name));
         let flips = [flip.becomes_true, flip.becomes_false];
         (flips, [rate.becomes_true, rate.becomes_false])
@@ -134,7 +134,7 @@ fn rates_per_second_stand_beside_likelihoods_per_step() {
 }
 
 #[test]
-fn failures_after_the_start_leave_behind_what_the_file_says() {
+fn failures_after_start_have_given_effects() {
     let task = doors();
     let text = format!(
         "{HEAD}
@@ -164,7 +164,7 @@ fn failures_after_the_start_leave_behind_what_the_file_says() {
         task.instantiate(schema, &[object]).unwrap()
     };
     let left = |name: &str| {
-        let aftermaths = likelihoods.aftermaths(&task, &shut(name)).into_iter();
+        let aftermaths = likelihoods.failure_outcomes(&task, &shut(name)).into_iter();
         let words = |(fact, truth): (_, bool)| format!("{} {truth}", task.fact_name(fact));
         let told = aftermaths.map(|it| {
             let changes = it.changes.into_iter().map(words);
@@ -178,10 +178,15 @@ fn failures_after_the_start_leave_behind_what_the_file_says() {
         (0.8, 0.7)
     );
     assert_eq!(
-        (likelihoods.during(&shut("a")), likelihoods.end(&shut("a"))),
+        (
+            likelihoods.failure_rate(&shut("a")),
+            likelihoods.end(&shut("a"))
+        ),
         (0.5, 0.8)
     );
-    assert!((likelihoods.lasts(&shut("a"), 2.0) - 0.8 * (-1.0_f64).exp()).abs() < 1e-15);
+    assert!(
+        (likelihoods.success_probability(&shut("a"), 2.0) - 0.8 * (-1.0_f64).exp()).abs() < 1e-15
+    );
     // Order: undone effects, facts that become true, facts that become false.
     assert_eq!(
         left("a"),
@@ -204,7 +209,7 @@ fn failures_after_the_start_leave_behind_what_the_file_says() {
     let wait = task.problem().schema("wait").unwrap();
     let wait = task.instantiate(wait, &[]).unwrap();
     assert_eq!(
-        (likelihoods.end(&wait), likelihoods.during(&wait)),
+        (likelihoods.end(&wait), likelihoods.failure_rate(&wait)),
         (1.0, 0.0)
     );
     let written = write(task.problem(), &likelihoods);
@@ -456,7 +461,7 @@ fn the_authors_format_is_read_and_its_mistakes_reported() {
 }
 
 #[test]
-fn no_bytes_upset_the_readers() {
+fn readers_do_not_panic_on_any_bytes() {
     let task = doors();
     let text =
         format!("{HEAD}[facts.open]\nbecomes_true = 0.5\n[actions.\"shut é\"]\n-\nopen#a 0 0%");
@@ -474,7 +479,7 @@ fn no_bytes_upset_the_readers() {
 }
 
 #[test]
-fn the_authors_files_say_the_same_in_our_format() {
+fn converted_published_files_are_equal() {
     for world in shared::sf3().iter().chain(&shared::af3()) {
         let written = write(world.task.problem(), &world.likelihoods);
         // The authors' file has no actions from a machine to itself, which Elbowroom's format

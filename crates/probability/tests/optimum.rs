@@ -9,12 +9,12 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, Condition, SnapAction};
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
-use elbowroom_probability::dispatch::patient;
-use elbowroom_probability::likelihoods::Failing;
+use elbowroom_probability::dispatch::never_interrupt;
+use elbowroom_probability::likelihoods::FailureModel;
 use elbowroom_probability::optimum::{DeadEnds, Horizon, Move, Perturbed, Settings};
 use elbowroom_probability::{
-    Choice, Circumstances, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider,
-    SearchSettings, Semantics, Slot,
+    Choice, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, SearchSettings,
+    SearchState, Semantics, Slot,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -29,7 +29,7 @@ fn steps(count: usize) -> Settings {
 }
 
 #[test]
-fn a_lone_action_is_tried_until_the_steps_run_out() {
+fn single_action_is_tried_until_horizon() {
     let domain = "(define (domain d) (:predicates (lit))
         (:durative-action light :parameters () :duration (= ?duration 1) :effect (at end (lit))))";
     let problem = "(define (problem p) (:domain d) (:init) (:goal (lit)))";
@@ -37,7 +37,7 @@ fn a_lone_action_is_tried_until_the_steps_run_out() {
     let mut likelihoods = Likelihoods::certain();
     likelihoods.defaults.start = Some(0.5);
     likelihoods.defaults.effect = Some(0.25);
-    let initial = Circumstances::initial(&task);
+    let initial = SearchState::initial(&task);
     let model = Model::new(task, plan, &likelihoods, Semantics::World).unwrap();
     let value = |settings| {
         let process = Perturbed::new(model.clone(), settings).unwrap();
@@ -64,7 +64,7 @@ const SMALL: Taste = Taste {
 };
 
 #[test]
-fn the_optimum_is_that_of_a_plain_recursion() {
+fn optimum_equals_plain_recursion() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let (mut between, mut dead_ends_matter) = (0, 0);
     for round in 0..300 {
@@ -75,7 +75,7 @@ fn the_optimum_is_that_of_a_plain_recursion() {
         if round >= 220 {
             case = with_outcomes(&mut rng, case);
         }
-        case.circumstances = Circumstances::initial(&case.task);
+        case.circumstances = SearchState::initial(&case.task);
         let model = Model::new(
             case.task.clone(),
             case.plan.clone(),
@@ -193,7 +193,7 @@ fn best(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 
             value += success * weight * perturbed(case, &after, &next, fewer);
         }
         let failures = if is_end {
-            left_behind(case, action, failing, state)
+            failure_states(case, action, failing, state)
         } else {
             vec![(state.to_vec(), 1.0)]
         };
@@ -207,10 +207,10 @@ fn best(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 
 }
 
 /// Returns the possible states after a failed end, by the definition of the file format.
-fn left_behind(
+fn failure_states(
     case: &Case,
     action: &Action,
-    failing: &Failing,
+    failing: &FailureModel,
     state: &[bool],
 ) -> Vec<(Vec<bool>, f64)> {
     let mut undone = state.to_vec();
@@ -271,7 +271,10 @@ fn steps_from<'c>(
 fn perturbed(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 {
     let mut worlds = vec![(Vec::new(), 1.0)];
     for (fact, &is_true) in case.facts().zip(state) {
-        let flip = case.likelihoods.flip(&case.task, fact).unwrap();
+        let flip = case
+            .likelihoods
+            .spontaneous_change(&case.task, fact)
+            .unwrap();
         let p = flip.after(f64::from(u8::from(is_true)));
         worlds = worlds
             .into_iter()
@@ -351,20 +354,24 @@ fn everything(task: &Arc<Task>, likelihoods: &Likelihoods) -> (Arc<Task>, Partia
 }
 
 /// Returns the move of an agent that searches the best order before each happening.
-fn adaptable(dispatch: &mut LayerDispatch, circumstances: &Circumstances) -> Move {
-    as_move(&dispatch.choose(circumstances, &mut patient).unwrap())
+fn adaptable(dispatch: &mut LayerDispatch, circumstances: &SearchState) -> Move {
+    as_move(
+        &dispatch
+            .choose(circumstances, &mut never_interrupt)
+            .unwrap(),
+    )
 }
 
 fn as_move(choice: &Choice) -> Move {
     match choice {
-        Choice::Next(next) => Move::Do(next.node),
+        Choice::Next(next) => Move::Try(next.node),
         Choice::Abandon(id) => Move::Abandon(*id),
         Choice::GoalReached | Choice::Replan => Move::Stop,
     }
 }
 
 #[test]
-fn no_executor_beats_the_optimum_of_the_authors_worlds() {
+fn no_executor_beats_optimum_of_published_worlds() {
     for world in shared::sf3().iter().step_by(3).chain(shared::af3().get(5)) {
         let (task, plan) = everything(&world.task, &world.likelihoods);
         let model = Model::new(task, plan.clone(), &world.likelihoods, Semantics::World).unwrap();
@@ -373,7 +380,7 @@ fn no_executor_beats_the_optimum_of_the_authors_worlds() {
             ..Settings::default()
         };
         let process = Perturbed::new(model.clone(), settings).unwrap();
-        let initial = Circumstances::initial(&world.task);
+        let initial = SearchState::initial(&world.task);
         let optimum = process.optimum();
         let best = optimum.value(&process, &initial);
         let followed = process.success_of(&initial, &mut |now, _| optimum.choose(&process, now));

@@ -29,7 +29,7 @@ fn interference(plan: &PartialOrderPlan) -> Vec<String> {
 }
 
 #[test]
-fn what_would_spoil_an_action_stays_after_it_and_what_enables_it_is_free() {
+fn threats_stay_ordered_and_enablers_are_free() {
     let steps = "0: (buy)\n1: (sweep a) [4]\n6: (go a b) [1]\n8: (sweep b) [5]";
     let (_, plan) = shared::read_task(DOMAIN, PROBLEM, steps);
     assert_eq!(
@@ -56,7 +56,7 @@ fn what_would_spoil_an_action_stays_after_it_and_what_enables_it_is_free() {
 }
 
 #[test]
-fn everything_that_could_be_done_has_no_order() {
+fn all_possible_actions_are_unordered() {
     let (task, plan) = shared::read_task(DOMAIN, PROBLEM, "0: (sweep a) [4]\n6: (go a b) [1]");
     let actions = plan
         .instances

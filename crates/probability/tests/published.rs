@@ -4,9 +4,9 @@
 mod shared;
 
 use elbowroom_plan::NodeId;
-use elbowroom_probability::dispatch::patient;
+use elbowroom_probability::dispatch::never_interrupt;
 use elbowroom_probability::{
-    Candidates, Circumstances, OrderSearch, PrunedNetwork, SearchSettings, Semantics,
+    Candidates, OrderSearch, PrunedNetwork, SearchSettings, SearchState, Semantics,
 };
 use shared::Published;
 
@@ -28,8 +28,8 @@ fn assert_published(world: &Published, probability: f64, published: f64) {
 
 fn best_order(world: &Published, settings: SearchSettings) -> (Vec<u32>, f64) {
     let mut search = OrderSearch::new(world.model(Semantics::Paper), settings);
-    let initial = Circumstances::initial(&world.task);
-    let found = search.best_order(&initial, &mut patient).unwrap();
+    let initial = SearchState::initial(&world.task);
+    let found = search.best_order(&initial, &mut never_interrupt).unwrap();
     let order = found.order.unwrap();
     let nodes = order.sequence.iter().map(|node| node.0).collect();
     (nodes, order.probability)
@@ -39,7 +39,7 @@ fn best_order(world: &Published, settings: SearchSettings) -> (Vec<u32>, f64) {
 fn the_orders_of_the_published_runs_have_the_published_probabilities() {
     let probability = |world: &Published, order: &[u32]| {
         let model = world.model(Semantics::Paper);
-        let initial = Circumstances::initial(&world.task);
+        let initial = SearchState::initial(&world.task);
         let mut network = PrunedNetwork::new(&model, &initial).unwrap();
         for &node in order {
             network.push(NodeId(node)).unwrap();
@@ -75,7 +75,7 @@ fn the_best_order_is_found_also_where_the_published_search_missed_it() {
 }
 
 #[test]
-fn an_order_may_count_on_luck_if_asked_to() {
+fn order_may_rely_on_spontaneous_changes_if_enabled() {
     let worlds = shared::sf3();
     let Some(world) = worlds.get(8) else {
         return;

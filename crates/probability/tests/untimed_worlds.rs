@@ -9,7 +9,7 @@ use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::PartialOrderPlan;
 use elbowroom_probability::optimum::{DeadEnds, Perturbed, Settings};
 use elbowroom_probability::{
-    Circumstances, Likelihoods, Model, Semantics, all_actions_under, likelihoods,
+    Likelihoods, Model, SearchState, Semantics, all_actions_under, likelihoods,
 };
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -239,7 +239,7 @@ impl World {
         let (task, likelihoods) = self.task();
         let actions = all_actions_under(&task, &likelihoods).unwrap();
         let plan = PartialOrderPlan::unordered(&task, actions);
-        let initial = Circumstances::initial(&task);
+        let initial = SearchState::initial(&task);
         let model = Model::new(task, plan, &likelihoods, Semantics::World).unwrap();
         let process = Perturbed::new(model, settings.clone()).unwrap();
         process.optimum().value(&process, &initial)

@@ -8,17 +8,17 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use std::{fs, thread};
 
-use elbowroom::answers::{Event, Halt, Watcher};
+use elbowroom::answers::{Event, Observer, StopRequest};
 use elbowroom::text::Source;
 use elbowroom_laboratory::answer::{AnyExperiment, CompareAnswer, CompareRequest, compare};
 use elbowroom_laboratory::compare::Part;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-use crate::trouble::{Trouble, guarded};
+use crate::errors::{CallError, run_without_gil};
 
 /// Interval between checks for signals and reports of progress.
-const GLANCE: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// A parsed experiment.
 #[pyclass(frozen, module = "elbowroom._native")]
@@ -34,7 +34,7 @@ pub(crate) fn experiment_files(
     text: String,
     folder: String,
 ) -> PyResult<BTreeMap<String, String>> {
-    guarded(py, || {
+    run_without_gil(py, || {
         let found = Mutex::new(BTreeMap::new());
         let file = |name: &str| {
             let path = Path::new(&folder).join(name);
@@ -58,7 +58,7 @@ impl Experiment {
         text: String,
         files: BTreeMap<String, String>,
     ) -> PyResult<Self> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let file = |name: &str| {
                 let text = files.get(name).cloned();
                 text.ok_or_else(|| format!("the file {name} was not given with the experiment"))
@@ -83,10 +83,10 @@ impl Experiment {
         jobs: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(String, bool)> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let (shard, shards) = part;
             if shard >= shards {
-                return Err(Trouble::Request(format!(
+                return Err(CallError::Request(format!(
                     "there is no part {shard} of {shards}; the parts are 0 to {}",
                     shards.saturating_sub(1)
                 )));
@@ -97,7 +97,7 @@ impl Experiment {
                 shards,
                 jobs,
             };
-            let state = State::default();
+            let state = TrialProgress::default();
             let request = CompareRequest {
                 experiment: &self.experiment,
                 part,
@@ -105,8 +105,8 @@ impl Experiment {
             // Only the thread that Python called can check for signals. The trials run in other
             // threads.
             let (answer, raised) = thread::scope(|scope| {
-                let trials = scope.spawn(|| compare(request, &mut Shared(&state)));
-                let raised = state.heed(progress.as_ref(), || trials.is_finished());
+                let trials = scope.spawn(|| compare(request, &mut TrialObserver(&state)));
+                let raised = state.poll(progress.as_ref(), || trials.is_finished());
                 let answer = trials.join();
                 (answer, raised)
             });
@@ -120,21 +120,21 @@ impl Experiment {
 
     /// Merges parts.
     fn merge(&self, py: Python<'_>, parts: Vec<String>) -> PyResult<String> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let parts = parts
                 .iter()
                 .map(|part| CompareAnswer::read(part, &self.experiment));
             let parts: Vec<_> = parts.collect::<Result<_, _>>()?;
-            Ok(document(&CompareAnswer::merged(&parts)?))
+            Ok(document(&CompareAnswer::merge_results(&parts)?))
         })
     }
 
     /// The table of results as CSV, as Markdown, and as plain text.
     fn tables(&self, py: Python<'_>, results: &str) -> PyResult<(String, String, String)> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let answer = CompareAnswer::read(results, &self.experiment)?;
             let table = answer.table(&self.experiment)?;
-            Ok((table.csv(), table.markdown(), table.within(100)))
+            Ok((table.csv(), table.markdown(), table.fit_to_width(100)))
         })
     }
 }
@@ -146,15 +146,15 @@ fn document(answer: &CompareAnswer) -> String {
 
 /// Progress of the trials, and the request to end them.
 #[derive(Default)]
-struct State {
+struct TrialProgress {
     done: AtomicU64,
     of: AtomicU64,
-    is_to_end: AtomicBool,
+    stop_requested: AtomicBool,
 }
 
-impl State {
+impl TrialProgress {
     /// Checks for signals and reports progress until the trials are over.
-    fn heed(&self, progress: Option<&Py<PyAny>>, is_over: impl Fn() -> bool) -> Option<PyErr> {
+    fn poll(&self, progress: Option<&Py<PyAny>>, is_over: impl Fn() -> bool) -> Option<PyErr> {
         let mut told = 0;
         loop {
             let over = is_over();
@@ -173,7 +173,7 @@ impl State {
                 }
             });
             if let Err(error) = heard {
-                self.is_to_end.store(true, Ordering::Relaxed);
+                self.stop_requested.store(true, Ordering::Relaxed);
                 let is_interrupt =
                     Python::attach(|py| error.is_instance_of::<PyKeyboardInterrupt>(py));
                 return if is_interrupt { None } else { Some(error) };
@@ -181,18 +181,18 @@ impl State {
             if over {
                 return None;
             }
-            thread::park_timeout(GLANCE);
+            thread::park_timeout(POLL_INTERVAL);
         }
     }
 }
 
 /// The watcher of the trials.
-struct Shared<'a>(&'a State);
+struct TrialObserver<'a>(&'a TrialProgress);
 
-impl Watcher for Shared<'_> {
-    fn flow(&mut self) -> ControlFlow<Halt> {
-        if self.0.is_to_end.load(Ordering::Relaxed) {
-            ControlFlow::Break(Halt::Cancelled)
+impl Observer for TrialObserver<'_> {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
+        if self.0.stop_requested.load(Ordering::Relaxed) {
+            ControlFlow::Break(StopRequest::Cancelled)
         } else {
             ControlFlow::Continue(())
         }
@@ -200,7 +200,7 @@ impl Watcher for Shared<'_> {
 
     fn notice(&mut self, event: &Event<'_>) {
         if let Event::Trials(progress) = event {
-            self.0.of.store(progress.of, Ordering::Relaxed);
+            self.0.of.store(progress.total, Ordering::Relaxed);
             self.0.done.store(progress.done, Ordering::Relaxed);
         }
     }

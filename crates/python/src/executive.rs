@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use elbowroom::execution::{Request, Ticket};
+use elbowroom::execution::{ActionHandle, Request};
 use elbowroom::executive::documents::{GivenNumber, NewGoal};
 use elbowroom_executive::journal::Segments;
 use elbowroom_executive::request_queue::{ExternalRequest, RequestStatus};
@@ -13,8 +13,8 @@ use elbowroom_executive::run::JournaledOutcome;
 use elbowroom_executive::{ExecutiveSettings, WarningSink};
 use pyo3::prelude::*;
 
+use crate::errors::{CallError, advised, json, number, run_without_gil};
 use crate::task::Task;
-use crate::trouble::{Trouble, advised, guarded, json, number};
 use crate::world::PyWorld;
 
 /// Persistent run. One thread calls `run`; all other methods can be called from any thread.
@@ -47,7 +47,7 @@ impl Executive {
         planner_memory: Option<u64>,
         warn: Py<PyAny>,
     ) -> PyResult<Self> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let spec = problem.specification(options, false)?;
             let settings = ExecutiveSettings {
                 journal,
@@ -68,7 +68,7 @@ impl Executive {
         planner_memory: Option<u64>,
         warn: Py<PyAny>,
     ) -> PyResult<Self> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let settings = settings(learn, segments, planner_memory, warn);
             let inner = elbowroom_executive::Executive::resume(&journal, settings)?;
             Ok(Self { inner })
@@ -85,7 +85,7 @@ impl Executive {
 
     /// Executes the run in this thread.
     fn run(&self, py: Python<'_>, world: Option<Py<PyAny>>) -> PyResult<Outcome> {
-        let (outcome, raised) = guarded(py, || match world {
+        let (outcome, raised) = run_without_gil(py, || match world {
             None => Ok((self.inner.run()?, None)),
             Some(adapter) => {
                 let ignored = Arc::new(AtomicBool::new(false));
@@ -124,10 +124,10 @@ impl Executive {
         within: Option<&str>,
         timeout: f64,
     ) -> PyResult<(String, &'static str)> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let given = |text: Option<&str>, what| {
                 let given = text.map(|text| number(text, what)).transpose()?;
-                Ok::<_, Trouble>(given.map(GivenNumber))
+                Ok::<_, CallError>(given.map(GivenNumber))
             };
             let goal = NewGoal {
                 name,
@@ -159,7 +159,7 @@ impl Executive {
 
     /// Submits the cancellation of a running action.
     fn cancel_action(&self, py: Python<'_>, ticket: u64, timeout: f64) -> PyResult<&'static str> {
-        let ticket = Ticket(ticket);
+        let ticket = ActionHandle(ticket);
         self.request(py, Request::CancelAction { ticket }, timeout)
     }
 
@@ -171,7 +171,7 @@ impl Executive {
         succeeded: bool,
         timeout: f64,
     ) -> PyResult<&'static str> {
-        let ticket = Ticket(ticket);
+        let ticket = ActionHandle(ticket);
         self.submit(py, ExternalRequest::Outcome { ticket, succeeded }, timeout)
     }
 
@@ -194,23 +194,23 @@ impl Executive {
         value: &str,
         timeout: f64,
     ) -> PyResult<&'static str> {
-        let value = number(value, "value").map_err(|error| error.raised(py))?;
+        let value = number(value, "value").map_err(|error| error.into_exception(py))?;
         self.submit(py, ExternalRequest::Number { fluent, value }, timeout)
     }
 
     /// The state: a document.
     fn state(&self, py: Python<'_>) -> PyResult<String> {
-        guarded(py, || Ok(json(&self.inner.status())))
+        run_without_gil(py, || Ok(json(&self.inner.status())))
     }
 
     /// The goals: a document.
     fn goals(&self, py: Python<'_>) -> PyResult<String> {
-        guarded(py, || Ok(json(&self.inner.published().all_goals())))
+        run_without_gil(py, || Ok(json(&self.inner.published().all_goals())))
     }
 
     /// The plan: a document.
     fn plan(&self, py: Python<'_>) -> PyResult<String> {
-        guarded(py, || Ok(json(&self.inner.published().plan())))
+        run_without_gil(py, || Ok(json(&self.inner.published().plan())))
     }
 
     /// Returns `true` if the run has processed all requests.
@@ -232,9 +232,9 @@ impl Executive {
         sent: usize,
         timeout: f64,
     ) -> PyResult<(Vec<String>, usize, usize, bool)> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let new = self.inner.events().lines_after(sent, duration(timeout)?);
-            Ok((new.lines, new.missed, new.last, new.is_over))
+            Ok((new.lines, new.missed, new.last, new.is_finished))
         })
     }
 
@@ -257,7 +257,7 @@ impl Executive {
         request: ExternalRequest,
         timeout: f64,
     ) -> PyResult<&'static str> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let status = self.inner.submit(request, duration(timeout)?);
             status.map(status_name).map_err(refused)
         })
@@ -283,12 +283,12 @@ fn settings(
     }
 }
 
-fn refused(error: elbowroom_executive::Error) -> Trouble {
-    Trouble::Request(advised(&error))
+fn refused(error: elbowroom_executive::Error) -> CallError {
+    CallError::Request(advised(&error))
 }
 
-fn duration(seconds: f64) -> Result<Duration, Trouble> {
-    Duration::try_from_secs_f64(seconds).map_err(Trouble::request)
+fn duration(seconds: f64) -> Result<Duration, CallError> {
+    Duration::try_from_secs_f64(seconds).map_err(CallError::request)
 }
 
 fn status_name(status: RequestStatus) -> &'static str {

@@ -13,9 +13,9 @@ use elbowroom::text::Source;
 use pyo3::prelude::*;
 use serde::Deserialize;
 
+use crate::errors::{CallError, json, run_without_gil};
+use crate::progress_observer::ProgressObserver;
 use crate::task::{Task, read_options};
-use crate::trouble::{Trouble, guarded, json};
-use crate::watch::Watch;
 
 /// The options of the success probability, as JSON.
 #[derive(Deserialize)]
@@ -48,7 +48,7 @@ impl Default for OddsOptions {
 }
 
 impl OddsOptions {
-    fn settings(self) -> Result<OddsSettings, Trouble> {
+    fn settings(self) -> Result<OddsSettings, CallError> {
         let default = OddsSettings::default();
         let executors = match &self.executors {
             Some(names) => executors(names)?,
@@ -68,11 +68,11 @@ impl OddsOptions {
 }
 
 /// Parses the names of executors.
-fn executors(names: &[String]) -> Result<Vec<ExecutorSpec>, Trouble> {
+fn executors(names: &[String]) -> Result<Vec<ExecutorSpec>, CallError> {
     let read = names.iter().map(|name| name.parse::<ExecutorSpec>());
-    let read: Vec<_> = read.collect::<Result<_, _>>().map_err(Trouble::request)?;
-    match read.iter().find(|spec| spec.asks_odds()) {
-        Some(odd) => Err(Trouble::Request(format!(
+    let read: Vec<_> = read.collect::<Result<_, _>>().map_err(CallError::request)?;
+    match read.iter().find(|spec| spec.needs_comparator()) {
+        Some(odd) => Err(CallError::Request(format!(
             "`{odd}` compares plans while it executes one, which is not sampled here; leave out the \
              number, or use `compare`"
         ))),
@@ -98,9 +98,9 @@ pub(crate) fn odds(
     time_limit: Option<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, Option<String>, bool)> {
-    guarded(py, || {
+    run_without_gil(py, || {
         let settings = read_options::<OddsOptions>(options)?.settings()?;
-        let mut watch = Watch::start(time_limit, progress);
+        let mut watch = ProgressObserver::start(time_limit, progress);
         let plan = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
         let likely = likelihoods::read(Source::new(likely.0, likely.1), &problem.task)?;
         let world = match world {

@@ -5,14 +5,14 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use elbowroom::answers::plan::{ImprovingPlans, ImprovingPlansRequest, NextPlan};
-use elbowroom::answers::{Halt, Watcher};
+use elbowroom::answers::{Observer, StopRequest};
 use pyo3::prelude::*;
 
+use crate::errors::{CallError, json, run_without_gil};
 use crate::task::{EVERY_PROCESSOR, Task, threads};
-use crate::trouble::{Trouble, guarded, json};
 
 /// Interval between two checks for signals.
-const GLANCE: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Grace period for the answer after the end of the search. It is part of the time limit.
 const GRACE: Duration = Duration::from_millis(50);
 
@@ -36,7 +36,7 @@ impl Plans {
         jobs: Option<usize>,
         self_overlap: bool,
     ) -> PyResult<Self> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let begun = Instant::now();
             let limit = time_limit
                 .map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
@@ -52,7 +52,7 @@ impl Plans {
             };
             let search = ImprovingPlans::search(&request, Box::new(clock));
             Ok(Self {
-                search: Mutex::new(search.map_err(Trouble::request)?),
+                search: Mutex::new(search.map_err(CallError::request)?),
                 begun,
                 limit,
             })
@@ -64,27 +64,29 @@ impl Plans {
     fn next(&self, py: Python<'_>) -> PyResult<Option<(String, bool)>> {
         loop {
             let left = self.limit.map(|it| it.saturating_sub(self.begun.elapsed()));
-            let patience = left.map_or(GLANCE, |left| left.min(GLANCE));
+            let patience = left.map_or(POLL_INTERVAL, |left| left.min(POLL_INTERVAL));
             // The lock is only held while the interpreter's lock is released.
-            let news = guarded(py, || {
+            let news = run_without_gil(py, || {
                 let mut search = self.search.lock().unwrap_or_else(PoisonError::into_inner);
                 match search.next_within(patience) {
-                    NextPlan::Better(better) => Ok(News::Document(json(&better.finding), false)),
-                    NextPlan::Later => Ok(News::None),
+                    NextPlan::Better(better) => {
+                        Ok(PollResult::Document(json(&better.finding), false))
+                    }
+                    NextPlan::Timeout => Ok(PollResult::None),
                     NextPlan::Ended => match search.answer() {
-                        Some(Ok(outcome)) => Ok(News::Document(json(&outcome.answer), true)),
-                        Some(Err(error)) => Err(Trouble::Unsupported(error.to_string())),
-                        None => Ok(News::None),
+                        Some(Ok(outcome)) => Ok(PollResult::Document(json(&outcome.answer), true)),
+                        Some(Err(error)) => Err(CallError::Unsupported(error.to_string())),
+                        None => Ok(PollResult::None),
                     },
                 }
             })?;
             match news {
-                News::Document(document, is_last) => return Ok(Some((document, is_last))),
-                News::None if left.is_some_and(|left| left.is_zero()) => {
+                PollResult::Document(document, is_last) => return Ok(Some((document, is_last))),
+                PollResult::None if left.is_some_and(|left| left.is_zero()) => {
                     self.stop(py)?;
                     return Ok(None);
                 }
-                News::None => {
+                PollResult::None => {
                     if let Err(error) = py.check_signals() {
                         self.stop(py)?;
                         return Err(error);
@@ -96,7 +98,7 @@ impl Plans {
 
     /// Stops the search.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let search = self.search.lock().unwrap_or_else(PoisonError::into_inner);
             search.stop();
             Ok(())
@@ -105,7 +107,7 @@ impl Plans {
 }
 
 /// Result of one poll of a search.
-enum News {
+enum PollResult {
     /// A document, with `true` if it is the answer.
     Document(String, bool),
     /// Nothing new.
@@ -118,14 +120,16 @@ struct Clock {
     limit: Option<Duration>,
 }
 
-impl Watcher for Clock {
+impl Observer for Clock {
     fn elapsed(&mut self) -> Duration {
         self.begun.elapsed()
     }
 
-    fn flow(&mut self) -> ControlFlow<Halt> {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         match self.limit {
-            Some(limit) if self.begun.elapsed() >= limit => ControlFlow::Break(Halt::TimeLimit),
+            Some(limit) if self.begun.elapsed() >= limit => {
+                ControlFlow::Break(StopRequest::TimeLimit)
+            }
             _ => ControlFlow::Continue(()),
         }
     }

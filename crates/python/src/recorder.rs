@@ -7,22 +7,22 @@ use elbowroom::execution::{Entry, Recorder};
 use elbowroom::model::Task;
 use elbowroom::report::trace::TraceWriter;
 
-use crate::trouble::Trouble;
+use crate::errors::CallError;
 
 /// A trace as text: `docs/formats/trace.md`.
 #[derive(Clone)]
-pub(crate) struct Tape {
+pub(crate) struct TraceText {
     task: Arc<Task>,
     text: Arc<Mutex<String>>,
 }
 
-impl Tape {
+impl TraceText {
     /// Creates a trace that begins with the specification of the run.
-    pub(crate) fn of(task: &Arc<Task>, spec: &RunSpec) -> Result<Self, Trouble> {
+    pub(crate) fn of(task: &Arc<Task>, spec: &RunSpec) -> Result<Self, CallError> {
         let mut text = String::new();
         let mut sink = |line: &str| text.push_str(line);
         let mut writer = TraceWriter::new(Arc::clone(task), &mut sink);
-        writer.header(spec).map_err(Trouble::request)?;
+        writer.header(spec).map_err(CallError::request)?;
         Ok(Self {
             task: Arc::clone(task),
             text: Arc::new(Mutex::new(text)),
@@ -38,7 +38,7 @@ impl Tape {
     }
 }
 
-impl Recorder for Tape {
+impl Recorder for TraceText {
     fn record(&mut self, entry: &Entry<'_>) {
         let mut locked = self.text.lock().unwrap_or_else(PoisonError::into_inner);
         let text = &mut *locked;

@@ -12,12 +12,12 @@ use elbowroom::model;
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 
+use crate::errors::{CallError, json, run_without_gil};
 use crate::planner::{PyPlanner, Raised};
-use crate::recorder::Tape;
+use crate::progress_observer::ProgressObserver;
+use crate::recorder::TraceText;
 use crate::stop::Stop;
 use crate::task::{Task, read_options, threads};
-use crate::trouble::{Trouble, guarded, json};
-use crate::watch::Watch;
 use crate::world::PyWorld;
 
 /// The executors: name, meaning of the number after the name, summary, source.
@@ -56,16 +56,17 @@ pub(crate) fn run(
     progress: Option<Py<PyAny>>,
     stop: &Stop,
 ) -> PyResult<(String, Option<String>, bool, Option<Py<PyAny>>)> {
-    let (answer, trace, is_interrupted, raised) = guarded(py, || {
+    let (answer, trace, is_interrupted, raised) = run_without_gil(py, || {
         let spec = problem.specification(options, plan.is_some())?;
-        let watch = Watch::start(time_limit, progress).stopped_by(Arc::clone(&stop.flag));
+        let watch =
+            ProgressObserver::start(time_limit, progress).with_stop_flag(Arc::clone(&stop.flag));
         let raised = Raised::default();
         let task = problem.with_epsilon_of(&spec);
         let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
         let mut request = RunRequest::new(&spec, &task).beginning_with(first);
         if let Some(callable) = planner {
-            let planner = problem.asking(callable, watch.flag(), &raised);
-            request = request.planned_by(planner);
+            let planner = problem.python_planner(callable, watch.flag(), &raised);
+            request = request.with_planner(planner);
         }
         problem.executed(request, world, &raised, has_trace, watch)
     })?;
@@ -75,7 +76,7 @@ pub(crate) fn run(
 
 impl Task {
     /// Returns a planner that calls a Python callable.
-    pub(crate) fn asking(
+    pub(crate) fn python_planner(
         &self,
         callable: Py<PyAny>,
         interrupted: Arc<AtomicBool>,
@@ -96,10 +97,10 @@ impl Task {
         world: Option<Py<PyAny>>,
         raised: &Raised,
         has_trace: bool,
-        mut watch: Watch,
-    ) -> Result<Outcome, Trouble> {
+        mut watch: ProgressObserver,
+    ) -> Result<Outcome, CallError> {
         let tape = if has_trace {
-            Some(Tape::of(request.task, request.spec)?)
+            Some(TraceText::of(request.task, request.spec)?)
         } else {
             None
         };
@@ -128,7 +129,11 @@ impl Task {
     }
 
     /// Returns the specification of a run of this problem with these options.
-    pub(crate) fn specification(&self, options: &str, has_plan: bool) -> Result<RunSpec, Trouble> {
+    pub(crate) fn specification(
+        &self,
+        options: &str,
+        has_plan: bool,
+    ) -> Result<RunSpec, CallError> {
         let usual = RunSpec {
             has_plan,
             epsilon: self.task.epsilon().clone(),
@@ -139,14 +144,16 @@ impl Task {
         // it.
         let jobs = options.remove("jobs").filter(|jobs| !jobs.is_null());
         let jobs = jobs.map(serde_json::from_value).transpose();
-        let jobs = jobs.map_err(|error| Trouble::Request(format!("jobs: {error}")))?;
-        let Value::Object(mut members) = serde_json::to_value(&usual).map_err(Trouble::request)?
+        let jobs = jobs.map_err(|error| CallError::Request(format!("jobs: {error}")))?;
+        let Value::Object(mut members) =
+            serde_json::to_value(&usual).map_err(CallError::request)?
         else {
             return Ok(usual);
         };
         members.extend(options);
-        let mut spec: RunSpec = serde_json::from_value(members.into()).map_err(Trouble::request)?;
-        check_vary(&self.task, &spec.vary).map_err(Trouble::request)?;
+        let mut spec: RunSpec =
+            serde_json::from_value(members.into()).map_err(CallError::request)?;
+        check_vary(&self.task, &spec.vary).map_err(CallError::request)?;
         spec.check_planner()?;
         spec.threads = threads(jobs, 1, spec.planner.eq_ignore_ascii_case(EMBEDDED))?;
         Ok(spec)

@@ -10,10 +10,10 @@ use elbowroom::model;
 use elbowroom::num::Rational;
 use pyo3::prelude::*;
 
+use crate::errors::{CallError, json, run_without_gil};
 use crate::planner::Raised;
-use crate::recorder::Tape;
+use crate::recorder::TraceText;
 use crate::task::Task;
-use crate::trouble::{Trouble, guarded, json};
 use crate::world::{names, read_observations, read_passage};
 
 /// A run that returns its next request, and receives the answer.
@@ -22,7 +22,7 @@ pub(crate) struct Stepper {
     run: Mutex<Run<'static>>,
     workers: Mutex<Box<dyn Workers + 'static>>,
     task: Arc<model::Task>,
-    tape: Option<Tape>,
+    tape: Option<TraceText>,
     raised: Raised,
     /// Requests the end of the run.
     stop: Arc<AtomicBool>,
@@ -54,24 +54,27 @@ impl Stepper {
         planner: Option<Py<PyAny>>,
         has_trace: bool,
     ) -> PyResult<Self> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let spec = problem.specification(options, plan.is_some())?;
             let task = problem.with_epsilon_of(&spec);
             let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
             let raised = Raised::default();
             let stop = Arc::new(AtomicBool::new(false));
             let is_stopped = Arc::clone(&stop);
-            let mut execution = spec.execution(&task)?.beginning_with(first).explaining();
-            execution = execution.ending_when(move || is_stopped.load(Ordering::SeqCst));
+            let mut execution = spec
+                .execution(&task)?
+                .beginning_with(first)
+                .with_explanations();
+            execution = execution.with_stop_check(move || is_stopped.load(Ordering::SeqCst));
             execution = if let Some(callable) = planner {
-                execution.planned_by(problem.asking(callable, Arc::clone(&stop), &raised))
+                execution.with_planner(problem.python_planner(callable, Arc::clone(&stop), &raised))
             } else {
                 let model = spec.beliefs(task.problem());
                 let model = model.map_err(elbowroom::execute::SpecError::World)?;
-                execution.planned_by(spec.planner_for(&task, model.as_ref(), NO_CLOCK, ALWAYS)?)
+                execution.with_planner(spec.planner_for(&task, model.as_ref(), NO_CLOCK, ALWAYS)?)
             };
             let tape = if has_trace {
-                Some(Tape::of(&task, &spec)?)
+                Some(TraceText::of(&task, &spec)?)
             } else {
                 None
             };
@@ -92,7 +95,7 @@ impl Stepper {
 
     /// The next request of the run.
     fn next(&self, py: Python<'_>) -> PyResult<Needed> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let mut run = self.run();
             let mut workers = self.workers.lock().unwrap_or_else(PoisonError::into_inner);
             loop {
@@ -103,7 +106,7 @@ impl Stepper {
                     .unwrap_or_else(PoisonError::into_inner)
                     .take()
                 {
-                    return Err(Trouble::Python(error));
+                    return Err(CallError::Python(error));
                 }
                 let now = run.now().to_string();
                 return Ok(match next {
@@ -124,7 +127,7 @@ impl Stepper {
                         Needed::Look("look", facts, fluents)
                     }
                     Next::Over(report) => {
-                        let trace = self.tape.as_ref().map(Tape::text);
+                        let trace = self.tape.as_ref().map(TraceText::text);
                         Needed::Over("over", json(&RunAnswer::of(&report)), trace)
                     }
                     request => {
@@ -138,23 +141,25 @@ impl Stepper {
 
     /// Answers a wait with the present time and the observations.
     fn observe(&self, py: Python<'_>, passage: &str) -> PyResult<()> {
-        guarded(py, || {
-            let passage = read_passage(passage, &self.task).map_err(Trouble::request)?;
-            self.run().observe(passage).map_err(Trouble::request)
+        run_without_gil(py, || {
+            let passage = read_passage(passage, &self.task).map_err(CallError::request)?;
+            self.run().observe(passage).map_err(CallError::request)
         })
     }
 
     /// Answers a look with the observations.
     fn see(&self, py: Python<'_>, observations: &str) -> PyResult<()> {
-        guarded(py, || {
-            let seen = read_observations(observations, &self.task).map_err(Trouble::request)?;
-            self.run().see(seen).map_err(Trouble::request)
+        run_without_gil(py, || {
+            let seen = read_observations(observations, &self.task).map_err(CallError::request)?;
+            self.run()
+                .observe_requested(seen)
+                .map_err(CallError::request)
         })
     }
 
     /// Reports a failure of the world.
     fn fail(&self, py: Python<'_>, why: &str) -> PyResult<()> {
-        guarded(py, || {
+        run_without_gil(py, || {
             self.run().fail(WorldError::new(why));
             Ok(())
         })

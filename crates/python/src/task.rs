@@ -16,12 +16,12 @@ use elbowroom::model::{self, TimeTriggeredPlan};
 use elbowroom::plan::format;
 use elbowroom::plan::parametrize::VarySpec;
 use elbowroom::text::Source;
-use elbowroom::{AnyPlan, PlanKind, RoundingRule, graph, pddl};
+use elbowroom::{AnyPlan, PlanKind, RoundingRule, dot, pddl};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::trouble::{Trouble, guarded, json, number, positive};
-use crate::watch::Watch;
+use crate::errors::{CallError, json, number, positive, run_without_gil};
+use crate::progress_observer::ProgressObserver;
 
 /// A problem with its texts.
 #[pyclass(frozen, module = "elbowroom._native")]
@@ -40,7 +40,7 @@ pub(crate) fn read(
     problem: (String, String),
     epsilon: &str,
 ) -> PyResult<(Task, String)> {
-    guarded(py, || {
+    run_without_gil(py, || {
         let domain = Source::new(domain.0, domain.1);
         let problem = Source::new(problem.0, problem.1);
         let epsilon = positive(epsilon, "epsilon")?;
@@ -138,7 +138,7 @@ impl Task {
 
     /// Validates a plan and returns a document.
     fn check(&self, py: Python<'_>, plan: (String, String), options: &str) -> PyResult<String> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let options: CheckOptions = read_options(options)?;
             let settings = match options.rules {
                 Rules::Pddl => Settings::default(),
@@ -177,7 +177,7 @@ impl Task {
         py: Python<'_>,
         plan: (String, String),
     ) -> PyResult<Option<Vec<(String, String, Option<String>)>>> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let AnyPlan::TimeTriggered(plan) = self.any_plan(plan)? else {
                 return Ok(None);
             };
@@ -206,15 +206,15 @@ impl Task {
         self_overlap: bool,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(String, bool)> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let is_embedded = planner.eq_ignore_ascii_case(plan::EMBEDDED);
             let threads = threads(jobs, EVERY_PROCESSOR, is_embedded)?;
             if self_overlap && !is_embedded {
                 return Err(SpecError::SelfOverlap(planner.to_owned()).into());
             }
-            let mut watch = Watch::start(time_limit, progress);
+            let mut watch = ProgressObserver::start(time_limit, progress);
             let limit = time_limit.map(std::time::Duration::try_from_secs_f64);
-            let limit = limit.transpose().map_err(Trouble::request)?;
+            let limit = limit.transpose().map_err(CallError::request)?;
             let mut request = PlanRequest {
                 task: &self.task,
                 first_plan_only: first,
@@ -225,8 +225,8 @@ impl Task {
             let outcome = if is_embedded {
                 plan::plan(&mut request, &mut watch)?
             } else {
-                let planner =
-                    Planner::named(planner).map_err(|error| Trouble::Planner(error.to_string()))?;
+                let planner = Planner::named(planner)
+                    .map_err(|error| CallError::Planner(error.to_string()))?;
                 let sources = [&self.domain, &self.problem];
                 plan::plan_with(&planner, &mut request, sources, limit, &mut watch)?
             };
@@ -240,18 +240,18 @@ impl Task {
         py: Python<'_>,
         plan: (String, String),
     ) -> PyResult<(String, Option<String>, Option<String>)> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let request = StnRequest {
                 task: &self.task,
                 plan: self.any_plan(plan)?,
             };
             let outcome = answers::stn::stn(&request)?;
             let text = match &outcome.plan {
-                Some(plan) => Some(format::write(&self.task, plan).map_err(Trouble::request)?),
+                Some(plan) => Some(format::write(&self.task, plan).map_err(CallError::request)?),
                 None => None,
             };
             let plan = outcome.plan.as_ref();
-            let dot = plan.map(|plan| graph::to_dot(&self.task, plan));
+            let dot = plan.map(|plan| dot::to_dot(&self.task, plan));
             Ok((json(&outcome.answer), text, dot))
         })
     }
@@ -265,9 +265,9 @@ impl Task {
         time_limit: Option<f64>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(String, Option<String>, bool)> {
-        guarded(py, || {
+        run_without_gil(py, || {
             let options: EnvelopeOptions = read_options(options)?;
-            let mut watch = Watch::start(time_limit, progress);
+            let mut watch = ProgressObserver::start(time_limit, progress);
             let name = plan.0.clone();
             let search = Search::default();
             let request = EnvelopeRequest {
@@ -277,7 +277,7 @@ impl Task {
                 enforce: options.enforce,
                 contains: options.contains,
                 timeout: match &options.timeout {
-                    Some(rule) => rule.parse().map_err(Trouble::request)?,
+                    Some(rule) => rule.parse().map_err(CallError::request)?,
                     None => TimeoutRule::default(),
                 },
                 search: Search {
@@ -318,7 +318,7 @@ impl Task {
 impl Task {
     /// Reads a plan of either kind, with the default rule about rounded numbers. The content, or
     /// the extension `.stn`, determines the kind.
-    fn any_plan(&self, plan: (String, String)) -> Result<AnyPlan, Trouble> {
+    fn any_plan(&self, plan: (String, String)) -> Result<AnyPlan, CallError> {
         self.any_plan_by(plan, &RoundingRule::default())
     }
 
@@ -326,7 +326,7 @@ impl Task {
         &self,
         (name, text): (String, String),
         rule: &RoundingRule,
-    ) -> Result<AnyPlan, Trouble> {
+    ) -> Result<AnyPlan, CallError> {
         let is_stn_name = name.to_ascii_lowercase().ends_with(".stn");
         let source = Source::new(name, text);
         if is_stn_name || PlanKind::of_text(source.text()) == PlanKind::Stn {
@@ -344,7 +344,7 @@ impl Task {
     pub(crate) fn time_triggered(
         &self,
         plan: (String, String),
-    ) -> Result<TimeTriggeredPlan, Trouble> {
+    ) -> Result<TimeTriggeredPlan, CallError> {
         self.time_triggered_by(plan, &RoundingRule::default())
     }
 
@@ -352,11 +352,11 @@ impl Task {
         &self,
         plan: (String, String),
         rule: &RoundingRule,
-    ) -> Result<TimeTriggeredPlan, Trouble> {
+    ) -> Result<TimeTriggeredPlan, CallError> {
         let name = plan.0.clone();
         match self.any_plan_by(plan, rule)? {
             AnyPlan::TimeTriggered(plan) => Ok(plan),
-            AnyPlan::Stn(_) => Err(Trouble::Request(format!(
+            AnyPlan::Stn(_) => Err(CallError::Request(format!(
                 "{name} is an STN plan, which stands for many plans; give a plan with fixed times, \
                  or ask for the envelope of this one"
             ))),
@@ -365,9 +365,9 @@ impl Task {
 }
 
 /// Parses the specifications of the quantities that may vary.
-fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Trouble> {
+fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, CallError> {
     let specs = texts.iter().map(|text| text.parse::<VarySpec>());
-    specs.collect::<Result<_, _>>().map_err(Trouble::request)
+    specs.collect::<Result<_, _>>().map_err(CallError::request)
 }
 
 /// Value of `jobs` that requests one thread per processor.
@@ -378,9 +378,9 @@ pub(crate) fn threads(
     jobs: Option<usize>,
     usual: usize,
     is_embedded: bool,
-) -> Result<usize, Trouble> {
+) -> Result<usize, CallError> {
     if jobs.is_some() && !is_embedded {
-        return Err(Trouble::request(
+        return Err(CallError::request(
             "`jobs` says how many threads the embedded planner uses; another one has its own settings",
         ));
     }
@@ -391,11 +391,11 @@ pub(crate) fn threads(
 }
 
 /// Reads options from JSON.
-pub(crate) fn read_options<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, Trouble> {
+pub(crate) fn read_options<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, CallError> {
     serde_json::from_str(text).map_err(|error| {
         // The position is useless, because the user did not write the JSON text.
         let message = error.to_string();
         let end = message.rfind(" at line ").unwrap_or(message.len());
-        Trouble::Request(message[..end].to_owned())
+        CallError::Request(message[..end].to_owned())
     })
 }

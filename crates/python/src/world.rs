@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::execution::{Command, Observation, TimeAdvance, World, WorldError};
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -69,7 +69,7 @@ impl PyWorld {
 
 impl PyWorld {
     /// Notifies the Python side of an invalid answer, as of an exception.
-    fn understood<T>(&self, answer: Result<T, WorldError>) -> Result<T, WorldError> {
+    fn check_answer<T>(&self, answer: Result<T, WorldError>) -> Result<T, WorldError> {
         answer.map_err(|error| {
             // The error of the answer takes precedence.
             let _ = Python::attach(|py| self.adapter.call_method0(py, "begin_end").map(|_| ()));
@@ -98,7 +98,7 @@ impl World for PyWorld {
         })
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let answered = Python::attach(|py| {
             self.call(py, "wait", (until.to_string(),), |it| {
                 it.extract::<String>()
@@ -107,9 +107,9 @@ impl World for PyWorld {
         let Some(text) = answered else {
             let now = self.now.clone();
             let observations = Vec::new();
-            return Ok(Passage { now, observations });
+            return Ok(TimeAdvance { now, observations });
         };
-        let passage = self.understood(read_passage(&text, &self.task))?;
+        let passage = self.check_answer(read_passage(&text, &self.task))?;
         self.now = passage.now.clone();
         Ok(passage)
     }
@@ -124,7 +124,7 @@ impl World for PyWorld {
             self.call(py, "look", (facts, fluents), |it| it.extract::<String>())
         })?;
         match answered {
-            Some(text) => self.understood(read_observations(&text, &self.task)),
+            Some(text) => self.check_answer(read_observations(&text, &self.task)),
             None => Ok(Vec::new()),
         }
     }
@@ -135,7 +135,7 @@ impl EmbeddedWorld for PyWorld {
         &mut self,
         now: &Rational,
         running: &[StartedAction],
-    ) -> Result<Option<Passage>, WorldError> {
+    ) -> Result<Option<TimeAdvance>, WorldError> {
         let running = running.iter().map(|it| {
             let duration = it.duration.as_ref().map(ToString::to_string);
             (
@@ -152,7 +152,7 @@ impl EmbeddedWorld for PyWorld {
         let Some(text) = answered.flatten() else {
             return Ok(None);
         };
-        let passage = self.understood(read_passage(&text, &self.task))?;
+        let passage = self.check_answer(read_passage(&text, &self.task))?;
         self.now = passage.now.clone();
         Ok(Some(passage))
     }
@@ -170,24 +170,27 @@ pub(crate) fn names(
 }
 
 /// Reads the answer to a wait: `{"now": …, "observations": […]}`.
-pub(crate) fn read_passage(text: &str, task: &Task) -> Result<Passage, WorldError> {
+pub(crate) fn read_passage(text: &str, task: &Task) -> Result<TimeAdvance, WorldError> {
     let message = read(text)?;
     let now =
         wire::field_number(&message, "now").map_err(|error| WorldError::new(error.message))?;
-    let observations = listed(message.get("observations"), task)?;
-    Ok(Passage { now, observations })
+    let observations = read_observation_list(message.get("observations"), task)?;
+    Ok(TimeAdvance { now, observations })
 }
 
 /// Reads the answer to a look: a list of observations.
 pub(crate) fn read_observations(text: &str, task: &Task) -> Result<Vec<Observation>, WorldError> {
-    listed(Some(&read(text)?), task)
+    read_observation_list(Some(&read(text)?), task)
 }
 
 fn read(text: &str) -> Result<Value, WorldError> {
     serde_json::from_str(text).map_err(|error| WorldError::new(error.to_string()))
 }
 
-fn listed(list: Option<&Value>, task: &Task) -> Result<Vec<Observation>, WorldError> {
+fn read_observation_list(
+    list: Option<&Value>,
+    task: &Task,
+) -> Result<Vec<Observation>, WorldError> {
     let list = list.and_then(Value::as_array);
     let list = list.ok_or_else(|| WorldError::new("the observations must be a list"))?;
     let read = |it| wire::read_observation(it, task);

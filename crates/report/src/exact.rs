@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_exact_texts_beside_decimals() {
+    fn numbers_have_exact_text_and_decimal() {
         let text = serde_json::to_string(&Exact(Rational::new(1393, 2))).unwrap();
         assert_eq!(text, r#"{"exact":"1393/2","decimal":696.5}"#);
         let read: Exact = serde_json::from_str(r#"{"exact":"1/3","decimal":0.3}"#).unwrap();
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn an_infinite_end_has_a_sign_and_no_decimal() {
+    fn infinite_end_has_sign_without_decimal() {
         let ends = Ends {
             lower: End::Infinite,
             upper: End::Infinite,

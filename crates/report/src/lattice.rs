@@ -59,12 +59,12 @@ const LINE: f64 = 16.0;
 const HEAD: f64 = 84.0;
 /// Maximum number of sets on a level at which probabilities are printed. In larger pictures, they
 /// are shown on hover only.
-const MOST_LABELLED: usize = 14;
+const MAX_LABELLED_NODES: usize = 14;
 
 impl LatticePicture {
     /// Renders the picture as an SVG document.
     pub fn svg(&self) -> String {
-        let places = self.places();
+        let places = self.node_centres();
         let levels = self.nodes.iter().map(|node| node.level).max().unwrap_or(0);
         let tallest = self.tallest();
         let width = (2.0 * MARGIN + COLUMN * float(levels)).max(640.0);
@@ -80,14 +80,14 @@ impl LatticePicture {
         text(&mut svg, (MARGIN / 2.0, 26.0), 16, "start", &self.title);
         text(&mut svg, (MARGIN / 2.0, 46.0), 12, "start", &self.subtitle);
         for edge in self.edges.iter().filter(|edge| !self.is_shown(edge)) {
-            self.line(&mut svg, edge, &places);
+            self.draw_edge(&mut svg, edge, &places);
         }
         for edge in self.edges.iter().filter(|edge| self.is_shown(edge)) {
-            self.line(&mut svg, edge, &places);
+            self.draw_edge(&mut svg, edge, &places);
         }
         let best = self.nodes.iter().map(|node| node.value).fold(0.0, f64::max);
         for (position, node) in self.nodes.iter().enumerate() {
-            self.set(&mut svg, (position, node), places[position], best, tallest);
+            self.draw_node(&mut svg, (position, node), places[position], best, tallest);
         }
         // Names would overlap lines and sets, so the lines of the highlighted order are numbered,
         // and a legend below has the names.
@@ -127,7 +127,7 @@ impl LatticePicture {
 
     /// Returns the centre of each set. Sets on a level are sorted by the mean height of their
     /// predecessors.
-    fn places(&self) -> Vec<(f64, f64)> {
+    fn node_centres(&self) -> Vec<(f64, f64)> {
         let levels = self.nodes.iter().map(|node| node.level).max().unwrap_or(0);
         let tallest = float(self.tallest().max(3));
         let mut places = vec![(0.0, 0.0); self.nodes.len()];
@@ -152,7 +152,7 @@ impl LatticePicture {
         places
     }
 
-    fn line(&self, svg: &mut String, edge: &PictureEdge, places: &[(f64, f64)]) {
+    fn draw_edge(&self, svg: &mut String, edge: &PictureEdge, places: &[(f64, f64)]) {
         let ((x1, y1), (x2, y2)) = (places[edge.from], places[edge.to]);
         let (stroke, width) = if self.is_shown(edge) {
             ("#d55e00", 3.0)
@@ -168,7 +168,7 @@ impl LatticePicture {
         );
     }
 
-    fn set(
+    fn draw_node(
         &self,
         svg: &mut String,
         (position, node): (usize, &PictureNode),
@@ -191,7 +191,7 @@ impl LatticePicture {
             escaped(&node.words),
             percent(node.value)
         );
-        if tallest <= MOST_LABELLED {
+        if tallest <= MAX_LABELLED_NODES {
             text(svg, (x, y + 20.0), 9, "middle", &percent(node.value));
         }
     }
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn each_set_and_each_line_is_drawn_once() {
+    fn each_node_and_edge_is_drawn_once() {
         let svg = diamond().svg();
         assert_eq!(svg.matches("<circle").count(), 4);
         assert_eq!(svg.matches("<line").count(), 4);
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_can_be_drawn() {
+    fn empty_lattice_is_drawn() {
         assert!(LatticePicture::default().svg().ends_with("</svg>\n"));
     }
 }

@@ -27,15 +27,15 @@ pub struct PlanePicture {
 
 /// The size of the plane in pixels.
 const SIDE: f64 = 400.0;
-const LEFT: f64 = 76.0;
-const TOP: f64 = 70.0;
+const LEFT_MARGIN: f64 = 76.0;
+const TOP_MARGIN: f64 = 70.0;
 /// Width of the legend.
-const LEGEND: f64 = 210.0;
-const BELOW: f64 = 60.0;
+const LEGEND_WIDTH: f64 = 210.0;
+const BOTTOM_MARGIN: f64 = 60.0;
 const INK: &str = "#3c3c3c";
 /// Colours of Okabe & Ito, which colour-blind readers can distinguish, each with its own dash
 /// pattern.
-const LINES: [(&str, &str); 4] = [
+const LEGEND_ENTRIES: [(&str, &str); 4] = [
     ("#d55e00", ""),
     ("#009e73", "8 4"),
     ("#cc79a7", "3 3"),
@@ -47,7 +47,10 @@ const TICKS: f64 = 6.0;
 impl PlanePicture {
     /// Renders the picture as an SVG document.
     pub fn svg(&self) -> String {
-        let (width, height) = (LEFT + SIDE + LEGEND, TOP + SIDE + BELOW);
+        let (width, height) = (
+            LEFT_MARGIN + SIDE + LEGEND_WIDTH,
+            TOP_MARGIN + SIDE + BOTTOM_MARGIN,
+        );
         let mut svg = String::new();
         let _ = writeln!(
             svg,
@@ -67,23 +70,23 @@ impl PlanePicture {
                 corners.join(" ")
             );
         }
-        let mut entry = TOP + 8.0;
+        let mut entry = TOP_MARGIN + 8.0;
         let _ = writeln!(
             svg,
             "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"26\" height=\"12\" fill=\"#56b4e9\" \
              fill-opacity=\"0.45\" stroke=\"#0072b2\"/>",
-            LEFT + SIDE + 18.0,
+            LEFT_MARGIN + SIDE + 18.0,
             entry - 4.0
         );
         legend(&mut svg, entry, &self.areas_name);
         for (index, (name, corners)) in self.boxes.iter().enumerate() {
             entry += 24.0;
-            let (colour, dashes) = LINES[index % LINES.len()];
+            let (colour, dashes) = LEGEND_ENTRIES[index % LEGEND_ENTRIES.len()];
             let style = format!(
                 "fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.5\" stroke-dasharray=\"{dashes}\""
             );
             self.outline(&mut svg, corners, &style);
-            let from = LEFT + SIDE + 18.0;
+            let from = LEFT_MARGIN + SIDE + 18.0;
             let _ = writeln!(
                 svg,
                 "<line x1=\"{from:.1}\" y1=\"{0:.1}\" x2=\"{1:.1}\" y2=\"{0:.1}\" {style}/>",
@@ -95,23 +98,23 @@ impl PlanePicture {
         if let Some((name, place)) = &self.point {
             entry += 24.0;
             cross(&mut svg, self.place(place));
-            cross(&mut svg, (LEFT + SIDE + 31.0, entry + 2.0));
+            cross(&mut svg, (LEFT_MARGIN + SIDE + 31.0, entry + 2.0));
             legend(&mut svg, entry, name);
         }
         let _ = writeln!(
             svg,
-            "<rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{SIDE}\" height=\"{SIDE}\" fill=\"none\" \
+            "<rect x=\"{LEFT_MARGIN}\" y=\"{TOP_MARGIN}\" width=\"{SIDE}\" height=\"{SIDE}\" fill=\"none\" \
              stroke=\"{INK}\"/>"
         );
-        let middle = LEFT + SIDE / 2.0;
+        let middle = LEFT_MARGIN + SIDE / 2.0;
         text(
             &mut svg,
-            (middle, TOP + SIDE + 44.0),
+            (middle, TOP_MARGIN + SIDE + 44.0),
             13,
             "middle",
             &self.axes[0],
         );
-        let (x, y) = (20.0, TOP + SIDE / 2.0);
+        let (x, y) = (20.0, TOP_MARGIN + SIDE / 2.0);
         let _ = writeln!(
             svg,
             "<text x=\"{x}\" y=\"{y}\" font-size=\"13\" text-anchor=\"middle\" fill=\"{INK}\" \
@@ -134,7 +137,10 @@ impl PlanePicture {
             };
             share.clamp(0.0, 1.0)
         };
-        (LEFT + SIDE * share(0), TOP + SIDE * (1.0 - share(1)))
+        (
+            LEFT_MARGIN + SIDE * share(0),
+            TOP_MARGIN + SIDE * (1.0 - share(1)),
+        )
     }
 
     fn pixels(&self, point: &[f64; 2]) -> String {
@@ -176,11 +182,11 @@ impl PlanePicture {
                 if axis == 0 {
                     let _ = writeln!(
                         svg,
-                        "<line x1=\"{x:.2}\" y1=\"{TOP}\" x2=\"{x:.2}\" y2=\"{y:.2}\" stroke=\"#e4e4e4\"/>"
+                        "<line x1=\"{x:.2}\" y1=\"{TOP_MARGIN}\" x2=\"{x:.2}\" y2=\"{y:.2}\" stroke=\"#e4e4e4\"/>"
                     );
                     text(svg, (x, y + 18.0), 11, "middle", &label);
                 } else {
-                    let end = LEFT + SIDE;
+                    let end = LEFT_MARGIN + SIDE;
                     let _ = writeln!(
                         svg,
                         "<line x1=\"{x:.2}\" y1=\"{y:.2}\" x2=\"{end:.2}\" y2=\"{y:.2}\" stroke=\"#e4e4e4\"/>"
@@ -229,7 +235,13 @@ fn cross(svg: &mut String, (x, y): (f64, f64)) {
 }
 
 fn legend(svg: &mut String, y: f64, words: &str) {
-    text(svg, (LEFT + SIDE + 52.0, y + 6.0), 12, "start", words);
+    text(
+        svg,
+        (LEFT_MARGIN + SIDE + 52.0, y + 6.0),
+        12,
+        "start",
+        words,
+    );
 }
 
 fn text(svg: &mut String, (x, y): (f64, f64), size: u32, anchor: &str, words: &str) {
@@ -257,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_the_window_is_not_drawn() {
+    fn shapes_outside_window_are_not_drawn() {
         let picture = PlanePicture {
             axes: ["a < b".to_owned(), String::new()],
             window: [[0.0, 0.0], [10.0, 10.0]],

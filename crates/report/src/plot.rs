@@ -5,10 +5,10 @@
 //! plot gives the same bytes.
 
 #[cfg(feature = "plots")]
-mod drawn;
+mod drawing;
 
 #[cfg(feature = "plots")]
-pub use drawn::PlotError;
+pub use drawing::PlotError;
 
 /// Values of several series, group by group.
 #[derive(Clone, Debug, Default, PartialEq)]

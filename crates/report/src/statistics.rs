@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn mcnemars_test_counts_the_ways_to_divide_so_unevenly() {
+    fn mcnemar_matches_exact_counting() {
         for first in 0..8 {
             for second in 0..8 {
                 let counted = mcnemar_by_counting(first, second);
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn wilsons_interval_is_that_of_the_books() {
+    fn wilson_interval_matches_published_values() {
         // Newcombe (1998), table I: 81 of 263, and 0 of 20, without continuity correction.
         let (lower, upper) = Proportion {
             successes: 81,

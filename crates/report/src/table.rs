@@ -74,7 +74,7 @@ impl Table {
 
     /// Renders the table for a terminal of `width` columns. Headings are broken between words.
     /// Columns that do not fit follow in further blocks, which repeat the keys.
-    pub fn within(&self, width: usize) -> String {
+    pub fn fit_to_width(&self, width: usize) -> String {
         let longest_word = |heading: &String| {
             let words = heading.split(' ').map(|word| word.chars().count());
             words.max().unwrap_or(0)
@@ -89,7 +89,7 @@ impl Table {
             .collect();
         let mut text = String::new();
         for line in self.caption.lines() {
-            let _ = writeln!(text, "{}", broken(line, width).join("\n"));
+            let _ = writeln!(text, "{}", wrap_lines(line, width).join("\n"));
         }
         for columns in blocks(&widths, self.keys.max(1), width) {
             text.push('\n');
@@ -100,7 +100,7 @@ impl Table {
 
     /// Writes some columns, with their headings.
     fn write_block(&self, text: &mut String, columns: &[usize], widths: &[usize]) {
-        let heading = |column: &usize| broken(&self.headings[*column], widths[*column]);
+        let heading = |column: &usize| wrap_lines(&self.headings[*column], widths[*column]);
         let headings: Vec<Vec<String>> = columns.iter().map(heading).collect();
         let height = headings.iter().map(Vec::len).max().unwrap_or(0);
         let lines = (0..height).map(|line| {
@@ -155,7 +155,7 @@ fn blocks(widths: &[usize], keys: usize, width: usize) -> Vec<Vec<usize>> {
 }
 
 /// Breaks a text into lines of at most `width` characters. Longer words are not broken.
-fn broken(text: &str, width: usize) -> Vec<String> {
+fn wrap_lines(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ') {
         match lines.last_mut() {
@@ -182,7 +182,7 @@ mod tests {
     use super::Table;
 
     #[test]
-    fn wide_tables_are_broken_and_lose_nothing() {
+    fn wide_table_is_split_without_loss() {
         let headings = ["who", "one: coverage [95 %]", "two: coverage [95 %]"];
         let row = ["a", "1.0 [0.5, 2.0]", "3.0 [2.5, 4.0]"];
         let table = Table {
@@ -195,13 +195,13 @@ mod tests {
         let expected = "How often it works\n\n\
                         who  one: coverage\n     [95 %]\na    1.0 [0.5, 2.0]\n\n\
                         who  two: coverage\n     [95 %]\na    3.0 [2.5, 4.0]\n";
-        assert_eq!(table.within(20), expected);
-        let all = table.within(80);
+        assert_eq!(table.fit_to_width(20), expected);
+        let all = table.fit_to_width(80);
         assert!(all.contains("one: coverage   two: coverage\n"), "{all}");
     }
 
     #[test]
-    fn folded_rows_are_told_apart() {
+    fn wrapped_rows_are_distinguishable() {
         let cells = |row: [&str; 4]| row.map(str::to_owned).to_vec();
         let table = Table {
             caption: "Who wins".to_owned(),
@@ -216,11 +216,11 @@ mod tests {
         let expected = "Who wins\n\n\
                         case  executor  success\np1    stn       10\np1    live      20\n\n\
                         case  executor  replans\np1    stn       1\np1    live      2\n";
-        assert_eq!(table.within(24), expected);
+        assert_eq!(table.fit_to_width(24), expected);
     }
 
     #[test]
-    fn cells_line_up_and_commas_are_quoted() {
+    fn cells_are_aligned_and_commas_quoted() {
         let table = Table {
             caption: "Two".to_owned(),
             headings: vec!["a".to_owned(), "long".to_owned()],

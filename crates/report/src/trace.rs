@@ -5,7 +5,7 @@
 //!
 //! [`Stored::read`] parses a trace into typed lines ([`mod@line`]).
 
-mod of;
+mod encode;
 mod replay;
 mod snapshot;
 
@@ -15,12 +15,13 @@ use elbowroom_execution::{Entry, Recorder};
 use elbowroom_model::Task;
 use serde::Serialize;
 
-pub use crate::line::{self, Line};
+pub use crate::schema::{self, Line};
 pub use replay::{
     Difference, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored, TraceError,
 };
 pub use snapshot::{
-    GoalLine, NewsLine, SituatedLine, SnapshotLine, StartLine, TakenUpLine, TurnLine, UnderWayLine,
+    GoalLine, NewsLine, PendingGoalChangeLine, PlanAdoptionLine, RunningActionLine,
+    SituationActionLine, SnapshotLine, StartLine,
 };
 
 /// The value of `format` in the first line of a trace.

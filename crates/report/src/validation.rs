@@ -9,9 +9,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use elbowroom_execution::run::{FIRST_GOAL, GoalReader, Stand, Verdict};
+use elbowroom_execution::run::{GoalReader, PROBLEM_GOAL_NAME, RunSnapshot, Verdict};
 use elbowroom_execution::{
-    Command, Ending, Entry, Event, GoalChange, Measured, Observation, Progression, Request, Ticket,
+    ActionHandle, BeliefState, Command, Ending, Entry, Event, GoalChange, Measured, Observation,
+    Request,
 };
 use elbowroom_model::ground::{Action, Body, Condition};
 use elbowroom_model::validate::{Execution, MeasuredAmount, Violation};
@@ -19,10 +20,10 @@ use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::{Interval, Rational};
 
 /// Findings beyond this number are only counted.
-const MOST_LISTED: usize = 20;
+const MAX_LISTED_FINDINGS: usize = 20;
 
 /// Number of ended starts that are remembered, to recognise contradictory reports about them.
-const MOST_ENDED: usize = 1000;
+const MAX_ENDED_STARTS: usize = 1000;
 
 /// Reason for an invalid run: a bug of the executor, not a failure of the world.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,7 +102,7 @@ pub struct Validation<'a> {
     reader: Box<dyn GoalReader + 'a>,
     /// The open goals.
     goals: Vec<Goal>,
-    starts: BTreeMap<Ticket, Start>,
+    starts: BTreeMap<ActionHandle, Start>,
     /// Number of starts that have ended.
     ended: usize,
     now: Rational,
@@ -130,7 +131,7 @@ impl<'a> Validation<'a> {
     /// Creates the validation of a new run of `task`. `reader` reads goals that are given during the run.
     pub fn new(task: &Arc<Task>, reader: impl GoalReader + 'a) -> Self {
         let goal = Goal {
-            name: FIRST_GOAL.to_owned(),
+            name: PROBLEM_GOAL_NAME.to_owned(),
             condition: task.goal().clone(),
             deadline: None,
         };
@@ -150,8 +151,8 @@ impl<'a> Validation<'a> {
 
     /// Continues from `stand` instead of the beginning of the run.
     #[must_use]
-    pub fn standing(mut self, stand: &Stand) -> Self {
-        if stand.goals.are_others {
+    pub fn resume_from(mut self, stand: &RunSnapshot) -> Self {
+        if stand.goals.are_changed {
             let task = Arc::clone(&self.task);
             let open = stand.goals.open.iter();
             let read = open.filter_map(|given| {
@@ -174,7 +175,7 @@ impl<'a> Validation<'a> {
             let is_running = stand.belief.running().contains_key(&known.ticket);
             let start = Start {
                 action: Arc::clone(&known.action),
-                commanded: known.ordered.clone(),
+                commanded: known.commanded.clone(),
                 has_started: known.started.is_some(),
                 ended: (known.ended.as_ref()).map(|(_, ending)| *ending == Ending::Succeeded),
             };
@@ -190,7 +191,7 @@ impl<'a> Validation<'a> {
     }
 
     /// Returns the first findings in the run so far.
-    pub fn found(&self) -> &[Invalid] {
+    pub fn findings(&self) -> &[Invalid] {
         &self.found
     }
 
@@ -200,7 +201,7 @@ impl<'a> Validation<'a> {
     }
 
     /// Processes the next entry of the record.
-    pub fn note(&mut self, entry: &Entry<'_>) {
+    pub fn process_entry(&mut self, entry: &Entry<'_>) {
         match entry {
             Entry::Passed { now, .. } | Entry::Looked { now, .. } => {
                 // The reports about this period follow as entries. The execution advances after them.
@@ -213,10 +214,10 @@ impl<'a> Validation<'a> {
                 ..
             } => {
                 self.now = (*now).clone().max(self.now.clone());
-                self.take(observation, *remark);
+                self.process_observation(observation, *remark);
             }
             Entry::Command { now, command, .. } => {
-                self.pass(now);
+                self.advance(now);
                 self.command(command);
             }
             Entry::Decided { now, .. }
@@ -224,34 +225,34 @@ impl<'a> Validation<'a> {
             | Entry::Kept { now, .. }
             | Entry::Warning { now, .. }
             | Entry::WorldFailed { now, .. }
-            | Entry::Interrupted { now } => self.pass(now),
+            | Entry::Interrupted { now } => self.advance(now),
             Entry::Goal { now, name, change } => {
-                self.pass(now);
+                self.advance(now);
                 self.change_goal(name, *change);
             }
             Entry::Resting { now, verdict, .. } => {
-                self.pass(now);
+                self.advance(now);
                 if let Some(verdict) = verdict {
-                    self.judge(verdict);
+                    self.check_verdict(verdict);
                 }
             }
             Entry::Over(report) => {
-                self.pass(&report.time);
-                self.judge(&report.verdict);
+                self.advance(&report.time);
+                self.check_verdict(&report.verdict);
             }
-            Entry::Mission(_) | Entry::Planned { .. } => {}
+            Entry::PlanAdopted(_) | Entry::Planned { .. } => {}
         }
     }
 
-    fn pass(&mut self, now: &Rational) {
+    fn advance(&mut self, now: &Rational) {
         self.now = now.clone().max(self.now.clone());
         let now = self.now.clone();
         self.execution.advance(&now);
     }
 
-    fn find(&mut self, invalid: Invalid) {
+    fn record_finding(&mut self, invalid: Invalid) {
         self.count += 1;
-        if self.found.len() < MOST_LISTED {
+        if self.found.len() < MAX_LISTED_FINDINGS {
             self.found.push(invalid);
         }
     }
@@ -272,28 +273,28 @@ impl<'a> Validation<'a> {
                 self.starts.insert(*ticket, start);
                 let judged = self.execution.command(ticket.0, action, duration.as_ref());
                 if let Err(violation) = judged {
-                    self.find(Invalid::Start(*violation));
+                    self.record_finding(Invalid::Start(*violation));
                 }
             }
             Command::Cancel { ticket } => self.execution.cancel(ticket.0),
         }
     }
 
-    fn take(&mut self, observation: &Observation, remark: Option<&str>) {
+    fn process_observation(&mut self, observation: &Observation, remark: Option<&str>) {
         let time = observation.time.clone().min(self.now.clone());
         match &observation.event {
-            Event::Started { ticket, measured } => self.started(*ticket, &time, measured),
+            Event::Started { ticket, measured } => self.process_start(*ticket, &time, measured),
             Event::Ended {
                 ticket,
                 ending,
                 measured,
             } => {
-                self.ended(*ticket, &time, *ending == Ending::Succeeded, measured);
+                self.process_end(*ticket, &time, *ending == Ending::Succeeded, measured);
             }
-            Event::Fact { fact, truth } => self.execution.see_fact(&time, *fact, *truth),
-            Event::Value { fluent, value } => self.execution.see_value(&time, *fluent, value),
+            Event::Fact { fact, truth } => self.execution.observe_fact(&time, *fact, *truth),
+            Event::Value { fluent, value } => self.execution.observe_value(&time, *fluent, value),
             // A request with a remark was ignored.
-            Event::Asked(request) if remark.is_none() => self.asked(request),
+            Event::Asked(request) if remark.is_none() => self.process_request(request),
             Event::Asked(_)
             | Event::Feedback { .. }
             | Event::PlanMade
@@ -302,7 +303,7 @@ impl<'a> Validation<'a> {
         }
     }
 
-    fn started(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) {
+    fn process_start(&mut self, ticket: ActionHandle, time: &Rational, measured: &[Measured]) {
         let Some(start) = self.starts.get_mut(&ticket) else {
             return;
         };
@@ -318,20 +319,26 @@ impl<'a> Validation<'a> {
         }
     }
 
-    fn ended(&mut self, ticket: Ticket, time: &Rational, succeeded: bool, measured: &[Measured]) {
+    fn process_end(
+        &mut self,
+        ticket: ActionHandle,
+        time: &Rational,
+        succeeded: bool,
+        measured: &[Measured],
+    ) {
         let Some(start) = self.starts.get(&ticket) else {
             return;
         };
         if let Some(earlier) = start.ended {
             if earlier != succeeded {
                 let action = Arc::clone(&start.action);
-                self.execution.contradict(&action);
+                self.execution.mark_contradicted(&action);
             }
             return;
         }
         let commanded = start.commanded.clone();
         if !start.has_started && succeeded {
-            self.started(ticket, &commanded, &[]);
+            self.process_start(ticket, &commanded, &[]);
         }
         if self.starts.get(&ticket).is_none_or(|it| it.ended.is_some()) {
             return;
@@ -346,23 +353,23 @@ impl<'a> Validation<'a> {
     }
 
     /// Records the end of an action, and drops the earliest of too many ended ones.
-    fn close(&mut self, ticket: Ticket, succeeded: bool) {
+    fn close(&mut self, ticket: ActionHandle, succeeded: bool) {
         if let Some(start) = self.starts.get_mut(&ticket) {
             start.ended = Some(succeeded);
             self.ended += 1;
         }
-        if self.ended >= 2 * MOST_ENDED {
-            let mut surplus = self.ended - MOST_ENDED;
+        if self.ended >= 2 * MAX_ENDED_STARTS {
+            let mut surplus = self.ended - MAX_ENDED_STARTS;
             self.starts.retain(|_, start| {
                 let is_forgotten = surplus > 0 && start.ended.is_some();
                 surplus -= usize::from(is_forgotten);
                 !is_forgotten
             });
-            self.ended = MOST_ENDED;
+            self.ended = MAX_ENDED_STARTS;
         }
     }
 
-    fn asked(&mut self, request: &Request) {
+    fn process_request(&mut self, request: &Request) {
         match request {
             Request::Pursue { name, goal, terms } => {
                 let Some(condition) = self.read(goal) else {
@@ -403,13 +410,13 @@ impl<'a> Validation<'a> {
         if change != GoalChange::Achieved {
             if goal.deadline.is_none_or(|deadline| time < deadline) {
                 let name = goal.name;
-                self.find(Invalid::NotLate { time, name });
+                self.record_finding(Invalid::NotLate { time, name });
             }
             return;
         }
         let unmet = self.unmet([&goal.condition], Execution::holds);
         if !unmet.is_empty() {
-            self.find(Invalid::NotReached { time, unmet });
+            self.record_finding(Invalid::NotReached { time, unmet });
         }
     }
 
@@ -426,24 +433,27 @@ impl<'a> Validation<'a> {
     }
 
     /// Compares a verdict of the run with the state. Goals that are reported as reached are closed.
-    fn judge(&mut self, verdict: &Verdict) {
+    fn check_verdict(&mut self, verdict: &Verdict) {
         let time = self.now.clone();
         match verdict {
             Verdict::GoalReached => {
                 let goals = std::mem::take(&mut self.goals);
-                let unmet =
-                    self.unmet(goals.iter().map(|goal| &goal.condition), Execution::reaches);
+                let unmet = self.unmet(
+                    goals.iter().map(|goal| &goal.condition),
+                    Execution::reaches_goal,
+                );
                 if !unmet.is_empty() {
-                    self.find(Invalid::NotReached { time, unmet });
+                    self.record_finding(Invalid::NotReached { time, unmet });
                 } else if !self.execution.is_idle() {
-                    self.find(Invalid::StillRunning { time });
+                    self.record_finding(Invalid::StillRunning { time });
                 }
             }
             Verdict::Unsolvable => {
                 let mut goals = self.goals.iter();
-                let holds = goals.all(|goal| self.execution.reaches(&goal.condition) == Some(true));
+                let holds =
+                    goals.all(|goal| self.execution.reaches_goal(&goal.condition) == Some(true));
                 if holds && !self.goals.is_empty() && self.execution.is_idle() {
-                    self.find(Invalid::Reached { time });
+                    self.record_finding(Invalid::Reached { time });
                 }
             }
             Verdict::NoPlan { .. }
@@ -457,13 +467,13 @@ impl<'a> Validation<'a> {
 }
 
 /// Returns a belief as a situation, and the tickets of its running actions in the same order.
-fn situation(belief: &Progression) -> (Situation, Vec<Ticket>) {
+fn situation(belief: &BeliefState) -> (Situation, Vec<ActionHandle>) {
     let running = belief.running().iter();
     let running = running.map(|(ticket, underway)| {
         let planned = Interval::point(underway.planned.clone());
         (*ticket, belief.running_action(underway, planned))
     });
-    let (tickets, running): (Vec<Ticket>, Vec<RunningAction>) = running.unzip();
+    let (tickets, running): (Vec<ActionHandle>, Vec<RunningAction>) = running.unzip();
     let situation = Situation {
         time: belief.time().clone(),
         state: belief.state(),

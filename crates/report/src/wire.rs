@@ -3,13 +3,13 @@
 //! Numbers are written as `{"exact": "1393/2", "decimal": 696.5}`, and read as that, as a number,
 //! or as a text.
 
-use elbowroom_execution::{Command, Ending, Event, Measured, Observation, Ticket};
+use elbowroom_execution::{ActionHandle, Command, Ending, Event, Measured, Observation};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::line::{GivenLine, ObservationLine};
+use crate::schema::{IssuedCommandLine, ObservationLine};
 
 /// Error: a message is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -19,7 +19,7 @@ pub struct WireError {
     pub message: String,
 }
 
-pub(crate) fn wrong(message: impl Into<String>) -> WireError {
+pub(crate) fn invalid_message(message: impl Into<String>) -> WireError {
     WireError {
         message: message.into(),
     }
@@ -50,8 +50,8 @@ pub fn read_number(value: &Value) -> Option<Rational> {
 pub fn field_number(message: &Value, name: &str) -> Result<Rational, WireError> {
     let value = message
         .get(name)
-        .ok_or_else(|| wrong(format!("`{name}` is missing")))?;
-    read_number(value).ok_or_else(|| wrong(format!("`{name}` must be a number")))
+        .ok_or_else(|| invalid_message(format!("`{name}` is missing")))?;
+    read_number(value).ok_or_else(|| invalid_message(format!("`{name}` must be a number")))
 }
 
 /// Returns the field `name` as a text.
@@ -61,15 +61,15 @@ pub fn field_number(message: &Value, name: &str) -> Result<Rational, WireError> 
 pub fn field_text<'a>(message: &'a Value, name: &str) -> Result<&'a str, WireError> {
     let value = message
         .get(name)
-        .ok_or_else(|| wrong(format!("`{name}` is missing")))?;
+        .ok_or_else(|| invalid_message(format!("`{name}` is missing")))?;
     value
         .as_str()
-        .ok_or_else(|| wrong(format!("`{name}` must be a text")))
+        .ok_or_else(|| invalid_message(format!("`{name}` must be a text")))
 }
 
 /// Writes a command.
 pub fn command(command: &Command) -> Value {
-    value(&GivenLine::of(command))
+    value(&IssuedCommandLine::of(command))
 }
 
 /// Writes an observation.
@@ -88,8 +88,9 @@ fn value(line: &impl Serialize) -> Value {
 pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, WireError> {
     let ticket = || {
         let ticket = message.get("ticket").and_then(Value::as_u64);
-        let ticket = ticket.ok_or_else(|| wrong("`ticket` must be the number of a start"));
-        ticket.map(Ticket)
+        let ticket =
+            ticket.ok_or_else(|| invalid_message("`ticket` must be the number of a start"));
+        ticket.map(ActionHandle)
     };
     let event = match field_text(message, "type")? {
         "started" => Event::Started {
@@ -113,19 +114,21 @@ pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, Wir
             let name = field_text(message, "fact")?;
             let fact = task.fact_named(name);
             Event::Fact {
-                fact: fact.ok_or_else(|| wrong(format!("the problem has no fact `{name}`")))?,
+                fact: fact
+                    .ok_or_else(|| invalid_message(format!("the problem has no fact `{name}`")))?,
                 truth: message
                     .get("becomes")
                     .and_then(Value::as_bool)
-                    .ok_or_else(|| wrong("`becomes` must be true or false"))?,
+                    .ok_or_else(|| invalid_message("`becomes` must be true or false"))?,
             }
         }
         "value" => {
             let name = field_text(message, "fluent")?;
             let fluent = task.fluent_named(name);
             Event::Value {
-                fluent: fluent
-                    .ok_or_else(|| wrong(format!("the problem has no fluent `{name}`")))?,
+                fluent: fluent.ok_or_else(|| {
+                    invalid_message(format!("the problem has no fluent `{name}`"))
+                })?,
                 value: field_number(message, "value")?,
             }
         }
@@ -135,7 +138,7 @@ pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, Wir
             why: field_text(message, "why")?.to_owned(),
         },
         other => {
-            return Err(wrong(format!(
+            return Err(invalid_message(format!(
                 "`{other}` is no type of observation: started, ended, feedback, \
                  fact, value"
             )));
@@ -155,7 +158,7 @@ fn completion(message: &Value) -> Result<Option<Rational>, WireError> {
     let completion = completion.filter(|part| !part.is_negative() && *part <= Rational::ONE);
     match completion {
         Some(part) => Ok(Some(part)),
-        None => Err(wrong("`completion` must be a number from 0 to 1")),
+        None => Err(invalid_message("`completion` must be a number from 0 to 1")),
     }
 }
 
@@ -167,7 +170,7 @@ fn ending(message: &Value) -> Result<Ending, WireError> {
         },
         "cancelled" => Ending::Cancelled,
         other => {
-            return Err(wrong(format!(
+            return Err(invalid_message(format!(
                 "`{other}` is no outcome: succeeded, failed, cancelled"
             )));
         }
@@ -180,13 +183,15 @@ fn read_amounts(message: &Value, task: &Task) -> Result<Vec<Measured>, WireError
     };
     let entries = measured
         .as_object()
-        .ok_or_else(|| wrong("`measured` must be an object: fluent to amount"))?;
+        .ok_or_else(|| invalid_message("`measured` must be an object: fluent to amount"))?;
     let read = |(name, value): (&String, &Value)| {
         let fluent = task.fluent_named(name);
         Ok(Measured {
-            fluent: fluent.ok_or_else(|| wrong(format!("the problem has no fluent `{name}`")))?,
-            amount: read_number(value)
-                .ok_or_else(|| wrong(format!("the amount of `{name}` must be a number")))?,
+            fluent: fluent
+                .ok_or_else(|| invalid_message(format!("the problem has no fluent `{name}`")))?,
+            amount: read_number(value).ok_or_else(|| {
+                invalid_message(format!("the amount of `{name}` must be a number"))
+            })?,
         })
     };
     entries.iter().map(read).collect()

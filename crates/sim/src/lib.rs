@@ -8,7 +8,7 @@
 //!   changes, failures, exogenous events, and the reliability of reports.
 //! - [`SimWorld`]: one trajectory of it, by the semantics of PDDL: conditions are evaluated in the
 //!   true state, and an action whose conditions do not hold fails.
-//! - [`Unreliable`]: loses, repeats, delays and contradicts the reports of another world.
+//! - [`FaultInjector`]: loses, repeats, delays and contradicts the reports of another world.
 //!
 //! Randomness is keyed ([`draw`]): the duration of the second time that `(pick rover box)` starts
 //! depends on the seed, on `(pick rover box)` and on 2, and on nothing else. Two executors that
@@ -33,21 +33,21 @@
 //! # Ok::<(), elbowroom_text::Diagnostics>(())
 //! ```
 
-mod below;
+mod cdf;
 pub mod draw;
+mod duration_control;
+mod fault_injection;
 mod model;
-mod paced;
 mod pattern;
 mod sim;
-mod unreliable;
 
-pub use below::{Side, rounding_edge};
+pub use cdf::{Side, rounding_edge};
 pub use draw::{Distribution, Purpose};
+pub use duration_control::{ControlledWorld, DurationController, FixedDurations, StartedAction};
+pub use fault_injection::FaultInjector;
 pub use model::{
-    Amount, Becoming, Exogenous, ExogenousChange, Failing, Failure, Hazard, Outcome, OutcomeChange,
-    Reports, Rule, Template, WorldModel,
+    Amount, ExogenousChange, ExogenousEvent, FactOutcome, FailureRule, FailureTime, Hazard,
+    Outcome, OutcomeChange, ReportReliability, Rule, Template, WorldModel,
 };
-pub use paced::{Begun, Durations, Pace, Paced};
 pub use pattern::ActionPattern;
-pub use sim::{Seen, SimWorld};
-pub use unreliable::Unreliable;
+pub use sim::{ObservedChanges, SimWorld};

@@ -13,7 +13,7 @@ use crate::draw::{Distribution, rounded};
 use crate::pattern::ActionPattern;
 
 pub use hazard::Hazard;
-pub use outcome::{Becoming, Outcome, OutcomeChange, Template};
+pub use outcome::{FactOutcome, Outcome, OutcomeChange, Template};
 
 /// A world without a seed.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,13 +28,13 @@ pub struct WorldModel {
     /// The amounts of numeric effects; without a rule, those of the domain.
     pub amounts: Vec<Amount>,
     /// Failure probabilities of actions; without a rule, 0.
-    pub failures: Vec<Failing>,
+    pub failures: Vec<FailureRule>,
     /// The exogenous events, apart from the problem's timed initials.
-    pub exogenous: Vec<Exogenous>,
+    pub exogenous: Vec<ExogenousEvent>,
     /// Rates of spontaneous changes of facts; without a rule, 0. The last rule that matches counts.
     pub hazards: Vec<Hazard>,
     /// The reliability of the world's reports.
-    pub reports: Reports,
+    pub reports: ReportReliability,
 }
 
 /// A distribution, clamped and scaled.
@@ -63,13 +63,13 @@ pub struct Amount {
 
 /// The failure probability of actions.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Failing {
+pub struct FailureRule {
     /// The action.
     pub action: ActionPattern,
     /// The probability.
     pub probability: f64,
     /// The time.
-    pub when: Failure,
+    pub when: FailureTime,
     /// `true` if a failure after the start undoes the start effects on facts: facts that it made
     /// false become true again, and facts that it made true become false. If `false`, the start
     /// effects remain.
@@ -81,7 +81,7 @@ pub struct Failing {
 
 /// The moment at which an action fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Failure {
+pub enum FailureTime {
     /// It does not start at all.
     AtStart,
     /// At a uniformly distributed time in its duration.
@@ -92,7 +92,7 @@ pub enum Failure {
 
 /// An exogenous event.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Exogenous {
+pub struct ExogenousEvent {
     /// The time.
     pub time: Rule,
     /// The probability that it happens at all.
@@ -115,7 +115,7 @@ pub enum ExogenousChange {
 
 /// The reliability of the world's reports. Each probability is that of a single report.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reports {
+pub struct ReportReliability {
     /// It never arrives.
     pub lost: f64,
     /// It arrives twice.
@@ -130,13 +130,13 @@ pub struct Reports {
 
 impl Default for WorldModel {
     fn default() -> Self {
-        Self::as_planned()
+        Self::without_deviations()
     }
 }
 
 impl WorldModel {
     /// Creates the model of a world without deviations from the plan.
-    pub fn as_planned() -> Self {
+    pub fn without_deviations() -> Self {
         Self {
             resolution: Rational::new(1, 1000),
             durations: Vec::new(),
@@ -145,7 +145,7 @@ impl WorldModel {
             failures: Vec::new(),
             exogenous: Vec::new(),
             hazards: Vec::new(),
-            reports: Reports::default(),
+            reports: ReportReliability::default(),
         }
     }
 
@@ -159,7 +159,7 @@ impl WorldModel {
 
     /// Draws the duration of an action with the planned duration `planned`.
     pub fn duration(&self, action: &str, planned: &Rational, rng: &mut impl Rng) -> Rational {
-        let duration = match last(&self.durations, action) {
+        let duration = match last_matching_rule(&self.durations, action) {
             Some(rule) => rule.draw(planned, &self.resolution, rng),
             None => planned.clone(),
         };
@@ -169,18 +169,18 @@ impl WorldModel {
 
     /// Returns the rule for the duration of an action; `None` for the planned duration.
     pub fn duration_rule(&self, action: &str) -> Option<&Rule> {
-        last(&self.durations, action)
+        last_matching_rule(&self.durations, action)
     }
 
     /// Returns the rule for the delay between the command and the start of an action; `None` for no
     /// delay.
     pub fn delay_rule(&self, action: &str) -> Option<&Rule> {
-        last(&self.delays, action)
+        last_matching_rule(&self.delays, action)
     }
 
     /// Draws the delay between the command and the start of an action.
     pub fn delay(&self, action: &str, rng: &mut impl Rng) -> Rational {
-        let rule = last(&self.delays, action);
+        let rule = last_matching_rule(&self.delays, action);
         let delay = rule.map(|rule| rule.draw(&Rational::ZERO, &self.resolution, rng));
         delay.unwrap_or_default().max(Rational::ZERO)
     }
@@ -198,12 +198,12 @@ impl WorldModel {
 
     /// Draws whether an action fails.
     pub fn fails(&self, action: &str, rng: &mut impl Rng) -> bool {
-        let failing = self.failing(action);
+        let failing = self.failure_rule(action);
         failing.is_some_and(|failing| rng.random::<f64>() < failing.probability)
     }
 
     /// Returns the failure rule of an action.
-    pub fn failing(&self, action: &str) -> Option<&Failing> {
+    pub fn failure_rule(&self, action: &str) -> Option<&FailureRule> {
         let mut rules = self.failures.iter().rev();
         rules.find(|rule| rule.action.matches(action))
     }
@@ -233,7 +233,7 @@ impl Rule {
     /// Returns `true` if a value written in the file is negative, or if all values that can be
     /// drawn are. A distribution that merely extends below 0 is permitted; draws below 0 count as
     /// 0.
-    fn means_negative(&self) -> bool {
+    fn can_be_negative(&self) -> bool {
         let cut = |value: f64| {
             let value = self.minimum.map_or(value, |minimum| value.max(minimum));
             self.maximum.map_or(value, |maximum| value.min(maximum))
@@ -264,7 +264,7 @@ impl From<Distribution> for Rule {
     }
 }
 
-impl Default for Reports {
+impl Default for ReportReliability {
     /// Perfect reports: each arrives at once, once, and is true.
     fn default() -> Self {
         Self {
@@ -277,7 +277,7 @@ impl Default for Reports {
     }
 }
 
-impl Reports {
+impl ReportReliability {
     /// Returns `true` if all reports come at once, once, and are true.
     pub fn is_perfect(&self) -> bool {
         let all = [self.lost, self.duplicated, self.late, self.contradicted];
@@ -285,7 +285,7 @@ impl Reports {
     }
 }
 
-fn last<'a>(rules: &'a [(ActionPattern, Rule)], action: &str) -> Option<&'a Rule> {
+fn last_matching_rule<'a>(rules: &'a [(ActionPattern, Rule)], action: &str) -> Option<&'a Rule> {
     let mut rules = rules.iter().rev();
     rules
         .find(|(pattern, _)| pattern.matches(action))

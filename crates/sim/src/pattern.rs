@@ -30,7 +30,7 @@ impl fmt::Display for ActionPattern {
 
 /// The kind of name that a pattern matches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Names {
+pub(crate) enum NameKind {
     Actions,
     Functions,
     Predicates,
@@ -38,7 +38,7 @@ pub(crate) enum Names {
 
 impl ActionPattern {
     /// Reads a pattern, and checks that its names exist.
-    pub(crate) fn read(text: &str, names: Names, problem: &Problem) -> Result<Self, String> {
+    pub(crate) fn read(text: &str, names: NameKind, problem: &Problem) -> Result<Self, String> {
         let text = text.trim();
         if text == "*" {
             return Ok(Self {
@@ -113,7 +113,7 @@ impl ActionPattern {
     }
 }
 
-impl Names {
+impl NameKind {
     fn arity(self, name: &str, problem: &Problem) -> Result<usize, String> {
         let same = |other: &str| other.eq_ignore_ascii_case(name);
         let (what, found, all): (_, _, Vec<&str>) = match self {

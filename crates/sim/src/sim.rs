@@ -1,24 +1,24 @@
 //! One trajectory of a world.
 
-mod amid;
+mod external_end;
 mod failures;
 mod hazards;
-mod held;
+mod mid_execution;
 mod world;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::{Ending, Event, Measured, Observation, Progression, Ticket};
+use elbowroom_execution::{ActionHandle, BeliefState, Ending, Event, Measured, Observation};
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, SnapAction};
 use elbowroom_num::Rational;
 use rand::Rng;
 
 use crate::draw::{Purpose, keyed};
-use crate::model::{ExogenousChange, Failure, Outcome, WorldModel};
-pub use amid::Seen;
-use hazards::Chance;
+use crate::model::{ExogenousChange, FailureTime, Outcome, WorldModel};
+use hazards::PoissonProcess;
+pub use mid_execution::ObservedChanges;
 
 /// A simulated world: the true state, and the coming events.
 ///
@@ -35,24 +35,24 @@ use hazards::Chance;
 pub struct SimWorld<'a> {
     model: &'a WorldModel,
     seed: u64,
-    truth: Progression,
+    truth: BeliefState,
     now: Rational,
     /// The coming happenings, by time and then in the order of their insertion.
-    agenda: BTreeMap<(Rational, u64), Coming>,
+    agenda: BTreeMap<(Rational, u64), ComingEvent>,
     /// Number of entries put on the agenda so far.
-    decided: u64,
+    scheduled: u64,
     /// Observations that have not been reported.
-    untold: Vec<Observation>,
+    unreported: Vec<Observation>,
     /// Number of starts, by action.
     occurrences: BTreeMap<String, u64>,
     /// Commanded actions that have not ended.
-    actions: BTreeMap<Ticket, Commanded<'a>>,
+    actions: BTreeMap<ActionHandle, CommandedAction<'a>>,
     /// Spontaneous changes at a rate.
-    chances: Vec<Chance>,
+    spontaneous_changes: Vec<PoissonProcess>,
 }
 
 #[derive(Clone, Debug)]
-struct Commanded<'a> {
+struct CommandedAction<'a> {
     action: Arc<Action>,
     planned: Option<Rational>,
     occurrence: u64,
@@ -64,19 +64,19 @@ struct Commanded<'a> {
 }
 
 #[derive(Clone, Debug)]
-enum Coming {
-    Start(Ticket),
-    End(Ticket),
-    Break(Ticket),
-    Fail(Ticket),
+enum ComingEvent {
+    Start(ActionHandle),
+    End(ActionHandle),
+    Break(ActionHandle),
+    Fail(ActionHandle),
     Exogenous(usize),
-    Chance(usize),
+    SpontaneousChange(usize),
 }
 
 impl<'a> SimWorld<'a> {
     /// Creates the world of that seed, at time 0.
     pub fn new(task: Arc<Task>, model: &'a WorldModel, seed: u64) -> Self {
-        let mut world = Self::empty(Progression::new(task), model, seed);
+        let mut world = Self::without_events(BeliefState::new(task), model, seed);
         for (index, exogenous) in model.exogenous.iter().enumerate() {
             let name = match &exogenous.change {
                 ExogenousChange::Fact(name, _) | ExogenousChange::Value(name, _) => name,
@@ -87,51 +87,51 @@ impl<'a> SimWorld<'a> {
                 .time
                 .draw(&Rational::ZERO, &model.resolution, &mut rng);
             if happens {
-                world.put(time.max(Rational::ZERO), Coming::Exogenous(index));
+                world.schedule(time.max(Rational::ZERO), ComingEvent::Exogenous(index));
             }
         }
-        world.expose();
+        world.schedule_spontaneous_changes();
         world
     }
 
     /// Creates a world without coming events.
-    fn empty(truth: Progression, model: &'a WorldModel, seed: u64) -> Self {
+    fn without_events(truth: BeliefState, model: &'a WorldModel, seed: u64) -> Self {
         Self {
             truth,
             model,
             seed,
             now: Rational::ZERO,
             agenda: BTreeMap::new(),
-            decided: 0,
-            untold: Vec::new(),
+            scheduled: 0,
+            unreported: Vec::new(),
             occurrences: BTreeMap::new(),
             actions: BTreeMap::new(),
-            chances: Vec::new(),
+            spontaneous_changes: Vec::new(),
         }
     }
 
     /// Returns the true state.
-    pub fn truth(&self) -> &Progression {
+    pub fn truth(&self) -> &BeliefState {
         &self.truth
     }
 
-    fn put(&mut self, time: Rational, coming: Coming) {
-        self.agenda.insert((time, self.decided), coming);
-        self.decided += 1;
+    fn schedule(&mut self, time: Rational, coming: ComingEvent) {
+        self.agenda.insert((time, self.scheduled), coming);
+        self.scheduled += 1;
     }
 
-    fn tell(&mut self, event: Event) {
-        self.untold.push(Observation {
+    fn report(&mut self, event: Event) {
+        self.unreported.push(Observation {
             time: self.now.clone(),
             event,
         });
     }
 
     /// Lets time pass until `until`, or until something is reported, if that `is_enough`.
-    fn proceed(&mut self, until: &Rational, is_enough: bool) {
+    fn advance(&mut self, until: &Rational, is_enough: bool) {
         loop {
-            self.happen_now();
-            let is_told = |world: &Self| is_enough && !world.untold.is_empty();
+            self.process_due_events();
+            let is_told = |world: &Self| is_enough && !world.unreported.is_empty();
             if is_told(self) || self.now >= *until {
                 return;
             }
@@ -146,7 +146,9 @@ impl<'a> SimWorld<'a> {
             // Timed initials can make running actions fail.
             let next = coming.into_iter().chain(self.truth.next_timed());
             let next = next.chain([until]).min().unwrap_or(until).clone();
-            let broken = self.truth.next_break(&next, &self.model.resolution);
+            let broken = self
+                .truth
+                .next_over_all_failure(&next, &self.model.resolution);
             let next = broken.into_iter().chain([next]).min().unwrap_or_default();
             // A moving fluent without a value does not get one.
             let _ = self.truth.advance(&next);
@@ -155,34 +157,34 @@ impl<'a> SimWorld<'a> {
     }
 
     /// Processes all happenings that are due by now.
-    fn happen_now(&mut self) {
+    fn process_due_events(&mut self) {
         let _ = self.truth.advance(&self.now);
         while let Some(entry) = self.agenda.first_entry() {
             if entry.key().0 > self.now {
                 break;
             }
             match entry.remove() {
-                Coming::Start(ticket) => self.start(ticket),
-                Coming::End(ticket) => self.end(ticket),
-                Coming::Break(ticket) => self.break_down(ticket),
-                Coming::Fail(ticket) => self.fail_at_last(ticket),
-                Coming::Exogenous(index) => self.change(index),
-                Coming::Chance(index) => self.take_chance(index),
+                ComingEvent::Start(ticket) => self.start(ticket),
+                ComingEvent::End(ticket) => self.end(ticket),
+                ComingEvent::Break(ticket) => self.break_down(ticket),
+                ComingEvent::Fail(ticket) => self.fail_broken_action(ticket),
+                ComingEvent::Exogenous(index) => self.change(index),
+                ComingEvent::SpontaneousChange(index) => self.process_spontaneous_change(index),
             }
         }
     }
 
     /// Returns an action whose over-all condition has failed, or fails from now on, with the
     /// reason.
-    fn first_broken(&self) -> Option<(Ticket, String)> {
-        if let Some((ticket, underway)) = self.truth.broken() {
-            return Some((ticket, self.no_longer(&underway.broken_parts())));
+    fn first_broken(&self) -> Option<(ActionHandle, String)> {
+        if let Some((ticket, underway)) = self.truth.violated_action() {
+            return Some((ticket, self.violated_reason(&underway.violated_conjuncts())));
         }
-        let (ticket, parts) = self.truth.breaking().into_iter().next()?;
-        Some((ticket, self.no_longer(&parts)))
+        let (ticket, parts) = self.truth.failing_actions().into_iter().next()?;
+        Some((ticket, self.violated_reason(&parts)))
     }
 
-    fn no_longer(&self, conditions: &[&Condition]) -> String {
+    fn violated_reason(&self, conditions: &[&Condition]) -> String {
         format!("{} no longer held", self.in_words(conditions))
     }
 
@@ -193,7 +195,7 @@ impl<'a> SimWorld<'a> {
         words.collect::<Vec<_>>().join(" and ")
     }
 
-    fn start(&mut self, ticket: Ticket) {
+    fn start(&mut self, ticket: ActionHandle) {
         let Some(commanded) = self.actions.get(&ticket).cloned() else {
             return;
         };
@@ -211,7 +213,7 @@ impl<'a> SimWorld<'a> {
         );
         let fails = self
             .model
-            .failing(&action.name)
+            .failure_rule(&action.name)
             .filter(|failing| failure.random::<f64>() < failing.probability);
         let outcome = fails.and_then(|failing| {
             let (name, occurrence) = (&action.name, commanded.occurrence);
@@ -227,12 +229,12 @@ impl<'a> SimWorld<'a> {
             return self.fail(ticket, &why);
         }
         let is_instantaneous = matches!(action.body, Body::Instantaneous(_));
-        if fails == Some(Failure::AtStart) || (is_instantaneous && fails.is_some()) {
+        if fails == Some(FailureTime::AtStart) || (is_instantaneous && fails.is_some()) {
             return self.break_down(ticket);
         }
         let measured = self.measured(&commanded, snap, 0, commanded.planned.as_ref());
         let _ = self.truth.start(ticket, action, &planned, &measured);
-        self.tell(Event::Started { ticket, measured });
+        self.report(Event::Started { ticket, measured });
         if is_instantaneous {
             self.actions.remove(&ticket);
             return;
@@ -249,17 +251,17 @@ impl<'a> SimWorld<'a> {
         let duration = self.model.duration(&action.name, &planned, &mut rng);
         let end = &self.now + &duration;
         match fails {
-            Some(Failure::AtEnd) => self.put(end, Coming::Break(ticket)),
-            Some(Failure::Midway) => {
+            Some(FailureTime::AtEnd) => self.schedule(end, ComingEvent::Break(ticket)),
+            Some(FailureTime::Midway) => {
                 let share = crate::draw::rounded(failure.random(), &self.model.resolution);
                 let time = &self.now + duration * share;
-                self.put(time, Coming::Break(ticket));
+                self.schedule(time, ComingEvent::Break(ticket));
             }
-            _ => self.put(end, Coming::End(ticket)),
+            _ => self.schedule(end, ComingEvent::End(ticket)),
         }
     }
 
-    fn end(&mut self, ticket: Ticket) {
+    fn end(&mut self, ticket: ActionHandle) {
         let Some(commanded) = self.actions.get(&ticket).cloned() else {
             return;
         };
@@ -269,9 +271,9 @@ impl<'a> SimWorld<'a> {
         ) else {
             return;
         };
-        let broken = underway.broken_parts();
+        let broken = underway.violated_conjuncts();
         if !broken.is_empty() {
-            let why = self.no_longer(&broken);
+            let why = self.violated_reason(&broken);
             return self.fail(ticket, &why);
         }
         let duration = &self.now - &underway.start;
@@ -284,17 +286,17 @@ impl<'a> SimWorld<'a> {
         let measured = self.measured(&commanded, &body.end, 1, Some(&duration));
         let _ = self.truth.end(ticket, &measured);
         self.actions.remove(&ticket);
-        self.tell(Event::Ended {
+        self.report(Event::Ended {
             ticket,
             ending: Ending::Succeeded,
             measured,
         });
     }
 
-    fn fail(&mut self, ticket: Ticket, why: &str) {
+    fn fail(&mut self, ticket: ActionHandle, why: &str) {
         self.truth.stop(ticket);
         if self.actions.remove(&ticket).is_some() {
-            self.tell(Event::Ended {
+            self.report(Event::Ended {
                 ticket,
                 ending: Ending::Failed {
                     why: why.to_owned(),
@@ -308,7 +310,7 @@ impl<'a> SimWorld<'a> {
     /// `?duration` is the planned duration at the start, and the real one at the end.
     fn measured(
         &self,
-        commanded: &Commanded<'_>,
+        commanded: &CommandedAction<'_>,
         snap: &SnapAction,
         place: u64,
         duration: Option<&Rational>,
@@ -368,7 +370,7 @@ impl<'a> SimWorld<'a> {
             }
         };
         if exogenous.is_reported {
-            self.tell(event);
+            self.report(event);
         }
     }
 }

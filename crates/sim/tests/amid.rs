@@ -4,14 +4,14 @@
 use std::sync::Arc;
 
 use elbowroom_execution::{
-    Command, Ending, Event, Passage, Progression, SeenChange, Ticket, World,
+    ActionHandle, BeliefState, Command, Ending, Event, ObservedChange, TimeAdvance, World,
 };
 use elbowroom_model::Task;
 use elbowroom_model::ground::Action;
 use elbowroom_model::problem::SchemaId;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
-use elbowroom_sim::{Seen, WorldModel};
+use elbowroom_sim::{ObservedChanges, WorldModel};
 
 const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions)
     (:predicates (done) (open) (lit))
@@ -41,18 +41,18 @@ fn work(task: &Task) -> Action {
 
 /// Events of a world from now until 20.
 #[derive(Debug, Default, PartialEq)]
-struct Course {
+struct EventTimes {
     /// The time of the action's end, and `true` if it succeeded.
     ended: Option<(f64, bool)>,
     door_shut: Option<f64>,
     light_out: Option<f64>,
 }
 
-fn course(task: &Task, world: &mut dyn World) -> Course {
-    let mut course = Course::default();
+fn simulate(task: &Task, world: &mut dyn World) -> EventTimes {
+    let mut course = EventTimes::default();
     let end = Rational::from(20);
     loop {
-        let Passage { now, observations } = world.wait(&end).expect("it works");
+        let TimeAdvance { now, observations } = world.wait(&end).expect("it works");
         for observation in observations {
             let time = observation.time.to_f64();
             match observation.event {
@@ -73,23 +73,23 @@ fn course(task: &Task, world: &mut dyn World) -> Course {
 }
 
 /// Runs a world from the beginning, with the work started at 0.
-fn from_the_beginning(task: &Arc<Task>, model: &WorldModel, seed: u64) -> Course {
+fn simulate_from_start(task: &Arc<Task>, model: &WorldModel, seed: u64) -> EventTimes {
     let mut world = model.world(task, seed);
     let action = work(task);
     let start = Command::Start {
-        ticket: Ticket(0),
+        ticket: ActionHandle(0),
         action: Arc::new(action),
         duration: Some(Rational::from(5)),
     };
     world.command(&Rational::ZERO, &start).expect("it works");
-    course(task, world.as_mut())
+    simulate(task, world.as_mut())
 }
 
 /// Returns the shares of worlds in which the work succeeds, the work ends after 6, the light goes
 /// out, and the door shuts after 4.
 #[allow(clippy::cast_precision_loss, reason = "there are few worlds")]
-fn shares(courses: &[Course]) -> [f64; 4] {
-    let share = |is_so: &dyn Fn(&Course) -> bool| {
+fn shares(courses: &[EventTimes]) -> [f64; 4] {
+    let share = |is_so: &dyn Fn(&EventTimes) -> bool| {
         courses.iter().filter(|it| is_so(it)).count() as f64 / courses.len() as f64
     };
     [
@@ -101,29 +101,29 @@ fn shares(courses: &[Course]) -> [f64; 4] {
 }
 
 #[test]
-fn what_is_to_come_is_drawn_given_what_was_seen() {
+fn future_events_are_drawn_conditionally_on_observations() {
     let task = task();
     let model = WorldModel::read(WORLD, task.problem()).expect("it works");
-    let goes_with = |course: &Course| {
+    let goes_with = |course: &EventTimes| {
         let is_later = |time: Option<f64>| time.is_none_or(|time| time > 4.0);
         is_later(course.ended.map(|(time, _)| time))
             && is_later(course.light_out)
             && is_later(course.door_shut)
     };
-    let all = (0..20_000).map(|seed| from_the_beginning(&task, &model, seed));
-    let kept: Vec<Course> = all.filter(goes_with).collect();
+    let all = (0..20_000).map(|seed| simulate_from_start(&task, &model, seed));
+    let kept: Vec<EventTimes> = all.filter(goes_with).collect();
 
-    let mut belief = Progression::new(Arc::clone(&task));
+    let mut belief = BeliefState::new(Arc::clone(&task));
     let action = Arc::new(work(&task));
     belief
-        .start(Ticket(0), &action, &Rational::from(5), &[])
+        .start(ActionHandle(0), &action, &Rational::from(5), &[])
         .expect("it works");
     belief.advance(&Rational::from(4)).expect("it works");
     let drawn = (0..4000).map(|seed| {
-        let mut world = model.world_amid(&belief, seed, &Seen::default());
-        course(&task, world.as_mut())
+        let mut world = model.world_amid(&belief, seed, &ObservedChanges::default());
+        simulate(&task, world.as_mut())
     });
-    let drawn: Vec<Course> = drawn.collect();
+    let drawn: Vec<EventTimes> = drawn.collect();
     assert!(drawn.iter().all(goes_with));
     assert!(kept.len() > 1000, "{}", kept.len());
     for (plain, drawn) in shares(&kept).into_iter().zip(shares(&drawn)) {
@@ -133,24 +133,24 @@ fn what_is_to_come_is_drawn_given_what_was_seen() {
 
 /// The door was observed to shut at 3.5, so the same event does not come again.
 #[test]
-fn what_was_seen_does_not_come_again() {
+fn observed_event_does_not_recur() {
     let task = task();
     let model = WorldModel::read(WORLD, task.problem()).expect("it works");
     let fact = task.fact_named("(open)").expect("it works");
-    let mut belief = Progression::new(Arc::clone(&task));
+    let mut belief = BeliefState::new(Arc::clone(&task));
     belief.advance(&Rational::from(4)).expect("it works");
     belief.change_fact(fact, false);
-    let seen = Seen {
-        changes: vec![SeenChange {
+    let seen = ObservedChanges {
+        changes: vec![ObservedChange {
             time: Rational::new(7, 2),
             fact,
             truth: false,
-            is_by_itself: true,
+            is_spontaneous: true,
         }],
     };
     let again = (0..200).filter(|seed| {
         let mut world = model.world_amid(&belief, *seed, &seen);
-        course(&task, world.as_mut()).door_shut.is_some()
+        simulate(&task, world.as_mut()).door_shut.is_some()
     });
     // The other event finds the door shut already. It is reported and changes nothing.
     let again = again.count();
@@ -159,13 +159,13 @@ fn what_was_seen_does_not_come_again() {
 
 /// Two runs that continue from here meet the same world as long as they do the same.
 #[test]
-fn the_same_seed_goes_on_in_the_same_way() {
+fn same_seed_continues_identically() {
     let task = task();
     let model = WorldModel::read(WORLD, task.problem()).expect("it works");
-    let belief = Progression::new(Arc::clone(&task));
+    let belief = BeliefState::new(Arc::clone(&task));
     let one = |seed| {
-        let mut world = model.world_amid(&belief, seed, &Seen::default());
-        course(&task, world.as_mut())
+        let mut world = model.world_amid(&belief, seed, &ObservedChanges::default());
+        simulate(&task, world.as_mut())
     };
     assert!((0..20).all(|seed| one(seed) == one(seed)));
     assert!((1..20).any(|seed| one(seed) != one(0)));

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::{Command, Ending, Event, Ticket, World};
+use elbowroom_execution::{ActionHandle, Command, Ending, Event, World};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
@@ -19,7 +19,7 @@ const PROBLEM: &str = "(define (problem p) (:domain d) (:init (lies) (free)) (:g
 
 /// Returns the reports on a pick that fails at its end, in words, and the facts that are true
 /// afterwards.
-fn after_a_failure(undone: &str) -> (Vec<String>, Vec<String>) {
+fn state_after_failure(undone: &str) -> (Vec<String>, Vec<String>) {
     let source = |text: &str| Source::new("test", text);
     let (problem, _) = read_problem(&source(DOMAIN), &source(PROBLEM)).expect("correct");
     let task = Arc::new(Task::new(problem));
@@ -30,7 +30,7 @@ fn after_a_failure(undone: &str) -> (Vec<String>, Vec<String>) {
     let model = WorldModel::read(text.as_str(), task.problem()).expect("a correct world");
     let schema = task.problem().schema("pick").expect("an action");
     let command = Command::Start {
-        ticket: Ticket(0),
+        ticket: ActionHandle(0),
         action: Arc::new(task.instantiate(schema, &[]).expect("no arguments")),
         duration: Some(Rational::from(2)),
     };
@@ -57,15 +57,15 @@ fn after_a_failure(undone: &str) -> (Vec<String>, Vec<String>) {
 }
 
 #[test]
-fn what_fails_leaves_things_as_its_start_left_them() {
-    let (told, facts) = after_a_failure("");
+fn failed_action_keeps_start_effects() {
+    let (told, facts) = state_after_failure("");
     assert_eq!(told, ["failed"]);
     assert_eq!(facts, ["(busy)"]);
 }
 
 #[test]
-fn what_is_undone_is_as_it_was_and_the_world_says_so() {
-    let (told, mut facts) = after_a_failure("undone = true");
+fn undone_start_effects_are_reverted_and_reported() {
+    let (told, mut facts) = state_after_failure("undone = true");
     assert_eq!(
         told,
         ["failed", "(lies) true", "(free) true", "(busy) false"]

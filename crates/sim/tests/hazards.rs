@@ -46,7 +46,7 @@ const BOTH: &str = "[[hazard]]\nfact = \"open\"
 
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few changes")]
-fn a_fact_changes_again_and_again_after_exponential_times() {
+fn fact_changes_repeatedly_after_exponential_times() {
     let task = task();
     let told = changes(&task, BOTH, 7, 100_000);
     for door in ["(open a)", "(open b)"] {
@@ -81,7 +81,7 @@ fn a_fact_changes_again_and_again_after_exponential_times() {
 }
 
 #[test]
-fn a_seed_means_one_course_and_facts_do_not_depend_on_each_other() {
+fn seed_determines_changes_and_facts_are_independent() {
     let task = task();
     assert_eq!(changes(&task, BOTH, 3, 200), changes(&task, BOTH, 3, 200));
     assert_ne!(changes(&task, BOTH, 3, 200), changes(&task, BOTH, 4, 200));
@@ -98,7 +98,7 @@ fn a_seed_means_one_course_and_facts_do_not_depend_on_each_other() {
 }
 
 #[test]
-fn the_last_section_that_matches_counts_and_what_is_not_reported_is_not_told() {
+fn last_matching_hazard_applies_and_unreported_changes_are_silent() {
     let task = task();
     let steady = format!("{BOTH}[[hazard]]\nfact = \"(open a)\"\nbecomes_false_per_second = 0\n");
     let told = changes(&task, &steady, 1, 1000);
@@ -108,7 +108,7 @@ fn the_last_section_that_matches_counts_and_what_is_not_reported_is_not_told() {
 }
 
 #[test]
-fn mistakes_in_rates_have_their_line_and_say_what_to_do() {
+fn rate_errors_have_line_and_advice() {
     let task = task();
     let cases = [
         ("fact = \"open\"", 3, "say how often"),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::{Command, Ending, Event, Observation, Ticket, World};
+use elbowroom_execution::{ActionHandle, Command, Ending, Event, Observation, World};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
@@ -19,12 +19,12 @@ const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions :fluen
     (:durative-action drain :parameters () :duration (= ?duration 5)
       :condition (over all (> (x) 0)) :effect (decrease (x) (* #t 2))))";
 
-struct Stage {
+struct TestTask {
     task: Task,
     tickets: u64,
 }
 
-impl Stage {
+impl TestTask {
     fn new(x: i64) -> Self {
         let problem =
             format!("(define (problem p) (:domain d) (:init (= (x) {x})) (:goal (mended)))");
@@ -40,7 +40,7 @@ impl Stage {
     fn start(&mut self, name: &str, duration: Rational) -> Command {
         let schema = self.task.problem().schema(name).expect("an action");
         let action = self.task.instantiate(schema, &[]).expect("no arguments");
-        let ticket = Ticket(self.tickets);
+        let ticket = ActionHandle(self.tickets);
         self.tickets += 1;
         Command::Start {
             ticket,
@@ -63,8 +63,8 @@ fn ended(observation: &Observation) -> Option<(u64, &str)> {
 
 /// Sends the commands at their times, and lets 100 s pass. Returns the reported ends with their
 /// times, by answer.
-fn played(stage: &Stage, commands: &[(Rational, Command)]) -> Vec<(Rational, Vec<String>)> {
-    let model = WorldModel::as_planned();
+fn simulate(stage: &TestTask, commands: &[(Rational, Command)]) -> Vec<(Rational, Vec<String>)> {
+    let model = WorldModel::without_deviations();
     let mut world = SimWorld::new(Arc::new(stage.task.clone()), &model, 0);
     let mut answers = Vec::new();
     let mut wait = |world: &mut SimWorld<'_>, until: &Rational| {
@@ -91,51 +91,54 @@ fn played(stage: &Stage, commands: &[(Rational, Command)]) -> Vec<(Rational, Vec
 }
 
 #[test]
-fn two_ends_at_one_time_are_told_together_and_neither_breaks_the_other() {
-    let mut stage = Stage::new(1);
+fn simultaneous_ends_are_reported_together_without_violation() {
+    let mut stage = TestTask::new(1);
     let commands = [
         (seconds(0), stage.start("burn", seconds(8000))),
         (seconds(3000), stage.start("mend", seconds(5000))),
     ];
     let ends = ["0 succeeded".to_owned(), "1 succeeded".to_owned()];
-    assert_eq!(played(&stage, &commands), [(seconds(8000), ends.to_vec())]);
+    assert_eq!(
+        simulate(&stage, &commands),
+        [(seconds(8000), ends.to_vec())]
+    );
 }
 
 #[test]
-fn a_light_that_goes_out_earlier_breaks_the_mending_at_that_moment() {
-    let mut stage = Stage::new(1);
+fn early_light_end_violates_mending() {
+    let mut stage = TestTask::new(1);
     let commands = [
         (seconds(0), stage.start("burn", seconds(8000))),
         (seconds(3001), stage.start("mend", seconds(5000))),
     ];
-    let told = played(&stage, &commands);
+    let told = simulate(&stage, &commands);
     let failed = (seconds(8000), vec!["1 failed".to_owned()]);
     assert_eq!(told.last(), Some(&failed), "{told:?}");
 }
 
 #[test]
-fn an_action_of_duration_0_ends_in_the_answer_in_which_it_starts() {
-    let mut stage = Stage::new(1);
+fn zero_duration_action_ends_with_its_start() {
+    let mut stage = TestTask::new(1);
     let commands = [(seconds(2000), stage.start("blink", Rational::ZERO))];
     let ends = vec!["0 succeeded".to_owned()];
-    assert_eq!(played(&stage, &commands), [(seconds(2000), ends)]);
+    assert_eq!(simulate(&stage, &commands), [(seconds(2000), ends)]);
 }
 
 /// An action with a planned duration below the resolution takes the planned duration.
 #[test]
-fn the_resolution_does_not_stretch_what_goes_as_planned() {
-    let mut stage = Stage::new(1);
+fn resolution_does_not_change_planned_durations() {
+    let mut stage = TestTask::new(1);
     let short = Rational::new(1, 3000);
     let commands = [(seconds(0), stage.start("blink", short.clone()))];
-    assert_eq!(played(&stage, &commands)[0].0, short);
+    assert_eq!(simulate(&stage, &commands)[0].0, short);
 }
 
 #[test]
-fn a_number_may_reach_its_strict_bound_at_the_end_and_not_before() {
+fn strict_bound_may_be_reached_only_at_end() {
     for (x, end, outcome) in [(10, 5000, "0 succeeded"), (9, 4501, "0 failed")] {
-        let mut stage = Stage::new(x);
+        let mut stage = TestTask::new(x);
         let commands = [(seconds(0), stage.start("drain", seconds(5000)))];
-        let told = played(&stage, &commands);
+        let told = simulate(&stage, &commands);
         assert_eq!(told, [(seconds(end), vec![outcome.to_owned()])], "{x}");
     }
     assert_eq!(Ending::Succeeded.name(), "succeeded");

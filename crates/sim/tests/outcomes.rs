@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::{Command, Ending, Event, Ticket, World};
+use elbowroom_execution::{ActionHandle, Command, Ending, Event, World};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
@@ -44,7 +44,7 @@ fn picked<'a>(
     let object = task.problem().object("a").expect("an object");
     let mut world = SimWorld::new(Arc::clone(task), model, seed);
     let command = Command::Start {
-        ticket: Ticket(0),
+        ticket: ActionHandle(0),
         action: Arc::new(task.instantiate(schema, &[object]).expect("a box")),
         duration: Some(Rational::from(4)),
     };
@@ -80,7 +80,9 @@ fn picked<'a>(
     };
     if let Some(time) = cancelled {
         listen(&mut world, time);
-        let command = Command::Cancel { ticket: Ticket(0) };
+        let command = Command::Cancel {
+            ticket: ActionHandle(0),
+        };
         let now = Rational::from(time);
         world.command(&now, &command).expect("simulated");
     }
@@ -94,7 +96,7 @@ const DROPPED: &str = "action = \"pick\"\nprobability = 1\nundone = true
     decrease = { \"(charge)\" = 2.5 }\ndelay = 6\n";
 
 #[test]
-fn an_outcome_is_about_the_actions_own_objects_and_comes_after_what_is_undone() {
+fn outcome_uses_action_objects_and_follows_undoing() {
     let task = task();
     let model = model(&task, DROPPED);
     let (told, world) = picked(&task, &model, 1, None);
@@ -123,7 +125,7 @@ fn an_outcome_is_about_the_actions_own_objects_and_comes_after_what_is_undone() 
 }
 
 #[test]
-fn what_is_not_reported_happens_all_the_same() {
+fn unreported_outcome_still_happens() {
     let task = task();
     let text = DROPPED.replace("undone = true", "") + "reported = false\n";
     let model = model(&task, &text);
@@ -134,7 +136,7 @@ fn what_is_not_reported_happens_all_the_same() {
 }
 
 #[test]
-fn what_has_broken_down_is_not_let_go_before_it_has_failed() {
+fn broken_action_is_not_released_before_failure() {
     let task = task();
     let model = model(&task, DROPPED);
     let before = picked(&task, &model, 1, Some(3)).0;
@@ -145,7 +147,7 @@ fn what_has_broken_down_is_not_let_go_before_it_has_failed() {
 }
 
 #[test]
-fn a_start_that_fails_has_outcomes_too() {
+fn failed_start_has_outcome() {
     let task = task();
     let text = "action = \"(pick a)\"\nprobability = 1\nwhen = \"start\"
         [[failure.outcome]]\nprobability = 1\nincrease = { \"(tries a)\" = 1 }\ndelay = 2\n";
@@ -156,7 +158,7 @@ fn a_start_that_fails_has_outcomes_too() {
 
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
-fn outcomes_are_as_frequent_as_the_file_says() {
+fn outcome_frequencies_match_file() {
     const RUNS: u64 = 4000;
     let task = task();
     let text = "action = \"pick\"\nprobability = 0.6
@@ -186,7 +188,7 @@ fn outcomes_are_as_frequent_as_the_file_says() {
 }
 
 #[test]
-fn outcomes_leave_the_dice_of_all_else_as_they_are() {
+fn outcomes_do_not_affect_other_random_draws() {
     let task = task();
     let plain = "action = \"pick\"\nprobability = 0.5\nwhen = \"midway\"\n";
     let with = format!(

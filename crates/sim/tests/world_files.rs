@@ -21,7 +21,7 @@ fn problem() -> Problem {
 }
 
 /// Returns the error in a file whose third and later lines are `sections`.
-fn mistake(sections: &str) -> (usize, String) {
+fn error_of(sections: &str) -> (usize, String) {
     let text = format!("format = \"elbowroom-world\"\nversion = 1\n{sections}");
     let error = WorldModel::read(&text, &problem()).expect_err(sections);
     let error = error.errors().next().expect("a mistake");
@@ -33,7 +33,7 @@ fn mistake(sections: &str) -> (usize, String) {
 }
 
 #[test]
-fn every_mistake_has_its_line_and_says_what_to_do() {
+fn each_error_has_line_and_advice() {
     let cases = [
         (
             "[[duration]]\naction = \"fly\"\nconstant = 1\n",
@@ -116,7 +116,7 @@ fn every_mistake_has_its_line_and_says_what_to_do() {
         ("[reports]\nlost = 1.5\n", 4, "between 0 and 1"),
     ];
     for (sections, line, words) in cases {
-        let (found, message) = mistake(sections);
+        let (found, message) = error_of(sections);
         assert_eq!(found, line, "{sections}: {message}");
         assert!(message.contains(words), "{sections}: {message}");
     }
@@ -124,7 +124,7 @@ fn every_mistake_has_its_line_and_says_what_to_do() {
 
 /// Regression: superfluous keys were once ignored. Each line is the one with the superfluous key.
 #[test]
-fn nothing_in_a_file_is_ignored() {
+fn unknown_keys_are_rejected() {
     let cases = [
         (
             "[[duration]]\naction = \"go\"\nconstant = 1\nprobability = 0.5\n",
@@ -183,14 +183,14 @@ fn nothing_in_a_file_is_ignored() {
         ),
     ];
     for (sections, line, words) in cases {
-        let (found, message) = mistake(sections);
+        let (found, message) = error_of(sections);
         assert_eq!(found, line, "{sections}: {message}");
         assert!(message.contains(words), "{sections}: {message}");
     }
 }
 
 #[test]
-fn numbers_that_make_no_sense_are_mistakes() {
+fn invalid_numbers_are_rejected() {
     let cases = [
         (
             "[[duration]]\naction = \"go\"\nconstant = 1\nminimum = 30\nmaximum = 20\n",
@@ -239,14 +239,14 @@ fn numbers_that_make_no_sense_are_mistakes() {
         ),
     ];
     for (sections, line, words) in cases {
-        let (found, message) = mistake(sections);
+        let (found, message) = error_of(sections);
         assert_eq!(found, line, "{sections}: {message}");
         assert!(message.contains(words), "{sections}: {message}");
     }
 }
 
 #[test]
-fn outcomes_that_make_no_sense_are_mistakes() {
+fn invalid_outcomes_are_rejected() {
     let outcome = "[[failure]]\naction = \"go\"\nprobability = 1\n[[failure.outcome]]\n";
     let cases = [
         ("delay = 1\n", 6, "`probability` is missing"),
@@ -309,18 +309,18 @@ fn outcomes_that_make_no_sense_are_mistakes() {
     ];
     for (rest, line, words) in cases {
         let sections = format!("{outcome}{rest}");
-        let (found, message) = mistake(&sections);
+        let (found, message) = error_of(&sections);
         assert_eq!(found, line, "{sections}: {message}");
         assert!(message.contains(words), "{sections}: {message}");
     }
     let of_any = outcome.replace("\"go\"", "\"*\"");
-    let (line, message) = mistake(&format!(
+    let (line, message) = error_of(&format!(
         "{of_any}probability = 1\nbecomes_true = [\"(at ?p)\"]\n"
     ));
     assert_eq!(line, 8);
     assert!(message.contains("give `action` a name"), "{message}");
     let (line, message) =
-        mistake("[[delay]]\naction = \"go\"\nconstant = 1\n[[delay.outcome]]\ndelay = 1\n");
+        error_of("[[delay]]\naction = \"go\"\nconstant = 1\n[[delay.outcome]]\ndelay = 1\n");
     assert!(
         line >= 3 && message.contains("`outcome` says nothing"),
         "{line} {message}"
@@ -328,7 +328,7 @@ fn outcomes_that_make_no_sense_are_mistakes() {
 }
 
 #[test]
-fn the_limits_of_late_reports_count() {
+fn lateness_limits_are_applied() {
     let text = "format = \"elbowroom-world\"\nversion = 1\n[reports]\nlate = 1\n\
         uniform = { from = 0, to = 10 }\nminimum = 20\nmaximum = 20\n";
     let model = WorldModel::read(text, &problem()).expect("a correct file");
@@ -339,7 +339,7 @@ fn the_limits_of_late_reports_count() {
 }
 
 #[test]
-fn a_file_of_another_kind_or_version_is_refused() {
+fn other_format_or_version_is_rejected() {
     for text in [
         "",
         "format = \"elbowroom-world\"\nversion = 2\n",
@@ -350,7 +350,7 @@ fn a_file_of_another_kind_or_version_is_refused() {
 }
 
 #[test]
-fn of_several_rules_the_last_that_matches_counts() {
+fn last_matching_rule_applies() {
     let text = "format = \"elbowroom-world\"\nversion = 1\n\
         [[duration]]\naction = \"*\"\nconstant = 2\nrelative = true\n\
         [[duration]]\naction = \"(GO b)\"\nconstant = 7\n";

@@ -12,9 +12,9 @@ fn main() {
 const NODES: u32 = 10_000;
 
 /// Small linear congruential generator, for the same networks on each run.
-struct Dice(u64);
+struct Random(u64);
 
-impl Dice {
+impl Random {
     fn below(&mut self, limit: u32) -> u32 {
         self.0 = self
             .0
@@ -26,9 +26,9 @@ impl Dice {
 
 /// Returns a network with `node` at about `node` seconds; times are in thousandths.
 fn network<W: Weight>(node_count: u32, thousandths: impl Fn(i64) -> W) -> Network<W> {
-    let mut dice = Dice(7);
+    let mut dice = Random(7);
     let mut network = Network::with_nodes(node_count as usize);
-    let mut jitter = Dice(11);
+    let mut jitter = Random(11);
     let times: Vec<i64> = (0..node_count)
         .map(|node| i64::from(node) * 1000 + i64::from(jitter.below(900)))
         .collect();
@@ -128,7 +128,7 @@ fn build_one_by_one(bencher: Bencher) {
 #[divan::bench]
 fn add_and_undo(bencher: Bencher) {
     let mut network = consistent(NODES);
-    let mut dice = Dice(13);
+    let mut dice = Random(13);
     bencher.bench_local(|| {
         let before = network.checkpoint();
         let from = dice.below(NODES - 40);

@@ -139,7 +139,7 @@ impl Tree {
     fn grow(&mut self, graph: &Split, root: usize) {
         // Nodes, each with the number of its successors that have been visited.
         let mut path = vec![(root, 0)];
-        self.see(root, 0);
+        self.discover(root, 0);
         while let Some((node, looked_at)) = path.last_mut() {
             let Some(&next) = graph.leads_to(*node).get(*looked_at) else {
                 path.pop();
@@ -147,13 +147,13 @@ impl Tree {
             };
             *looked_at += 1;
             if self.numbers[next] == 0 {
-                self.see(next, self.numbers[*node]);
+                self.discover(next, self.numbers[*node]);
                 path.push((next, 0));
             }
         }
     }
 
-    fn see(&mut self, node: usize, parent: usize) {
+    fn discover(&mut self, node: usize, parent: usize) {
         self.numbers[node] = self.nodes.len();
         self.nodes.push(node);
         self.parents.push(parent);
@@ -253,7 +253,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_bridge_is_what_there_is_no_way_around(
+        fn bridge_has_no_detour(
             count in 1..9_usize,
             edges in prop::collection::vec((0..9_usize, 0..9_usize), 0..24),
         ) {

@@ -5,7 +5,7 @@ use std::fmt;
 
 use elbowroom_num::Rational;
 
-use crate::{ConstraintId, Network, NodeId, Schedule, Weight, spend_step};
+use crate::{ConstraintId, Network, NodeId, Schedule, Weight, count_step};
 
 /// Proof that a network is inconsistent: a cycle of constraints that sum up to `0 <= total < 0`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,7 +54,7 @@ impl<W: Weight> Network<W> {
         let mut tree = Tree::star(self.node_count());
         let mut queue: VecDeque<NodeId> = self.late_nodes_first().into();
         while let Some(node) = queue.pop_front() {
-            spend_step();
+            count_step();
             if !std::mem::take(&mut tree.is_queued[node.index()]) {
                 continue;
             }
@@ -64,7 +64,7 @@ impl<W: Weight> Network<W> {
                 if limit >= schedule[constraint.to] {
                     continue;
                 }
-                if tree.is_cut_off_with(constraint.to, node) {
+                if tree.detach_subtree(constraint.to, node) {
                     let constraints = tree.path(self, constraint.to, node, id);
                     let total = limit.minus(&schedule[constraint.to]);
                     return Err(NegativeCycle { constraints, total });
@@ -126,7 +126,7 @@ impl Tree {
     }
 
     /// Detaches `node` and its subtree. Returns `true` if `cause` is in it.
-    fn is_cut_off_with(&mut self, node: NodeId, cause: NodeId) -> bool {
+    fn detach_subtree(&mut self, node: NodeId, cause: NodeId) -> bool {
         if node == cause {
             return true;
         }

@@ -14,7 +14,7 @@ pub struct ConsistentNetwork<W = Rational> {
     schedule: Schedule<W>,
     repair: Repair<W>,
     /// The previous times of moved nodes, in order, if they are recorded.
-    former: Option<Vec<(NodeId, W)>>,
+    previous_times: Option<Vec<(NodeId, W)>>,
 }
 
 /// A snapshot of the size of a network, to go back to.
@@ -45,7 +45,7 @@ impl<W: Weight> TryFrom<Network<W>> for ConsistentNetwork<W> {
             network,
             schedule,
             repair,
-            former: None,
+            previous_times: None,
         })
     }
 }
@@ -57,12 +57,12 @@ impl<W: Weight> ConsistentNetwork<W> {
             network: Network::new(),
             schedule: Schedule::new(Vec::new()),
             repair: Repair::default(),
-            former: None,
+            previous_times: None,
         }
     }
 
     /// Creates the network with this schedule; `None` if the schedule violates a constraint.
-    pub fn by(network: Network<W>, schedule: Schedule<W>) -> Option<Self> {
+    pub fn with_schedule(network: Network<W>, schedule: Schedule<W>) -> Option<Self> {
         if !schedule.holds_in(&network) {
             return None;
         }
@@ -72,7 +72,7 @@ impl<W: Weight> ConsistentNetwork<W> {
             network,
             schedule,
             repair,
-            former: None,
+            previous_times: None,
         })
     }
 
@@ -117,9 +117,12 @@ impl<W: Weight> ConsistentNetwork<W> {
     pub fn add(&mut self, constraint: Constraint<W>) -> Result<ConstraintId, NegativeCycle<W>> {
         let before = self.checkpoint();
         let id = self.network.add(constraint);
-        let repaired =
-            self.repair
-                .after_adding(id, &self.network, &mut self.schedule, &mut self.former);
+        let repaired = self.repair.after_adding(
+            id,
+            &self.network,
+            &mut self.schedule,
+            &mut self.previous_times,
+        );
         if let Err(cycle) = repaired {
             self.undo_to(before);
             return Err(cycle);
@@ -132,7 +135,7 @@ impl<W: Weight> ConsistentNetwork<W> {
         Checkpoint {
             node_count: self.network.node_count(),
             constraint_count: self.network.constraints().len(),
-            moves: self.former.as_ref().map_or(0, Vec::len),
+            moves: self.previous_times.as_ref().map_or(0, Vec::len),
         }
     }
 
@@ -145,15 +148,15 @@ impl<W: Weight> ConsistentNetwork<W> {
         self.resize();
     }
 
-    /// Records the times of nodes from now on, so that [`go_back_to`](Self::go_back_to) can restore
+    /// Records the times of nodes from now on, so that [`restore`](Self::go_back_to) can restore
     /// them. All earlier checkpoints become invalid.
-    pub fn remember_times(&mut self) {
-        self.former = Some(Vec::new());
+    pub fn record_times(&mut self) {
+        self.previous_times = Some(Vec::new());
     }
 
     /// Returns the nodes that have moved since the recording of times began.
     pub fn moved(&self) -> impl Iterator<Item = NodeId> + '_ {
-        self.former.iter().flatten().map(|(node, _)| *node)
+        self.previous_times.iter().flatten().map(|(node, _)| *node)
     }
 
     /// Like [`undo_to`](Self::undo_to), but also restores the times that nodes had at `checkpoint`,
@@ -163,9 +166,9 @@ impl<W: Weight> ConsistentNetwork<W> {
     /// Without this call, times only ever decrease, a little with each constraint that is tried.
     /// With this call, their range is limited by the remaining constraints and those tried since.
     /// Machine integers can then be used as weights without overflow.
-    pub fn go_back_to(&mut self, checkpoint: Checkpoint) {
+    pub fn restore(&mut self, checkpoint: Checkpoint) {
         for (node, time) in self
-            .former
+            .previous_times
             .iter_mut()
             .flat_map(|it| it.drain(checkpoint.moves..).rev())
         {
@@ -180,7 +183,7 @@ impl<W: Weight> ConsistentNetwork<W> {
     /// Moves nodes to other times. All constraints have to hold at these times.
     pub fn reschedule(&mut self, times: impl IntoIterator<Item = (NodeId, W)>) {
         for (node, time) in times {
-            if let Some(former) = &mut self.former {
+            if let Some(former) = &mut self.previous_times {
                 former.push((node, self.schedule[node].clone()));
             }
             self.schedule.set(node, time);

@@ -41,14 +41,14 @@ impl<W: Weight> ConsistentNetwork<W> {
             network: self,
             schedule,
             slack,
-            can_go: network.constraint_ids().map(|id| !keep(id)).collect(),
-            is_gone: vec![false; network.constraints().len()],
+            is_removable: network.constraint_ids().map(|id| !keep(id)).collect(),
+            is_removed: vec![false; network.constraints().len()],
             rigid,
         };
-        search.within_groups();
-        search.between_groups();
+        search.thin_within_groups();
+        search.thin_between_groups();
         let gone = network.constraint_ids();
-        gone.filter(|id| search.is_gone[id.index()]).collect()
+        gone.filter(|id| search.is_removed[id.index()]).collect()
     }
 
     /// Returns the nodes whose differences are fixed, group by group: the strongly connected
@@ -93,9 +93,9 @@ struct Search<'a, W> {
     schedule: &'a Schedule<W>,
     slack: Vec<W>,
     /// `true` if the caller allows that a constraint is left out.
-    can_go: Vec<bool>,
+    is_removable: Vec<bool>,
     /// `true` for constraints removed so far. The remaining ones imply all of these.
-    is_gone: Vec<bool>,
+    is_removed: Vec<bool>,
     rigid: Rigid,
 }
 
@@ -103,7 +103,7 @@ impl<W: Weight> Search<'_, W> {
     /// Removes constraints between nodes of one group, newest first.
     ///
     /// Those with slack are never needed. Those without must keep the group strongly connected.
-    fn within_groups(&mut self) {
+    fn thin_within_groups(&mut self) {
         let network = self.network.network();
         let mut inner: Vec<ConstraintId> = Vec::new();
         let mut tight_leaving = vec![0_usize; network.node_count()];
@@ -114,7 +114,7 @@ impl<W: Weight> Search<'_, W> {
                 continue;
             }
             if edge.from == edge.to || self.slack[id.index()] > W::zero() {
-                self.is_gone[id.index()] = self.can_go[id.index()];
+                self.is_removed[id.index()] = self.is_removable[id.index()];
                 continue;
             }
             tight_leaving[edge.from.index()] += 1;
@@ -128,8 +128,8 @@ impl<W: Weight> Search<'_, W> {
             // searches.
             let is_bridge =
                 tight_leaving[edge.from.index()] < 2 || tight_entering[edge.to.index()] < 2;
-            if self.can_go[id.index()] && !is_bridge && self.has_tight_detour(id, &mut mark) {
-                self.is_gone[id.index()] = true;
+            if self.is_removable[id.index()] && !is_bridge && self.has_tight_detour(id, &mut mark) {
+                self.is_removed[id.index()] = true;
                 tight_leaving[edge.from.index()] -= 1;
                 tight_entering[edge.to.index()] -= 1;
             }
@@ -149,7 +149,7 @@ impl<W: Weight> Search<'_, W> {
             for id in network.leaving(node) {
                 let to = network.constraint(id).to;
                 let is_open = id != avoided
-                    && !self.is_gone[id.index()]
+                    && !self.is_removed[id.index()]
                     && self.slack[id.index()] == W::zero()
                     && self.group(to) == self.group(node)
                     && mark[to.index()] != Some(avoided);
@@ -166,7 +166,7 @@ impl<W: Weight> Search<'_, W> {
     }
 
     /// Removes constraints between nodes of different groups.
-    fn between_groups(&mut self) {
+    fn thin_between_groups(&mut self) {
         let group_count = self.rigid.groups.len();
         let mut sources: Vec<usize> = (0..group_count).collect();
         // Most edges lead back in time. With early sources first, later sources search through
@@ -179,11 +179,11 @@ impl<W: Weight> Search<'_, W> {
         let mut outgoing = self.outgoing();
         let hub = Hub::of(self, &outgoing);
         for source in sources {
-            reach.look_for_detours(&outgoing, source, hub.as_ref(), &self.can_go);
+            reach.find_detours(&outgoing, source, hub.as_ref(), &self.is_removable);
             for edges in outgoing.of(source).chunk_by(|a, b| a.target == b.target) {
                 self.thin_out(edges, reach.has_detour[edges[0].target]);
             }
-            outgoing.drop_gone(source, &self.is_gone);
+            outgoing.drop_removed(source, &self.is_removed);
         }
     }
 
@@ -192,14 +192,14 @@ impl<W: Weight> Search<'_, W> {
     fn thin_out(&mut self, edges: &[Edge<W>], has_detour: bool) {
         // Constraints that must stay count as older than the rest, because they make the others
         // redundant.
-        let age = |edge: &Edge<W>| (self.can_go[edge.id.index()], edge.id);
+        let age = |edge: &Edge<W>| (self.is_removable[edge.id.index()], edge.id);
         let shortest = edges
             .iter()
             .min_by(|a, b| a.length.cmp(&b.length).then_with(|| age(a).cmp(&age(b))));
         let needed = shortest.map(|edge| edge.id).filter(|_| !has_detour);
         for edge in edges {
-            if self.can_go[edge.id.index()] && Some(edge.id) != needed {
-                self.is_gone[edge.id.index()] = true;
+            if self.is_removable[edge.id.index()] && Some(edge.id) != needed {
+                self.is_removed[edge.id.index()] = true;
             }
         }
     }
@@ -251,7 +251,7 @@ impl<W> Outgoing<W> {
     }
 
     /// Drops the removed edges of a group.
-    fn drop_gone(&mut self, group: usize, is_gone: &[bool]) {
+    fn drop_removed(&mut self, group: usize, is_gone: &[bool]) {
         let range = &mut self.ranges[group];
         let mut end = range.start;
         for place in range.clone() {
@@ -335,7 +335,7 @@ impl<W: Weight> Reach<W> {
 
     /// Runs Dijkstra's algorithm from `source`, until all of its edges with a detour are known. The
     /// lengths of detours through the hub are known beforehand.
-    fn look_for_detours(
+    fn find_detours(
         &mut self,
         outgoing: &Outgoing<W>,
         source: usize,

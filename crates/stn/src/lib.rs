@@ -18,7 +18,7 @@
 //!   constraints that imply them;
 //! - [`ConsistentNetwork::implied`]: the redundant constraints;
 //! - [`ConsistentNetwork::minimal`]: all implied bounds at once, for small networks;
-//! - [`MovingWindows`]: windows that are updated as times become known.
+//! - [`IncrementalWindows`]: windows that are updated as times become known.
 //!
 //! [`uncertain`] has networks with uncertainty (STNUs), their controllability and dispatch;
 //! [`branching`] decides whether there is a schedule for all values of quantities in the bounds
@@ -49,20 +49,20 @@
 //! # Ok::<(), elbowroom_stn::NegativeCycle>(())
 //! ```
 
-pub mod branching;
 mod bridges;
 mod consistency;
 mod consistent;
+pub mod corner_search;
 mod direction;
-mod few;
 mod ids;
 mod implied;
+mod incremental_windows;
 mod lists;
 mod minimal;
-mod moving;
 mod network;
 mod paths;
 mod schedule;
+mod small_map;
 #[cfg(feature = "testing")]
 pub mod testing;
 pub mod uncertain;
@@ -73,8 +73,8 @@ pub use consistency::NegativeCycle;
 pub use consistent::{Checkpoint, ConsistentNetwork};
 pub use direction::Direction;
 pub use ids::{ConstraintId, NodeId};
+pub use incremental_windows::{Grounds, IncrementalWindows, OutOfWindow, WindowEnd};
 pub use minimal::Minimal;
-pub use moving::{Grounds, MovingWindows, OutOfWindow, WindowEnd};
 pub use network::{Constraint, Network};
 pub use paths::ShortestPaths;
 pub use schedule::Schedule;
@@ -82,7 +82,7 @@ pub use weight::Weight;
 pub use windows::{Window, Windows};
 
 /// Counts a step of a propagation.
-fn spend_step() {
+fn count_step() {
     elbowroom_num::work::spend(STEP_WORK);
 }
 

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use elbowroom_num::Rational;
 
 use crate::{
-    ConsistentNetwork, Constraint, ConstraintId, Direction, NodeId, Schedule, Weight, spend_step,
+    ConsistentNetwork, Constraint, ConstraintId, Direction, NodeId, Schedule, Weight, count_step,
 };
 
 /// The tightest implied bound between one node, the root, and each other node.
@@ -79,7 +79,7 @@ impl<W: Weight> ConsistentNetwork<W> {
         let mut are_final = BTreeSet::new();
         let mut queue = BinaryHeap::from([Reverse((key(&W::zero(), from), from))]);
         while let Some(Reverse((_, node))) = queue.pop() {
-            spend_step();
+            count_step();
             let near = distances.get(&node)?.clone();
             if node == to {
                 return Some(near);
@@ -127,7 +127,7 @@ impl<W: Weight> ConsistentNetwork<W> {
             root,
         )));
         while let Some(Reverse((_, node))) = queue.pop() {
-            spend_step();
+            count_step();
             if std::mem::replace(&mut is_final[node.index()], true) {
                 continue;
             }

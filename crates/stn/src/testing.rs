@@ -7,17 +7,17 @@ use proptest::sample::Index;
 use crate::{Constraint, Network, NodeId, Schedule, Weight};
 
 /// A network and the schedule it was built around.
-pub type Hidden<W = Rational> = (Network<W>, Schedule<W>);
+pub type GeneratedNetwork<W = Rational> = (Network<W>, Schedule<W>);
 
 /// Generates networks around a hidden schedule, so that they are consistent by construction.
 ///
 /// Some bounds leave no slack, so that rigid parts occur.
-pub fn consistent_networks() -> impl Strategy<Value = Hidden> {
+pub fn consistent_networks() -> impl Strategy<Value = GeneratedNetwork> {
     consistent(whole_numbers_and_halves())
 }
 
 /// Like [`consistent_networks`], with some strict bounds.
-pub fn consistent_strict_networks() -> impl Strategy<Value = Hidden<Delta>> {
+pub fn consistent_strict_networks() -> impl Strategy<Value = GeneratedNetwork<Delta>> {
     consistent(whole_numbers_and_halves().prop_map(Delta::from)).prop_flat_map(
         |(network, times)| {
             let count = network.constraints().len();
@@ -55,7 +55,7 @@ pub fn networks() -> impl Strategy<Value = Network> {
 /// Generates networks around times drawn from `times`; slacks are distances of two such times.
 fn consistent<W: Weight + 'static>(
     times: impl Strategy<Value = W>,
-) -> impl Strategy<Value = Hidden<W>> {
+) -> impl Strategy<Value = GeneratedNetwork<W>> {
     let times = prop::collection::vec(times, 2..14);
     let ends = (any::<Index>(), any::<Index>());
     let slack = (any::<Index>(), any::<Index>());

@@ -19,18 +19,18 @@
 //! controllable, a [`Conflict`] is the proof, and a [`Spoiler`] chooses durations that make every
 //! executor fail.
 
+mod adversary;
 mod conflict;
 mod dispatchable;
 mod dispatcher;
 mod dynamic;
 mod extended;
 mod graph;
+mod integer_network;
 mod order;
 mod recheck;
 mod refutation;
-mod spoiler;
 mod strong;
-mod whole;
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -39,15 +39,15 @@ use elbowroom_num::Rational;
 
 use crate::{Network, NodeId, Weight};
 
+pub use adversary::Adversary;
 pub use conflict::{Conflict, Ground, Step};
 pub use dispatchable::{Dispatchable, DispatchableEdge, Wait};
 pub use dispatcher::{Dispatcher, Missed};
 pub use extended::Extended;
+pub use integer_network::{IntegerNetwork, Unit};
 pub use recheck::Recheck;
-pub use refutation::{Part, Refutation, Refuted, Way};
-pub use spoiler::Spoiler;
+pub use refutation::{Part, Refutation, RefutationPath, Refuted};
 pub use strong::StrongConflict;
-pub use whole::{Unit, WholeNetwork};
 
 /// Contingent link `lower <= end - activation <= upper`; the world chooses the difference.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -168,7 +168,7 @@ impl<W: Weight> UncertainNetwork<W> {
             links,
             ending,
         };
-        match network.circle() {
+        match network.activation_cycle() {
             Some(link) => Err(BadLink::Circular(link)),
             None => Ok(network),
         }
@@ -205,7 +205,7 @@ impl<W: Weight> UncertainNetwork<W> {
     }
 
     /// Returns a link on a cycle of links, where the end of each link activates the next one.
-    fn circle(&self) -> Option<LinkId> {
+    fn activation_cycle(&self) -> Option<LinkId> {
         let mut is_known = BTreeSet::new();
         for first in self.link_ids() {
             let mut path = BTreeSet::new();

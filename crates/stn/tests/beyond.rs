@@ -54,7 +54,7 @@ impl Run {
     /// Returns `true` if the remaining network is dynamically controllable, by a check from
     /// scratch.
     fn is_sure(&self) -> bool {
-        let happened = |node: NodeId| self.dispatcher.happened(node).copied();
+        let happened = |node: NodeId| self.dispatcher.event_time(node).copied();
         let requirements = self.network.requirements();
         let mut rest = Network::with_nodes(requirements.node_count());
         for constraint in requirements.constraints() {
@@ -98,8 +98,8 @@ impl Run {
     fn active(&self) -> Vec<(LinkId, ContingentLink<i64>, i64)> {
         let links = self.network.link_ids().filter_map(|id| {
             let link = self.network.link(id);
-            let begun = *self.dispatcher.happened(link.activation)?;
-            let is_over = self.dispatcher.happened(link.end).is_some();
+            let begun = *self.dispatcher.event_time(link.activation)?;
+            let is_over = self.dispatcher.event_time(link.end).is_some();
             (!is_over).then(|| (id, link.clone(), begun))
         });
         links.collect()
@@ -128,13 +128,14 @@ impl Run {
                 return Some(());
             };
             let is_within = self.is_within(*id, link, *begun);
-            let missed = self.dispatcher.happen(link.end, &self.now).err();
+            let missed = self.dispatcher.record(link.end, &self.now).err();
             self.prolonged.remove(id);
             assert_eq!(missed.is_none(), is_within, "{told}: {missed:?}");
             let Some(missed) = missed else {
                 continue;
             };
-            let bears = missed.is_only_link && self.dispatcher.bears(link.end, &self.now);
+            let bears =
+                missed.is_only_link && self.dispatcher.stays_executable(link.end, &self.now);
             self.compare(bears, &mut counts.ended, &mut counts.late, told)?;
         }
     }
@@ -143,10 +144,10 @@ impl Run {
     fn furthest(&self, id: LinkId, most: i64, counts: &mut Counts, told: &str) {
         let does = |until: i64| {
             let mut other = self.dispatcher.clone();
-            other.prolong(id, Some(&until), &self.now)
+            other.extend_link(id, Some(&until), &self.now)
         };
         let last = (self.now..=most).rev().find(|until| does(*until));
-        let found = self.dispatcher.prolongable(id, &most, &self.now);
+        let found = self.dispatcher.extendable_until(id, &most, &self.now);
         assert_eq!(found, last, "{told}: until {most} at {}", self.now);
         counts.furthest[usize::from(found.is_some())] += 1;
         counts.shortened += usize::from(found.is_some_and(|found| found < most));
@@ -161,7 +162,7 @@ impl Run {
             }
             self.furthest(id, self.now + random.whole(0, 9), counts, told);
             let until = (random.below(2) == 0).then(|| self.now + random.whole(0, 4));
-            let does = self.dispatcher.prolong(id, until.as_ref(), &self.now);
+            let does = self.dispatcher.extend_link(id, until.as_ref(), &self.now);
             self.prolonged.insert(id, until);
             let others = self.active();
             let mut others = others.iter().filter(|(other, link, begun)| {
@@ -198,7 +199,7 @@ impl Run {
     fn go(&mut self, random: &mut Random, counts: &mut Counts, told: &str) -> Option<()> {
         let trouble = |missed| panic!("{told}: {missed:?}");
         self.dispatcher
-            .happen(NodeId(0), &0)
+            .record(NodeId(0), &0)
             .unwrap_or_else(trouble);
         while self.now < 200 {
             self.overdue(random, counts, told)?;
@@ -219,7 +220,7 @@ impl Run {
                 && (deadline.is_some_and(|deadline| deadline <= self.now) || random.below(3) == 0)
             {
                 self.dispatcher
-                    .happen(node, &self.now)
+                    .record(node, &self.now)
                     .unwrap_or_else(trouble);
                 continue;
             }
@@ -230,14 +231,15 @@ impl Run {
             self.now += 1;
         }
         for constraint in self.network.requirements().constraints() {
-            let times = [constraint.to, constraint.from].map(|node| self.dispatcher.happened(node));
+            let times =
+                [constraint.to, constraint.from].map(|node| self.dispatcher.event_time(node));
             if let [Some(to), Some(from)] = times {
                 assert!(to - from <= constraint.bound, "{told}");
             }
         }
         let mut nodes = self.network.requirements().nodes();
         assert!(
-            nodes.all(|node| self.dispatcher.happened(node).is_some()),
+            nodes.all(|node| self.dispatcher.event_time(node).is_some()),
             "{told}: not all has happened"
         );
         counts.finished += 1;
@@ -257,7 +259,7 @@ fn without_horizon(network: &UncertainNetwork<i64>) -> UncertainNetwork<i64> {
 }
 
 #[test]
-fn what_is_borne_is_known_from_the_neighbours() {
+fn executability_is_decided_by_neighbours() {
     let mut counts = Counts::default();
     for seed in 0..many(6_000) {
         let mut random = Random(seed);

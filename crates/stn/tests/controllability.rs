@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{
-    ContingentLink, Dispatchable, Dispatcher, Spoiler, UncertainNetwork,
+    Adversary, ContingentLink, Dispatchable, Dispatcher, UncertainNetwork,
 };
 use elbowroom_stn::{Constraint, Network, NodeId, Weight};
 use game::{Board, Random};
@@ -28,7 +28,7 @@ fn many(default: u64) -> u64 {
 }
 
 #[test]
-fn the_verdict_is_that_of_the_game() {
+fn verdict_equals_game_result() {
     let mut controllable = 0;
     let count = many(20_000);
     for seed in 0..count {
@@ -116,7 +116,7 @@ enum World {
     Early,
     Late,
     Corners,
-    Anyhow,
+    Arbitrary,
 }
 
 /// Executes a network, each point as early as possible (or at random later), and returns the times.
@@ -137,32 +137,32 @@ fn execute(
                 World::Early => link.lower,
                 World::Corners if random.below(2) == 0 => link.lower,
                 World::Late | World::Corners => upper,
-                World::Anyhow => random.whole(link.lower, upper),
+                World::Arbitrary => random.whole(link.lower, upper),
             }
         })
         .collect();
     let mut dispatcher = Dispatcher::new(Arc::clone(form));
     dispatcher
-        .happen(NodeId(0), &0)
+        .record(NodeId(0), &0)
         .map_err(|missed| format!("{missed:?}"))?;
     let mut now = 0;
     while (0..count).any(|node| {
         dispatcher
-            .happened(NodeId(u32::try_from(node).unwrap()))
+            .event_time(NodeId(u32::try_from(node).unwrap()))
             .is_none()
     }) {
         // Executes the world's events until now, which may cause further ones.
         let ends = |dispatcher: &Dispatcher<i64>| {
             let due = network.links().iter().zip(&durations);
-            due.filter(|(link, _)| dispatcher.happened(link.end).is_none())
+            due.filter(|(link, _)| dispatcher.event_time(link.end).is_none())
                 .filter_map(|(link, duration)| {
-                    Some((dispatcher.happened(link.activation)? + duration, link.end))
+                    Some((dispatcher.event_time(link.activation)? + duration, link.end))
                 })
                 .min()
         };
         while let Some((time, end)) = ends(&dispatcher).filter(|(time, _)| *time <= now) {
             dispatcher
-                .happen(end, &time)
+                .record(end, &time)
                 .map_err(|missed| format!("{missed:?}"))?;
         }
         let next_end = ends(&dispatcher).map(|(time, _)| time);
@@ -185,7 +185,7 @@ fn execute(
                 || random.below(3) == 0)
         {
             dispatcher
-                .happen(node, &now)
+                .record(node, &now)
                 .map_err(|missed| format!("{missed:?}"))?;
             continue;
         }
@@ -205,14 +205,14 @@ fn execute(
     }
     let times = (0..count).map(|node| {
         let node = NodeId(u32::try_from(node).unwrap());
-        let time = dispatcher.happened(node).copied();
+        let time = dispatcher.event_time(node).copied();
         time.ok_or_else(|| format!("{node} never happens"))
     });
     times.collect()
 }
 
 #[test]
-fn the_dispatcher_satisfies_every_requirement_whatever_the_world_does() {
+fn dispatcher_satisfies_requirements_in_any_world() {
     let mut runs = 0;
     for seed in 0..many(20_000) {
         let mut random = Random(seed);
@@ -230,8 +230,8 @@ fn the_dispatcher_satisfies_every_requirement_whatever_the_world_does() {
             World::Early,
             World::Late,
             World::Corners,
-            World::Anyhow,
-            World::Anyhow,
+            World::Arbitrary,
+            World::Arbitrary,
         ] {
             for lingers in [false, true] {
                 let told = || {
@@ -254,7 +254,7 @@ fn the_dispatcher_satisfies_every_requirement_whatever_the_world_does() {
 }
 
 #[test]
-fn a_link_without_an_upper_bound_is_one_with_a_very_large_one() {
+fn unbounded_link_equals_very_large_bound() {
     let mut controllable = [0; 2];
     for seed in 0..many(10_000) {
         let board = Board::random(&mut Random(seed));
@@ -304,7 +304,7 @@ fn rational(network: &UncertainNetwork<i64>) -> UncertainNetwork {
 
 /// Executes a network against the spoiler. Returns `true` if every requirement held in the end.
 fn survives(board: &Board, network: &UncertainNetwork, random: &mut Random) -> bool {
-    let spoiler = Spoiler::new(network.clone(), NodeId(0));
+    let spoiler = Adversary::new(network.clone(), NodeId(0));
     let mut happened: Vec<Option<Rational>> = vec![None; board.count];
     happened[0] = Some(Rational::ZERO);
     let eagerness = 1 + random.below(4);
@@ -342,7 +342,7 @@ fn survives(board: &Board, network: &UncertainNetwork, random: &mut Random) -> b
 }
 
 #[test]
-fn the_spoiler_beats_everybody_where_the_network_is_not_controllable() {
+fn adversary_wins_if_network_is_uncontrollable() {
     let mut games = 0;
     for seed in 0..many(3_000) {
         let mut random = Random(seed);

@@ -83,7 +83,7 @@ fn a_negative_loop_at_one_node_is_a_contradiction() {
 }
 
 #[test]
-fn of_equal_constraints_the_oldest_stays() {
+fn oldest_of_equal_constraints_is_kept() {
     let mut network = Network::with_nodes(2);
     for _ in 0..3 {
         network.add(Constraint::at_most(A, B, number(7)));

@@ -3,7 +3,7 @@
 use elbowroom_num::Rational;
 use elbowroom_stn::testing::consistent_networks;
 use elbowroom_stn::{
-    ConsistentNetwork, Constraint, ConstraintId, MovingWindows, Network, NodeId, WindowEnd,
+    ConsistentNetwork, Constraint, ConstraintId, IncrementalWindows, Network, NodeId, WindowEnd,
 };
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -26,7 +26,7 @@ fn limits() -> impl Strategy<Value = Vec<(Limit, Index, i64)>> {
 }
 
 /// Computes the result from scratch, with the limit as one or two constraints.
-fn plainly(
+fn expected_windows(
     network: &ConsistentNetwork,
     limit: Limit,
     node: NodeId,
@@ -56,7 +56,7 @@ proptest! {
         limits in limits(),
     ) {
         let mut plain = ConsistentNetwork::try_from(network).expect("consistent by construction");
-        let mut moving = MovingWindows::new(plain.clone(), NodeId(0));
+        let mut moving = IncrementalWindows::new(plain.clone(), NodeId(0));
         let count = plain.network().node_count();
         for (limit, node, time) in limits {
             let node = NodeId(u32::try_from(node.index(count)).expect("few nodes"));
@@ -66,10 +66,10 @@ proptest! {
                 Limit::NotBefore => moving.not_before(node, &time),
                 Limit::NotAfter => moving.not_after(node, &time),
             };
-            let tightened = plainly(&plain, limit, node, &time);
+            let tightened = expected_windows(&plain, limit, node, &time);
             prop_assert_eq!(answer.is_ok(), tightened.is_some(), "{:?}", answer);
             if let Err(out) = &answer {
-                prop_assert!(out.by.is_positive());
+                prop_assert!(out.amount.is_positive());
                 prop_assert_eq!(out.node, node);
             }
             plain = tightened.unwrap_or(plain);
@@ -96,7 +96,7 @@ proptest! {
         let origin = NodeId(0);
         let consistent = |network: &Network| ConsistentNetwork::try_from(network.clone());
         let mut plain = network.clone();
-        let mut moving = MovingWindows::new(consistent(&network).expect("consistent"), origin);
+        let mut moving = IncrementalWindows::new(consistent(&network).expect("consistent"), origin);
         let mut known = Vec::new();
         let ids: Vec<ConstraintId> = network.constraint_ids().collect();
         let mut lifted = Vec::new();
@@ -135,7 +135,7 @@ proptest! {
             }
             let mut rest = consistent(&plain.without(&lifted)).expect("still consistent");
             for (limit, node, time) in &known {
-                rest = plainly(&rest, *limit, *node, time).expect("it was before");
+                rest = expected_windows(&rest, *limit, *node, time).expect("it was before");
             }
             for (node, window) in rest.windows(origin).iter() {
                 prop_assert_eq!(moving.window(node), window, "{:?} in step {}", node, step);
@@ -147,7 +147,7 @@ proptest! {
 
 /// Checks that the bounds of the explanation's constraints add up from the root's own end to the
 /// node's.
-fn every_end_has_its_grounds(moving: &MovingWindows) -> Result<(), TestCaseError> {
+fn every_end_has_its_grounds(moving: &IncrementalWindows) -> Result<(), TestCaseError> {
     let bound = |id: &ConstraintId| moving.network().constraint(*id).bound.clone();
     for node in moving.network().nodes() {
         for end in [WindowEnd::Earliest, WindowEnd::Latest] {

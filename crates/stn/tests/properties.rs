@@ -34,12 +34,12 @@ proptest! {
     }
 
     #[test]
-    fn the_verdict_and_all_distances_are_those_of_bellman_and_ford(network in networks()) {
+    fn verdict_and_distances_equal_bellman_ford(network in networks()) {
         agrees_with_the_oracle(&network)?;
     }
 
     #[test]
-    fn components_say_where_constraints_lead(network in networks()) {
+    fn components_match_reachability(network in networks()) {
         let components = network.components();
         let leads = |from: NodeId, to: NodeId| {
             let mut seen = vec![false; network.node_count()];
@@ -99,7 +99,7 @@ proptest! {
     }
 
     #[test]
-    fn adding_one_by_one_refuses_exactly_what_contradicts(network in networks()) {
+    fn incremental_add_refuses_exactly_contradictions(network in networks()) {
         let mut grown = ConsistentNetwork::new();
         for _ in network.nodes() {
             grown.add_node();
@@ -127,13 +127,13 @@ proptest! {
     }
 
     #[test]
-    fn undoing_leads_back_to_the_network_as_it_was(
+    fn undo_restores_network(
         (base, _) in consistent_networks(),
         additions in networks(),
         extra_nodes in 0..3_usize,
     ) {
         let mut network = ConsistentNetwork::try_from(base.clone()).expect("consistent");
-        network.remember_times();
+        network.record_times();
         let times = network.schedule().clone();
         let before = network.checkpoint();
         for _ in 0..extra_nodes {
@@ -158,7 +158,7 @@ proptest! {
         let later = later.into_iter().map(|node| (node, &network.schedule()[node] + &Rational::ONE));
         let later: Vec<_> = later.collect();
         network.reschedule(later);
-        network.go_back_to(before);
+        network.restore(before);
         prop_assert_eq!(network.network(), &base);
         prop_assert_eq!(network.schedule(), &times);
         prop_assert!(network.schedule().holds_in(network.network()));
@@ -172,20 +172,20 @@ proptest! {
         keeps_some in any::<bool>(),
     ) {
         let keep = |id: ConstraintId| keeps_some && kept[id.index()];
-        thins_out_to_the_least(&network, keep)?;
+        check_implied_is_minimal(&network, keep)?;
     }
 
     #[test]
     fn implied_constraints_are_found_among_strict_ones_too(
         (network, _) in consistent_strict_networks(),
     ) {
-        thins_out_to_the_least(&network, |_| false)?;
+        check_implied_is_minimal(&network, |_| false)?;
     }
 
     #[test]
     fn implied_constraints_are_found_in_any_consistent_network(network in networks()) {
         if network.consistency().is_ok() {
-            thins_out_to_the_least(&network, |_| false)?;
+            check_implied_is_minimal(&network, |_| false)?;
         }
     }
 }
@@ -243,7 +243,7 @@ fn leads(
 
 /// Checks that the constraints of `implied` can be removed, and that of the others only those of
 /// `keep` could be removed as well.
-fn thins_out_to_the_least<W: Weight>(
+fn check_implied_is_minimal<W: Weight>(
     network: &Network<W>,
     keep: impl Fn(ConstraintId) -> bool,
 ) -> TestCaseResult {

@@ -55,7 +55,7 @@ fn change(network: UncertainNetwork<i64>, random: &mut Random, counts: &mut [usi
 }
 
 #[test]
-fn the_verdict_is_that_of_a_check_from_scratch() {
+fn recheck_equals_check_from_scratch() {
     let mut counts = [0; 2];
     for seed in 0..4_000 {
         let mut random = Random(seed);
@@ -71,7 +71,7 @@ fn the_verdict_is_that_of_a_check_from_scratch() {
 
 /// The same network in other units gives the same results, with and without whole numbers.
 #[test]
-fn whole_numbers_change_nothing() {
+fn integer_weights_give_same_result() {
     let mut controllable = 0;
     for seed in 0..2_000 {
         let network = rows(&mut Random(seed));

@@ -8,13 +8,15 @@
 
 mod game;
 
-use elbowroom_stn::uncertain::{ContingentLink, Part, Refutation, Refuted, UncertainNetwork, Way};
+use elbowroom_stn::uncertain::{
+    ContingentLink, Part, Refutation, RefutationPath, Refuted, UncertainNetwork,
+};
 use elbowroom_stn::{Constraint, Network, NodeId};
 use game::{Board, Random};
 
 /// Returns the length of a way with a network's bounds, and `true` if the way is valid with them:
 /// the part after a lower-case edge is negative.
-fn length(way: &Way, network: &UncertainNetwork<i64>) -> (i64, bool) {
+fn length(way: &RefutationPath, network: &UncertainNetwork<i64>) -> (i64, bool) {
     let mut length = 0;
     let mut is_legal = true;
     for part in way.parts.iter().rev() {
@@ -25,7 +27,7 @@ fn length(way: &Way, network: &UncertainNetwork<i64>) -> (i64, bool) {
                 network.link(*link).lower
             }
             Part::Late(link) => -network.link(*link).upper.unwrap(),
-            Part::Way(way) => {
+            Part::Path(way) => {
                 let (own, own_legal) = self::length(way, network);
                 is_legal &= own_legal;
                 own
@@ -62,7 +64,7 @@ fn changed(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNet
 }
 
 #[test]
-fn a_network_that_a_refutation_still_fits_is_not_controllable() {
+fn network_matching_refutation_is_uncontrollable() {
     let mut random = Random(7);
     let (mut refuted, mut further, mut fits, mut waits) = (0, 0, 0, 0);
     for _ in 0..20_000 {
@@ -72,17 +74,17 @@ fn a_network_that_a_refutation_still_fits_is_not_controllable() {
                 assert!(network.is_dynamically_controllable());
                 continue;
             }
-            Refuted::Because(refutations) => refutations,
+            Refuted::Refutations(refutations) => refutations,
             Refuted::TooLong => continue,
         };
         assert!(!network.is_dynamically_controllable());
-        let first = Refuted::Because(refutations[..1].to_vec());
+        let first = Refuted::Refutations(refutations[..1].to_vec());
         assert_eq!(network.refutations(1), first);
         refuted += 1;
         further += refutations.len() - 1;
         for refutation in &refutations {
             assert!(refutes(refutation, &network), "{network:?} {refutation:?}");
-            let is_wait = |part: &Part| matches!(part, Part::Way(way) if way.unlabelled.is_some());
+            let is_wait = |part: &Part| matches!(part, Part::Path(way) if way.unlabelled.is_some());
             waits += usize::from(
                 refutation
                     .cycle
@@ -110,7 +112,7 @@ fn a_network_that_a_refutation_still_fits_is_not_controllable() {
 /// Each link may take a little longer than the time until the next one's earliest start, so that
 /// the last one ends too late. The derivation is nested as deeply as there are links.
 #[test]
-fn a_conflict_along_many_windows_is_told_flat() {
+fn conflict_along_many_windows_is_flat() {
     let (period, more, room) = (10_000, 1, 2_000);
     let mut requirements = Network::with_nodes(6_001);
     let zero = NodeId(0);
@@ -131,7 +133,7 @@ fn a_conflict_along_many_windows_is_told_flat() {
         });
     }
     let network = UncertainNetwork::new(requirements, links).unwrap();
-    let Refuted::Because(refutations) = network.refutations(1) else {
+    let Refuted::Refutations(refutations) = network.refutations(1) else {
         panic!("one is not too long to be told");
     };
     let [refutation] = &refutations[..] else {

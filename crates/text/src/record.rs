@@ -97,7 +97,7 @@ mod tests {
     use crate::source::Source;
 
     #[test]
-    fn a_record_says_where_and_what_to_do() {
+    fn record_has_position_and_advice() {
         let source = Source::new("a.txt", "one\ntwö three\n");
         let mut found = Diagnostic::new(Severity::Warning, &source, 9..14, "odd");
         found.label("here").advise("write 3");

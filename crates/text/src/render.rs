@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn the_place_is_marked_in_its_line() {
+    fn label_marks_its_span() {
         insta::assert_snapshot!(shown("one\ntwo three\n", 8..13), @r"
 error: wrong
  --> f:2:5
@@ -111,7 +111,7 @@ error: wrong
     }
 
     #[test]
-    fn of_a_long_line_what_stands_around_the_place_is_shown() {
+    fn long_line_is_shortened_around_the_label() {
         let text = format!("a\n{}XYZ{}", "b".repeat(500), "c".repeat(500));
         insta::assert_snapshot!(shown(&text, 502..505), @r"
 error: wrong
@@ -126,7 +126,7 @@ error: wrong
 
     proptest! {
         #[test]
-        fn no_text_and_no_place_make_it_panic(
+        fn rendering_never_panics(
             text in "[a-c\u{e9}\u{1f600}\n\r\t]{0,30}",
             start in 0_usize..40,
             length in 0_usize..40,

@@ -8,22 +8,22 @@ use crate::suggest::nearest;
 #[derive(Debug)]
 pub struct Report {
     source: Source,
-    found: Vec<Diagnostic>,
+    findings: Vec<Diagnostic>,
     /// Replaces the findings beyond the limit.
-    surplus: Option<Diagnostic>,
+    overflow_notice: Option<Diagnostic>,
     is_failed: bool,
 }
 
 impl Report {
     /// Maximum number of findings that are kept.
-    pub const MOST: usize = 100;
+    pub const MAX_FINDINGS: usize = 100;
 
     /// Creates a report without findings.
     pub fn new(source: &Source) -> Self {
         Self {
             source: source.clone(),
-            found: Vec::new(),
-            surplus: None,
+            findings: Vec::new(),
+            overflow_notice: None,
             is_failed: false,
         }
     }
@@ -56,8 +56,8 @@ impl Report {
 
     /// Adds a warning, unless there is already one with this message.
     pub fn warn_once(&mut self, span: Span, message: &str) -> &mut Diagnostic {
-        match self.found.iter().position(|d| d.message == message) {
-            Some(position) => &mut self.found[position],
+        match self.findings.iter().position(|d| d.message == message) {
+            Some(position) => &mut self.findings[position],
             None => self.warning(span, message),
         }
     }
@@ -69,7 +69,7 @@ impl Report {
         name: &str,
         candidates: impl IntoIterator<Item = &'a str>,
     ) -> Option<&'a str> {
-        if self.found.len() < Self::MOST {
+        if self.findings.len() < Self::MAX_FINDINGS {
             nearest(name, candidates)
         } else {
             None
@@ -87,8 +87,9 @@ impl Report {
     /// Returns all findings, by position, if there was an error. A reader without a value must have
     /// reported an error.
     pub fn finish<T>(mut self, value: Option<T>) -> Result<(T, Vec<Diagnostic>), Diagnostics> {
-        self.found.sort_by_key(|found| found.labels[0].span.start);
-        Diagnostics::outcome(value, self.found)
+        self.findings
+            .sort_by_key(|found| found.labels[0].span.start);
+        Diagnostics::outcome(value, self.findings)
     }
 
     fn add(&mut self, severity: Severity, span: Span, message: String) -> &mut Diagnostic {
@@ -96,12 +97,12 @@ impl Report {
         // An error that is not kept must not turn the result into a success: the first error is
         // kept even if warnings have reached the limit.
         let is_error = |d: &Diagnostic| d.severity == Severity::Error;
-        let is_first_error = severity == Severity::Error && !self.found.iter().any(is_error);
-        if self.found.len() < Self::MOST || is_first_error {
-            self.found.push(diagnostic);
-            self.found.last_mut().expect("just pushed")
+        let is_first_error = severity == Severity::Error && !self.findings.iter().any(is_error);
+        if self.findings.len() < Self::MAX_FINDINGS || is_first_error {
+            self.findings.push(diagnostic);
+            self.findings.last_mut().expect("just pushed")
         } else {
-            self.surplus.insert(diagnostic)
+            self.overflow_notice.insert(diagnostic)
         }
     }
 }
@@ -123,12 +124,12 @@ mod tests {
     #[test]
     fn an_error_after_many_warnings_is_an_error() {
         let mut report = Report::new(&Source::from("abc"));
-        for _ in 0..2 * Report::MOST {
+        for _ in 0..2 * Report::MAX_FINDINGS {
             report.warning(0..1, "odd");
         }
         report.error(1..2, "wrong");
         let found = report.finish(Some(())).unwrap_err();
-        assert_eq!(found.iter().count(), Report::MOST + 1);
+        assert_eq!(found.iter().count(), Report::MAX_FINDINGS + 1);
         assert_eq!(found.errors().count(), 1);
     }
 

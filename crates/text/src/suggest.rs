@@ -56,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_suggested_for_an_unlike_name() {
+    fn unlike_name_has_no_suggestion() {
         assert_eq!(nearest("truck", ["waypoint", "rover"]), None);
         assert_eq!(nearest("", ["waypoint"]), None);
     }

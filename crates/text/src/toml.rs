@@ -36,7 +36,7 @@ pub fn diagnostic(source: &Source, error: &toml::de::Error) -> Diagnostic {
     } else if let Some(key) = quoted_after(&message, "missing field ") {
         (format!("`{key}` is missing"), format!("add `{key} = …`"))
     } else {
-        (in_words(&message), String::new())
+        (plain_message(&message), String::new())
     };
     let mut diagnostic = Diagnostic::new(Severity::Error, source, span, message);
     diagnostic.advise(advice);
@@ -64,7 +64,7 @@ fn quoted_after<'m>(message: &'m str, start: &str) -> Option<&'m str> {
 }
 
 /// Converts the message of the TOML reader, which mentions Rust types, to plain words.
-fn in_words(message: &str) -> String {
+fn plain_message(message: &str) -> String {
     const FOUND: [(&str, &str); 5] = [
         ("floating point `", "the number `"),
         ("integer `", "the number `"),
@@ -141,14 +141,14 @@ mod tests {
     }
 
     #[test]
-    fn a_misspelt_key_is_told_with_the_one_that_was_meant() {
+    fn misspelt_key_suggests_known_key() {
         insta::assert_snapshot!(wrong("seed = 1\nactoin = \"a\""), @"f:2:1: error: unknown key `actoin`; did you mean `action`?");
         insta::assert_snapshot!(wrong("seed = 1\nwhatever = 3"), @"f:2:1: error: unknown key `whatever`; known here: seed, action, share, names, is_new, colour");
         insta::assert_snapshot!(wrong("seed = 1\ncolour = \"gren\""), @"f:2:10: error: unknown value `gren`; did you mean `green`?");
     }
 
     #[test]
-    fn no_type_of_rust_is_named() {
+    fn message_names_no_rust_type() {
         insta::assert_snapshot!(wrong("seed = \"one\""), @r#"f:1:8: error: found the text "one", expected a whole number that is not negative"#);
         insta::assert_snapshot!(wrong("seed = 1.5"), @"f:1:8: error: found the number `1.5`, expected a whole number that is not negative");
         insta::assert_snapshot!(wrong("seed = 1\nshare = \"half\""), @r#"f:2:9: error: found the text "half", expected a number"#);

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 
 use elbowroom_model::ground::FluentId;
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_num::{Rational, chance};
+use elbowroom_num::{Rational, log_concave};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 
 use crate::certificate::{Certificate, Chance, End as Side, Guarantee, Parameter, Reasons};
-use crate::check::{Inside, Verified, verify};
-use crate::derive::{self, NotDerived, Plan, Quantity, Told};
+use crate::check::{InsideCheck, Verified, verify};
+use crate::derive::{self, LabelText, NotDerived, Plan, Quantity};
 use crate::flaw::Flaw;
 use crate::given::GivenPlan;
 use crate::sound::Endless;
@@ -81,8 +81,8 @@ struct Answer {
     domain: Option<String>,
     problem: Option<String>,
     settings: Settings,
-    parameters: Vec<Room>,
-    best: Best,
+    parameters: Vec<ParameterRange>,
+    best: Optimum,
 }
 
 #[derive(Deserialize)]
@@ -97,7 +97,7 @@ struct Settings {
 }
 
 #[derive(Deserialize)]
-struct Room {
+struct ParameterRange {
     name: String,
     quantity: Option<String>,
     kind: Option<String>,
@@ -108,9 +108,9 @@ struct Room {
     upper: End,
 }
 
-impl Room {
-    fn told(&self) -> Told<'_> {
-        Told {
+impl ParameterRange {
+    fn label_text(&self) -> LabelText<'_> {
+        LabelText {
             name: &self.name,
             kind: self.kind.as_deref(),
             action: self.action.as_deref(),
@@ -120,7 +120,7 @@ impl Room {
 }
 
 #[derive(Deserialize)]
-struct Best {
+struct Optimum {
     objective: Objective,
     symmetric: bool,
     most: Number,
@@ -227,7 +227,8 @@ pub fn verify_answer_of_network(
 /// Distribution of the duration of an action in a world, from the action's name and its planned
 /// duration; `None` if it is always the planned one. The error is the reason why a world's
 /// distribution cannot be compared.
-pub type Distributions<'a> = &'a dyn Fn(&str, &Rational) -> Result<Option<chance::Chance>, String>;
+pub type Distributions<'a> =
+    &'a dyn Fn(&str, &Rational) -> Result<Option<log_concave::LogConcaveDistribution>, String>;
 
 /// Checks as [`verify_answer_of`] does. For a box of the objective `probability` it also checks that the
 /// parameters are distributed as in a world; without one, this is the only assumption of the verdict.
@@ -277,9 +278,9 @@ pub fn verify_answer_in_world(
     let mut earlier = Vec::new();
     for (index, room) in answer.parameters.iter().enumerate() {
         let label = derived.labels.get(&index);
-        let label = label.ok_or(Flaw::NoSuch("parameter", index))?;
+        let label = label.ok_or(Flaw::UnknownReference("parameter", index))?;
         let what = format!("{} has another meaning", room.name);
-        same(label.is_told(&room.told(), &earlier), &what)?;
+        same(label.is_denoted_by(&room.label_text(), &earlier), &what)?;
         earlier.push(room.name.as_str());
     }
     verified.assumes.clear();
@@ -291,7 +292,7 @@ pub fn verify_answer_in_world(
     }
     verified.proves = claim::proves_all(certificate);
     verified.from_conditions = std::mem::take(&mut verified.assumed);
-    verified.inside = Some(Inside {
+    verified.inside = Some(InsideCheck {
         is_controllable: true,
         conditions: Some(derived.conditions),
         assumed: 0,
@@ -365,11 +366,11 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
     let any: AnyAnswer = serde_json::from_str(text)?;
     any.best.ok_or(AnswerError::NoBox)?;
     let answer: Answer = serde_json::from_str(text)?;
-    same(
+    check_equal(
         whole.get("version") == Some(&Value::from(1)),
         "the version, which is 1,",
     )?;
-    same(are_decimals_right(&whole), "a decimal and its exact number")?;
+    check_equal(are_decimals_right(&whole), "a decimal and its exact number")?;
     let best = &answer.best;
     let certificate = best.certificate.as_ref();
     let certificate = certificate.ok_or(AnswerError::NoCertificate)?;
@@ -380,26 +381,26 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
         Reasons::Volume { .. } => Objective::Volume,
         Reasons::Probability(_) => Objective::Probability,
     };
-    same(best.objective == objective, "the objective")?;
-    same(best.most.exact == certificate.counted, "how far ends count")?;
-    same(best.symmetric == certificate.symmetric, "`symmetric`")?;
-    same(
+    check_equal(best.objective == objective, "the objective")?;
+    check_equal(best.most.exact == certificate.counted, "how far ends count")?;
+    check_equal(best.symmetric == certificate.symmetric, "`symmetric`")?;
+    check_equal(
         answer.settings.guarantee == certificate.guarantee,
         "the guarantee",
     )?;
-    same(best.value.exact == verified.value, "the value")?;
-    same(best.bound.exact == verified.bound, "the bound")?;
-    same(
+    check_equal(best.value.exact == verified.value, "the value")?;
+    check_equal(best.bound.exact == verified.bound, "the bound")?;
+    check_equal(
         best.proved == (verified.bound <= &verified.value + &verified.tolerance),
         "whether the box is proved to be the best",
     )?;
-    same(
+    check_equal(
         answer.parameters.len() == certificate.parameters.len(),
         "the number of parameters",
     )?;
     let chances = certificate.parameters.iter().map(|own| &own.chance);
     let is_told = best.chances.iter().eq(chances.clone());
-    same(
+    check_equal(
         is_told || (best.chances.is_empty() && chances.flatten().next().is_none()),
         "the distributions",
     )?;
@@ -407,8 +408,8 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
     for (index, (room, own)) in parameters.enumerate() {
         check_interval(&answer, certificate, (index, room, own))?;
     }
-    same(
-        is_likely_so(&answer, certificate, &verified.bound),
+    check_equal(
+        is_probability_consistent(&answer, certificate, &verified.bound),
         "the probability",
     )?;
     Ok(verified)
@@ -417,7 +418,7 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
 /// Returns `true` if the answer's probability matches the enclosure that the certificate's
 /// distributions give for its box, with the certificate's intervals. An answer for another
 /// objective must not have a probability.
-fn is_likely_so(answer: &Answer, certificate: &Certificate, bound: &Rational) -> bool {
+fn is_probability_consistent(answer: &Answer, certificate: &Certificate, bound: &Rational) -> bool {
     let Some(told) = &answer.best.probability else {
         return answer.best.objective != Objective::Probability;
     };
@@ -432,18 +433,18 @@ fn is_likely_so(answer: &Answer, certificate: &Certificate, bound: &Rational) ->
 fn check_interval(
     answer: &Answer,
     certificate: &Certificate,
-    (index, room, own): (usize, &Room, &Parameter),
+    (index, room, own): (usize, &ParameterRange, &Parameter),
 ) -> Result<(), Flaw> {
-    same(
+    check_equal(
         room.name == own.name && room.nominal.exact == own.nominal,
         &format!("parameter {index}"),
     )?;
-    same(
+    check_equal(
         room.weight.exact == own.weight,
         &format!("the weight of {}", own.name),
     )?;
     let size = own.nominal.abs();
-    same(
+    check_equal(
         size.is_zero() || own.scale == size,
         &format!("the scale of {}", own.name),
     )?;
@@ -484,7 +485,7 @@ fn check_interval(
             }
             Some(_) => is_that,
         };
-        same(
+        check_equal(
             is_end && most.as_ref().is_none_or(|most| most.0 <= counted),
             &format!("the interval of {}", own.name),
         )?;
@@ -493,7 +494,7 @@ fn check_interval(
 }
 
 /// Returns an error that names `what`, unless answer and certificate agree on it.
-fn same(is_same: bool, what: &str) -> Result<(), Flaw> {
+fn check_equal(is_same: bool, what: &str) -> Result<(), Flaw> {
     let differs = || Flaw::Differs(what.to_owned());
     is_same.then_some(()).ok_or_else(differs)
 }

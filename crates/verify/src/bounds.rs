@@ -7,14 +7,14 @@ use elbowroom_num::Rational;
 /// `constant + Σ factor · end`. The ends are numbered: the lower end of parameter `p` is `2p`, the
 /// upper end is `2p + 1`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Ends {
+pub struct EndExpression {
     /// Constant term.
     pub constant: Rational,
     /// Factor of each end; none is zero.
     pub factors: BTreeMap<usize, Rational>,
 }
 
-impl Ends {
+impl EndExpression {
     /// Returns a constant sum.
     pub fn number(constant: Rational) -> Self {
         Self {
@@ -49,7 +49,7 @@ impl Ends {
     }
 
     /// Returns `true` if some parameter occurs with both of its ends.
-    pub fn tears(&self) -> bool {
+    pub fn has_both_ends(&self) -> bool {
         let ends: Vec<usize> = self.factors.keys().copied().collect();
         ends.windows(2).any(|pair| pair[0] / 2 == pair[1] / 2)
     }

@@ -121,7 +121,7 @@ pub enum Proof {
     /// A semi-reducible cycle, for an executor that observes the values during execution.
     Semireducible {
         /// All ways of the cycle. The parts of each refer only to earlier ways.
-        ways: Vec<Way>,
+        ways: Vec<Path>,
         /// The cycle, as positions of ways. Each way begins where the previous one ends.
         cycle: Vec<usize>,
     },
@@ -172,7 +172,7 @@ pub enum End {
 /// Parts that follow each other, as one bound.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Way {
+pub struct Path {
     /// The parts. Each begins where the previous one ends.
     pub parts: Vec<Part>,
     /// Position of the constraint whose duration ends the way at its latest time. The way counts

@@ -1,6 +1,6 @@
 //! Distributions in certificates, and points of contact of bounds on probabilities.
 
-use elbowroom_num::{Rational, chance};
+use elbowroom_num::{Rational, log_concave};
 use serde::{Deserialize, Serialize};
 
 use crate::number::Exact;
@@ -84,33 +84,33 @@ pub enum Touch {
 
 impl Chance {
     /// Converts the distribution to a form for exact computation. Returns `None` if it is invalid.
-    pub(crate) fn reckoned(&self) -> Option<chance::Chance> {
+    pub(crate) fn to_exact(&self) -> Option<log_concave::LogConcaveDistribution> {
         let Some(shape) = &self.density else {
             let values = self.values.iter().map(|own| own.0.clone());
             let alone =
                 self.minimum.is_none() && self.maximum.is_none() && self.resolution.is_none();
-            return chance::Chance::values(values.collect()).filter(|_| alone);
+            return log_concave::LogConcaveDistribution::values(values.collect()).filter(|_| alone);
         };
         let number = |own: &Exact| own.0.clone();
         let density = match shape {
-            Shape::Uniform { from, to } => chance::Density::Uniform {
+            Shape::Uniform { from, to } => log_concave::Density::Uniform {
                 from: number(from),
                 to: number(to),
             },
-            Shape::Triangular { from, mode, to } => chance::Density::Triangular {
+            Shape::Triangular { from, mode, to } => log_concave::Density::Triangular {
                 from: number(from),
                 mode: number(mode),
                 to: number(to),
             },
-            Shape::Normal { mean, deviation } => chance::Density::Normal {
+            Shape::Normal { mean, deviation } => log_concave::Density::Normal {
                 mean: number(mean),
                 deviation: number(deviation),
             },
-            Shape::Exponential { from, mean } => chance::Density::Exponential {
+            Shape::Exponential { from, mean } => log_concave::Density::Exponential {
                 from: number(from),
                 mean: number(mean),
             },
-            Shape::Lognormal { location, spread } => chance::Density::Lognormal {
+            Shape::Lognormal { location, spread } => log_concave::Density::Lognormal {
                 location: number(location),
                 spread: number(spread),
             },
@@ -121,38 +121,38 @@ impl Chance {
         }
         let cuts = [&self.minimum, &self.maximum].map(|cut| cut.as_ref().map(number));
         let [minimum, maximum] = cuts;
-        chance::Chance::dense(density, minimum, maximum, &resolution.0)
+        log_concave::LogConcaveDistribution::dense(density, minimum, maximum, &resolution.0)
     }
 }
 
-impl From<&chance::Chance> for Chance {
-    fn from(own: &chance::Chance) -> Self {
+impl From<&log_concave::LogConcaveDistribution> for Chance {
+    fn from(own: &log_concave::LogConcaveDistribution) -> Self {
         let exact = |number: &Rational| Exact(number.clone());
         match own {
-            chance::Chance::Values(values) => Self {
+            log_concave::LogConcaveDistribution::Values(values) => Self {
                 values: values.iter().map(exact).collect(),
                 ..Self::default()
             },
-            chance::Chance::Dense(dense) => Self {
+            log_concave::LogConcaveDistribution::Dense(dense) => Self {
                 density: Some(match &dense.density {
-                    chance::Density::Uniform { from, to } => Shape::Uniform {
+                    log_concave::Density::Uniform { from, to } => Shape::Uniform {
                         from: exact(from),
                         to: exact(to),
                     },
-                    chance::Density::Triangular { from, mode, to } => Shape::Triangular {
+                    log_concave::Density::Triangular { from, mode, to } => Shape::Triangular {
                         from: exact(from),
                         mode: exact(mode),
                         to: exact(to),
                     },
-                    chance::Density::Normal { mean, deviation } => Shape::Normal {
+                    log_concave::Density::Normal { mean, deviation } => Shape::Normal {
                         mean: exact(mean),
                         deviation: exact(deviation),
                     },
-                    chance::Density::Exponential { from, mean } => Shape::Exponential {
+                    log_concave::Density::Exponential { from, mean } => Shape::Exponential {
                         from: exact(from),
                         mean: exact(mean),
                     },
-                    chance::Density::Lognormal { location, spread } => Shape::Lognormal {
+                    log_concave::Density::Lognormal { location, spread } => Shape::Lognormal {
                         location: exact(location),
                         spread: exact(spread),
                     },
@@ -166,14 +166,14 @@ impl From<&chance::Chance> for Chance {
     }
 }
 
-impl From<&chance::Touch> for Touch {
-    fn from(own: &chance::Touch) -> Self {
+impl From<&log_concave::TangentPoint> for Touch {
+    fn from(own: &log_concave::TangentPoint) -> Self {
         match own {
-            chance::Touch::At([below, above]) => {
+            log_concave::TangentPoint::At([below, above]) => {
                 Self::At([Exact(below.clone()), Exact(above.clone())])
             }
-            chance::Touch::Mass(mass) => Self::Mass(Exact(mass.clone())),
-            chance::Touch::Nowhere => Self::Nowhere,
+            log_concave::TangentPoint::Mass(mass) => Self::Mass(Exact(mass.clone())),
+            log_concave::TangentPoint::NoContact => Self::Nowhere,
         }
     }
 }

@@ -2,13 +2,13 @@
 
 mod cases;
 
-use elbowroom_num::{Rational, enclosed};
+use elbowroom_num::{Rational, enclosures};
 
-use crate::bounds::Ends;
+use crate::bounds::EndExpression;
 use crate::certificate::{Case, Certificate, Exact, Parameter, Proof, Reasons, Source, Stopped};
 use crate::flaw::Flaw;
 use crate::intervals::Intervals;
-use crate::probability::{Chances, NEVER};
+use crate::probability::{NEVER, VariableDistributions};
 use crate::sound::{Control, Sound};
 use crate::{claim, conditions, control, network, row, volume};
 
@@ -31,7 +31,7 @@ pub struct Verified {
     /// Number of inequalities proved from conditions on numbers, derived from problem and plan.
     pub from_conditions: usize,
     /// Result of the check that the box is inside the envelope; `None` if this is assumed.
-    pub inside: Option<Inside>,
+    pub inside: Option<InsideCheck>,
     /// Claim of the certificate, in words.
     pub proves: String,
     /// Assumptions, in words.
@@ -40,7 +40,7 @@ pub struct Verified {
 
 /// Result of the check that the box is inside the envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Inside {
+pub struct InsideCheck {
     /// `true` if it is proved that all points can be scheduled as the guarantee requires; assumed
     /// otherwise.
     pub is_controllable: bool,
@@ -50,7 +50,7 @@ pub struct Inside {
     pub assumed: usize,
 }
 
-impl Inside {
+impl InsideCheck {
     /// Returns `true` if nothing is assumed.
     pub fn is_proved(&self) -> bool {
         self.is_controllable && self.conditions.is_some() && self.assumed == 0
@@ -76,7 +76,7 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
     let checker = Checker::new(certificate)?;
     let inside = certificate.sound.as_ref();
     let inside = inside
-        .map(|sound| inside_of(certificate, sound))
+        .map(|sound| check_inside(certificate, sound))
         .transpose()?;
     let bound = match &certificate.reasons {
         Reasons::LeastSlack(stopped) => checker.least_slack(stopped)?,
@@ -86,9 +86,9 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
     };
     let value = match &certificate.reasons {
         Reasons::LeastSlack(_) => bound.clone(),
-        Reasons::Widths(_) => checker.worth(),
+        Reasons::Widths(_) => checker.weighted_width_sum(),
         Reasons::Volume { foot, .. } => {
-            let worth = volume::worth(foot, checker.widths_of_parameters());
+            let worth = volume::objective_value(foot, checker.widths_of_parameters());
             worth.ok_or(Flaw::Range("the volume of box", 0))?
         }
         Reasons::Probability(_) => {
@@ -96,7 +96,7 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
             if bound <= Rational::from(NEVER) {
                 return Err(Flaw::Range("the probability of box", 0));
             }
-            checker.chances.worth(&checker.slacks)
+            checker.chances.log_probability(&checker.slacks)
         }
     };
     let tolerance = match &certificate.reasons {
@@ -118,7 +118,7 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
 }
 
 /// Returns the proof without the parts that fail the check. These parts become assumptions.
-fn proved(certificate: &Certificate, sound: &Sound) -> Result<Sound, Flaw> {
+fn assume_failed_parts(certificate: &Certificate, sound: &Sound) -> Result<Sound, Flaw> {
     let mut proved = sound.clone();
     let intervals = Intervals::new(certificate, &sound.endless)?;
     if control::check(certificate, &intervals, &sound.control).is_err() {
@@ -133,7 +133,7 @@ fn proved(certificate: &Certificate, sound: &Sound) -> Result<Sound, Flaw> {
 }
 
 /// Checks the proof that the box is inside the envelope. Assumed parts are skipped.
-fn inside_of(certificate: &Certificate, sound: &Sound) -> Result<Inside, Flaw> {
+fn check_inside(certificate: &Certificate, sound: &Sound) -> Result<InsideCheck, Flaw> {
     let intervals = Intervals::new(certificate, &sound.endless)?;
     control::check(certificate, &intervals, &sound.control)?;
     let conditions = sound.conditions.as_deref().unwrap_or_default();
@@ -145,7 +145,7 @@ fn inside_of(certificate: &Certificate, sound: &Sound) -> Result<Inside, Flaw> {
             conditions::check(certificate, &intervals, (index, condition))?;
         }
     }
-    Ok(Inside {
+    Ok(InsideCheck {
         is_controllable: sound.control != Control::Assumed,
         conditions: sound.conditions.as_ref().map(Vec::len),
         assumed,
@@ -159,7 +159,7 @@ fn inside_of(certificate: &Certificate, sound: &Sound) -> Result<Inside, Flaw> {
 ///
 /// # Errors
 /// A sum cannot be computed. The result may still prove nothing.
-pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
+pub fn with_sums(mut certificate: Certificate) -> Result<Certificate, Flaw> {
     let checker = Checker::new(&certificate)?;
     let mut reasons = certificate.reasons.clone();
     let is_likely = matches!(reasons, Reasons::Probability(_));
@@ -196,7 +196,7 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
     certificate.sound = certificate
         .sound
         .as_ref()
-        .map(|own| proved(&certificate, own))
+        .map(|own| assume_failed_parts(&certificate, own))
         .transpose()?;
     certificate.proves = claim::proves(&certificate);
     certificate.assumes = claim::assumes(&certificate);
@@ -206,7 +206,7 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
 struct Checker<'a> {
     certificate: &'a Certificate,
     /// Distributions of the parameters.
-    chances: Chances,
+    chances: VariableDistributions,
     /// For each proof its inequalities, at least one of them true.
     rows: Vec<Vec<Inequality>>,
     /// For each variable: slack, scale, upper limit of the slack, and weight in the sum of widths.
@@ -257,7 +257,7 @@ impl<'a> Checker<'a> {
         }
         let mut checker = Self {
             certificate,
-            chances: Chances::new(certificate)?,
+            chances: VariableDistributions::new(certificate)?,
             rows: Vec::new(),
             slacks,
             scales,
@@ -275,12 +275,12 @@ impl<'a> Checker<'a> {
     }
 
     /// Expresses in the variables that a sum of bounds is not negative.
-    fn inequality(&self, sum: &Ends) -> Result<Inequality, Flaw> {
+    fn inequality(&self, sum: &EndExpression) -> Result<Inequality, Flaw> {
         let mut factors = vec![Rational::ZERO; self.slacks.len()];
         let mut bound = sum.constant.clone();
         for (&end, factor) in &sum.factors {
             let parameter = self.certificate.parameters.get(end / 2);
-            let parameter = parameter.ok_or(Flaw::NoSuch("parameter", end / 2))?;
+            let parameter = parameter.ok_or(Flaw::UnknownReference("parameter", end / 2))?;
             bound += &parameter.nominal * factor;
             let variable = if self.certificate.symmetric {
                 end / 2
@@ -299,7 +299,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Returns the weighted sum of widths.
-    fn worth(&self) -> Rational {
+    fn weighted_width_sum(&self) -> Rational {
         let terms = self.worths.iter().zip(&self.slacks).map(|(w, s)| w * s);
         terms.sum()
     }
@@ -320,7 +320,7 @@ impl<'a> Checker<'a> {
             } = one;
             let variable = *variable;
             match is_stopped.get_mut(variable) {
-                None => return Err(Flaw::NoSuch("variable", variable)),
+                None => return Err(Flaw::UnknownReference("variable", variable)),
                 Some(true) => return Err(Flaw::Stopped(variable)),
                 Some(is_stopped) => *is_stopped = true,
             }
@@ -346,15 +346,15 @@ impl<'a> Checker<'a> {
         }
         let mut least: Option<Rational> = None;
         for variable in 0..self.slacks.len() {
-            let slack = self.relative(variable)?;
+            let slack = self.relative_slack(variable)?;
             least = Some(least.map_or(slack.clone(), |least| least.min(slack)));
         }
         Ok(least.unwrap_or_default())
     }
 
     /// Returns the slack of a variable in relation to its scale.
-    fn relative(&self, variable: usize) -> Result<Rational, Flaw> {
-        let no_such = Flaw::NoSuch("variable", variable);
+    fn relative_slack(&self, variable: usize) -> Result<Rational, Flaw> {
+        let no_such = Flaw::UnknownReference("variable", variable);
         let slack = self.slacks.get(variable).ok_or(no_such)?;
         let slack = slack.checked_div(&self.scales[variable]);
         slack.ok_or(Flaw::Range("the scale of variable", variable))
@@ -363,8 +363,11 @@ impl<'a> Checker<'a> {
     /// Returns by how much each inequality of a proof is violated when no variable has more slack,
     /// in relation to its scale, than this one.
     fn over(&self, variable: usize, proof: usize) -> Result<Vec<Rational>, Flaw> {
-        let rows = self.rows.get(proof).ok_or(Flaw::NoSuch("proof", proof))?;
-        let level = self.relative(variable)?;
+        let rows = self
+            .rows
+            .get(proof)
+            .ok_or(Flaw::UnknownReference("proof", proof))?;
+        let level = self.relative_slack(variable)?;
         let over = rows.iter().map(|row| {
             let mut sum = -&row.bound;
             for (other, factor) in row.factors.iter().enumerate() {
@@ -427,7 +430,7 @@ impl<'a> Checker<'a> {
         self.cases(cases, &|total, factors, spans| {
             let bound = self.chances.bound(total, factors, spans)?;
             let is_told = total.most.as_ref().is_some_and(|most| most.0 == bound);
-            is_told.then(|| enclosed::billionths_above(&bound))
+            is_told.then(|| enclosures::ceil_to_billionth(&bound))
         })
     }
 }

@@ -12,10 +12,12 @@ use elbowroom_num::Rational;
 use crate::certificate::{Certificate, Constraint, Limit};
 use crate::flaw::Flaw;
 use crate::intervals::Intervals;
-use crate::sound::{Condition, Difference, Failing, Ground, Inequality, Multiplied, Summand, Way};
+use crate::sound::{
+    Condition, Difference, FailureCase, Ground, Inequality, Multiplied, Summand, Violation,
+};
 
 /// Largest number of parameters of one violation whose ends are combined.
-const MOST_CORNERS: usize = 8;
+const MAX_CORNERS: usize = 8;
 
 /// Checks the proof that the condition at this position cannot fail.
 ///
@@ -78,7 +80,7 @@ impl Checker<'_> {
                 return Err(self.flaw());
             }
             match case {
-                Failing::Either { event, cases } => {
+                FailureCase::Either { event, cases } => {
                     let moment = self.certificate.points.len();
                     if condition.during.is_none() || *event >= moment {
                         return Err(self.flaw());
@@ -93,10 +95,12 @@ impl Checker<'_> {
                         open.push((*case, differences));
                     }
                 }
-                Failing::Never(sum) => self.refutes(sum, (&differences, &[]), self.intervals)?,
-                Failing::Ways(ways) => {
+                FailureCase::Never(sum) => {
+                    self.check_contradiction(sum, (&differences, &[]), self.intervals)?;
+                }
+                FailureCase::Ways(ways) => {
                     for way in ways {
-                        self.way(way, &differences)?;
+                        self.check_violation(way, &differences)?;
                     }
                 }
             }
@@ -106,14 +110,14 @@ impl Checker<'_> {
     }
 
     /// Checks that a violation is not possible.
-    fn way(&self, way: &Way, known: &[Difference]) -> Result<(), Flaw> {
+    fn check_violation(&self, way: &Violation, known: &[Difference]) -> Result<(), Flaw> {
         let mut differences = known.to_vec();
         differences.extend(way.differences.iter().cloned());
         let count = way.corners.len();
-        if count > MOST_CORNERS || way.sums.len() != 1 << count {
+        if count > MAX_CORNERS || way.sums.len() != 1 << count {
             return Err(self.flaw());
         }
-        self.decides(way)?;
+        self.check_corners_suffice(way)?;
         for (corner, sum) in way.sums.iter().enumerate() {
             let mut intervals = self.intervals.clone();
             for (place, &parameter) in way.corners.iter().rev().enumerate() {
@@ -121,7 +125,7 @@ impl Checker<'_> {
                 let narrowed = intervals.at_end(parameter, is_upper);
                 intervals = narrowed.ok_or_else(|| self.flaw())?;
             }
-            self.refutes(sum, (&differences, &way.inequalities), &intervals)?;
+            self.check_contradiction(sum, (&differences, &way.inequalities), &intervals)?;
         }
         Ok(())
     }
@@ -130,7 +134,7 @@ impl Checker<'_> {
     /// the sums use contains a multiplied parameter, the network contains none, and none is squared
     /// unless its minimum is at an end. For fixed times and other values, the inequality is then
     /// easiest to satisfy with the parameter at one of its ends.
-    fn decides(&self, way: &Way) -> Result<(), Flaw> {
+    fn check_corners_suffice(&self, way: &Violation) -> Result<(), Flaw> {
         let is_corner = |parameter: usize| way.corners.contains(&parameter);
         let in_network = self.certificate.constraints.iter().any(|own| {
             [&own.lower, &own.upper]
@@ -175,7 +179,7 @@ impl Checker<'_> {
     }
 
     /// Checks that a sum contradicts the differences and inequalities.
-    fn refutes(
+    fn check_contradiction(
         &self,
         sum: &[Summand],
         (differences, inequalities): (&[Difference], &[Inequality]),

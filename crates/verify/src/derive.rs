@@ -40,7 +40,6 @@
 //! Plans that need more are [not derivable](NotDerived::Unknown). Examples are conditions on numbers that are not
 //! linear in times and parameters. Where nothing reads such a number, its value does not matter.
 
-mod course;
 mod decisions;
 mod distances;
 mod failures;
@@ -50,9 +49,10 @@ mod labels;
 mod linear;
 mod needed;
 mod numbers;
-mod places;
-mod reading;
+mod offset_components;
+mod point_state;
 mod subject;
+mod trajectory;
 mod valid;
 
 use std::collections::BTreeMap;
@@ -66,16 +66,16 @@ use crate::flaw::Flaw;
 use crate::given::GivenPlan;
 use crate::intervals::Intervals;
 use crate::sound::Control;
-use course::Course;
 use distances::Distances;
 use failures::Failure;
 use given::Given;
 use histories::Histories;
-pub(crate) use labels::{Label, Told};
+pub(crate) use labels::{Label, LabelText};
 use linear::Linear;
 use numbers::Numbers;
-use places::Places;
+use offset_components::OffsetComponents;
 use subject::Subject;
+use trajectory::TrajectoryDerivation;
 
 /// Reason for a certificate that cannot be shown to be about a plan.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -149,8 +149,8 @@ pub(crate) fn check(
         let what = format!("the plan is not valid at {times}: {violation}");
         return Err(NotDerived::Unknown(what));
     }
-    let course = Course::new(&subject)?;
-    let places = Places::new(certificate);
+    let course = TrajectoryDerivation::new(&subject)?;
+    let places = OffsetComponents::new(certificate);
     // Times are not negative. Other parameters occur in the network only as bounds.
     let is_bound = |parameter: usize| {
         let kind = given.as_ref().and_then(|given| given.kind(parameter));
@@ -191,7 +191,7 @@ pub(crate) fn check(
         if !numbers.refutes(&failure)? {
             let what = format!(
                 "in some schedules of the network, {} may fail",
-                failure.what
+                failure.description
             );
             return Err(NotDerived::Unknown(what));
         }
@@ -255,7 +255,7 @@ fn assumed(
             let own: Vec<Vec<Linear>> = own.collect::<Result<_, Flaw>>()?;
             rows = Some(own.concat());
         }
-        if !numbers::follows(rows.as_deref().unwrap_or_default(), sums) {
+        if !numbers::is_implied(rows.as_deref().unwrap_or_default(), sums) {
             let what = format!("an inequality that the certificate only states ({why})");
             return Err(NotDerived::Unknown(what));
         }

@@ -6,7 +6,7 @@
 pub enum Flaw {
     /// A reference to something that does not exist.
     #[error("there is no {0} {1}")]
-    NoSuch(&'static str, usize),
+    UnknownReference(&'static str, usize),
     /// A list has the wrong length.
     #[error("there are {found} {what}, but {wanted} are needed")]
     Count {
@@ -44,7 +44,7 @@ pub enum Flaw {
     Empty,
     /// The parts of a proof do not form a cycle.
     #[error("the parts of a proof do not follow each other in a circle")]
-    Broken,
+    NoCycle,
     /// A rule does not apply where it is used.
     #[error("a proof uses a rule where it does not apply")]
     Rule,
@@ -79,7 +79,7 @@ pub enum Flaw {
     Negative(usize),
     /// A case uses an inequality that does not hold in it.
     #[error("case {0} uses an inequality that does not hold in it")]
-    NotThere(usize),
+    InequalityNotInCase(usize),
     /// A time is given for a point that the world decides, or none for a point that the executor
     /// schedules.
     #[error(
@@ -88,19 +88,19 @@ pub enum Flaw {
     NotChosen(usize),
     /// A point may come before time zero, or time zero is not at 0.
     #[error("the times given for point {0} are not at 0 or later in all of the box")]
-    Early(usize),
+    BeforeTimeZero(usize),
     /// Times do not satisfy a constraint.
     #[error("the given times do not satisfy constraint {0} in all of the box")]
-    Unmet(usize),
+    ConstraintViolated(usize),
     /// The schedules do not form a tree.
     #[error("schedule {0} is reached never or twice, or splits an interval that has no end")]
     Schedules(usize),
     /// Negative edges and waits form a cycle.
     #[error("the predecessors of point {0} also come after it")]
-    Circle(usize),
+    NegativeCycle(usize),
     /// The network is not closed: the edge or wait that two edges imply is missing.
     #[error("the network is not closed: an edge is missing beside two that meet at point {0}")]
-    Open(usize),
+    NotClosed(usize),
     /// A sum of inequalities is not a contradiction.
     #[error("it does not follow that condition {0} holds in all of the box")]
     Condition(usize),

@@ -26,7 +26,7 @@ impl Intervals {
             };
             let slack = |place: usize| {
                 let slack = certificate.slacks.get(place);
-                slack.ok_or(Flaw::NoSuch("variable", place))
+                slack.ok_or(Flaw::UnknownReference("variable", place))
             };
             let lower = &own.nominal - &slack(places[0])?.0;
             let upper = &own.nominal + &slack(places[1])?.0;
@@ -35,7 +35,7 @@ impl Intervals {
         let mut intervals = intervals.collect::<Result<Vec<_>, Flaw>>()?;
         for own in endless {
             let interval = intervals.get_mut(own.parameter);
-            let interval = interval.ok_or(Flaw::NoSuch("parameter", own.parameter))?;
+            let interval = interval.ok_or(Flaw::UnknownReference("parameter", own.parameter))?;
             let end = &mut interval[usize::from(own.end == End::Upper)];
             let end = end.take().filter(|_| !certificate.symmetric);
             end.ok_or(Flaw::Range("the interval of parameter", own.parameter))?;
@@ -82,7 +82,7 @@ impl Intervals {
     pub(crate) fn of(&self, parameter: usize) -> Result<&[Option<Rational>; 2], Flaw> {
         self.0
             .get(parameter)
-            .ok_or(Flaw::NoSuch("parameter", parameter))
+            .ok_or(Flaw::UnknownReference("parameter", parameter))
     }
 
     /// Returns the box with a parameter fixed at one of its ends; `None` if the end is infinite, or

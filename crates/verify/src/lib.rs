@@ -67,12 +67,12 @@ pub use answer::{
     AnswerError, Distributions, epsilon_of, verify_answer, verify_answer_in_world,
     verify_answer_of, verify_answer_of_network,
 };
-pub use bounds::Ends;
+pub use bounds::EndExpression;
 pub use certificate::{
     Case, Certificate, Chance, Constraint, End, Exact, Guarantee, Limit, Multiplier, Parameter,
-    Part, Proof, Reasons, Shape, Source, Stopped, Sum, Term, Total, Touch, Way, sound,
+    Part, Path, Proof, Reasons, Shape, Source, Stopped, Sum, Term, Total, Touch, sound,
 };
-pub use check::{Inside, Verified, added_up, verify};
+pub use check::{InsideCheck, Verified, verify, with_sums};
 pub use derive::{NotDerived, Plan};
 pub use flaw::Flaw;
 pub use given::{GivenConstraint, GivenInstance, GivenParameter, GivenPlan};

@@ -25,14 +25,14 @@
 //! searches neither for a list nor for plans. Programs that generate certificates can use the same
 //! [`Instances`].
 
-mod beginning;
 pub mod closed;
+mod earliest_times;
+mod initial_state;
 mod instances;
-mod lasting;
-mod moments;
 pub mod pairs;
 mod processes;
 mod relevance;
+mod static_facts;
 mod valueless;
 
 use std::collections::BTreeMap;
@@ -43,16 +43,16 @@ use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
 
 use crate::Exact;
-pub use closed::{Closed, ClosedState};
+pub use closed::{ClosedSet, ClosedState};
+use earliest_times::{ConditionContext, EarliestTimes};
 pub use instances::{Breach, Instances};
-use moments::{HeldTo, Moments};
 use pairs::Structure;
 
 /// A predicate and its objects.
 pub type Fact = (PredicateId, Vec<ObjectId>);
 
 /// Facts, each with a time before which it is not true. A fact that is not listed is never true.
-pub type Reached = BTreeMap<Fact, Rational>;
+pub type ReachedFacts = BTreeMap<Fact, Rational>;
 
 /// Certificate that a problem has no plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,10 +71,10 @@ pub struct NoPlan {
     /// Pairs that are not true together before some time; see [`pairs`]. Empty if they are not
     /// needed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub apart: Vec<Apart>,
+    pub apart: Vec<MutexPair>,
     /// Closed set of states; see [`closed`]. `None` if it is not needed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub closed: Option<Closed>,
+    pub closed: Option<ClosedSet>,
 }
 
 /// Pairs that are not true together before some time. The elements are literals, `(at rover depot)`
@@ -82,7 +82,7 @@ pub struct NoPlan {
 /// action, `begun (drive rover depot)` for one that was running initially and still is, and `ended
 /// …` for one that was running initially and has ended.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Apart {
+pub struct MutexPair {
     /// The time; `None`: the pairs are never true together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<Exact>,
@@ -119,7 +119,7 @@ pub const PROVES_CLOSED: &str = "no plan exists: whatever happens leads into one
                                  goal holds in none";
 
 /// Largest number of action instances and tried objects.
-pub const MOST_STEPS: u64 = 20_000_000;
+pub const MAX_STEPS: u64 = 20_000_000;
 
 /// Reason why a certificate does not prove that there is no plan.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -162,7 +162,7 @@ pub enum NoPlanFlaw {
     Leads(String),
     /// Two objects are not interchangeable.
     #[error("`{0}` and `{1}` are not alike")]
-    NotAlike(String, String),
+    NotInterchangeable(String, String),
     /// The list does not exclude the goal.
     #[error("according to the listed facts, the goal could be reached")]
     GoalInReach,
@@ -252,11 +252,14 @@ pub fn verify_no_plan_from(
         return closed.verify(&instances, &reached);
     }
     let structure = Structure::of(&instances, &reached);
-    let claims = structure.read(&certificate.apart)?;
-    if let Some((pair, by)) = structure.first_broken(&claims) {
+    let claims = structure.parse_groups(&certificate.apart)?;
+    if let Some((pair, by)) = structure.first_violation(&claims) {
         return Err(NoPlanFlaw::Together {
-            pair: structure.in_words(pair),
-            by: by.map_or_else(|| "the beginning".to_owned(), |by| structure.happening(by)),
+            pair: structure.describe_claim(pair),
+            by: by.map_or_else(
+                || "the beginning".to_owned(),
+                |by| structure.describe_happening(by),
+            ),
         });
     }
     if structure.is_goal_excluded(&claims) {
@@ -279,8 +282,8 @@ pub fn verify_earliest(
     condition: &ground::Condition,
 ) -> Result<Option<Rational>, NoPlanFlaw> {
     let (instances, reached) = verified_list(task, situation, certificate)?;
-    let moments = instances.moments(&reached);
-    Ok(moments.next(condition, &situation.time, HeldTo::All))
+    let moments = instances.earliest_times(&reached);
+    Ok(moments.next(condition, &situation.time, ConditionContext::All))
 }
 
 /// Checks that the certificate's list of facts is an invariant. Returns it with the instances that it allows.
@@ -288,10 +291,10 @@ fn verified_list(
     task: &Task,
     situation: &Situation,
     certificate: &NoPlan,
-) -> Result<(Instances, Reached), NoPlanFlaw> {
+) -> Result<(Instances, ReachedFacts), NoPlanFlaw> {
     let mut instances = Instances::from(task, situation)?;
     let reached = listed(task, certificate)?;
-    instances.extend(&reached, MOST_STEPS)?;
+    instances.extend(&reached, MAX_STEPS)?;
     if let Some(breach) = instances.breaches(&reached).into_iter().next() {
         let said = reached.get(&breach.fact);
         return Err(NoPlanFlaw::Breach {
@@ -342,7 +345,7 @@ impl NoPlan {
 }
 
 /// Returns the certificate for a list of facts, without checking that it proves anything.
-pub fn no_plan_certificate(task: &Task, reached: &Reached) -> NoPlan {
+pub fn no_plan_certificate(task: &Task, reached: &ReachedFacts) -> NoPlan {
     let mut by_time: BTreeMap<&Rational, Vec<String>> = BTreeMap::new();
     for ((predicate, objects), from) in reached {
         let name = task.problem().apply_predicate(*predicate, objects);
@@ -363,8 +366,8 @@ pub fn no_plan_certificate(task: &Task, reached: &Reached) -> NoPlan {
 }
 
 /// Returns the facts that the certificate lists.
-fn listed(task: &Task, certificate: &NoPlan) -> Result<Reached, NoPlanFlaw> {
-    let mut reached = Reached::new();
+fn listed(task: &Task, certificate: &NoPlan) -> Result<ReachedFacts, NoPlanFlaw> {
+    let mut reached = ReachedFacts::new();
     for group in &certificate.reached {
         for name in &group.facts {
             let fact = fact(task, name).ok_or_else(|| NoPlanFlaw::NoSuchFact(name.clone()))?;

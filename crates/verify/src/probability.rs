@@ -5,8 +5,8 @@
 //! in its ends for a log-concave density (Prékopa 1973). A jump counts in full where a case does
 //! not exclude it.
 
-use elbowroom_num::chance::{Cell, Chance, Reach, Touch as Touching};
-use elbowroom_num::{Rational, enclosed};
+use elbowroom_num::log_concave::{Cell, LogConcaveDistribution, Reach, TangentPoint as Touching};
+use elbowroom_num::{Rational, enclosures};
 
 use crate::certificate::{Certificate, Exact, Total, Touch};
 use crate::flaw::Flaw;
@@ -26,13 +26,13 @@ pub(crate) struct Span {
 }
 
 /// The parameters with their distributions.
-pub(crate) struct Chances {
-    own: Vec<Option<(Rational, Chance)>>,
+pub(crate) struct VariableDistributions {
+    own: Vec<Option<(Rational, LogConcaveDistribution)>>,
     /// For each parameter the variables that move its ends.
     ends: Vec<[usize; 2]>,
 }
 
-impl Chances {
+impl VariableDistributions {
     /// Reads the distributions of a certificate.
     ///
     /// # Errors
@@ -46,7 +46,7 @@ impl Chances {
                 let Some(chance) = &parameter.chance else {
                     return Ok(None);
                 };
-                let reckoned = chance.reckoned();
+                let reckoned = chance.to_exact();
                 let reckoned =
                     reckoned.ok_or(Flaw::Range("the distribution of parameter", index))?;
                 Ok(Some((parameter.nominal.clone(), reckoned)))
@@ -67,7 +67,7 @@ impl Chances {
     /// Restricts variables to the range where the box has a positive probability and where moving
     /// an end increases it. A box outside this range has probability 0, or no more than some box
     /// inside it.
-    pub(crate) fn narrow(&self, spans: &mut [Span]) {
+    pub(crate) fn restrict_spans(&self, spans: &mut [Span]) {
         let mut gains: Vec<Option<Option<Rational>>> = vec![None; spans.len()];
         for (own, ends) in self.own.iter().zip(&self.ends) {
             let limits = match own {
@@ -92,7 +92,7 @@ impl Chances {
     }
 
     /// Returns `true` if a probability jumps when this variable reaches a number.
-    pub(crate) fn jumps(&self, variable: usize, at: &Rational) -> bool {
+    pub(crate) fn has_jump_at(&self, variable: usize, at: &Rational) -> bool {
         let all = self.own.iter().zip(&self.ends);
         let mut own = all.filter_map(|(own, ends)| Some((own.as_ref()?, ends)));
         own.any(|((nominal, chance), ends)| {
@@ -104,20 +104,20 @@ impl Chances {
 
     /// Returns the logarithm of the probability of a box, rounded down; [`NEVER`] if it is 0 or
     /// below that.
-    pub(crate) fn worth(&self, slacks: &[Rational]) -> Rational {
+    pub(crate) fn log_probability(&self, slacks: &[Rational]) -> Rational {
         let mut sum = Rational::ZERO;
         for (own, ends) in self.own.iter().zip(&self.ends) {
             let Some((nominal, chance)) = own else {
                 continue;
             };
             let reach: Reach = ends.map(|variable| slacks[variable].clone());
-            let [mass, _] = chance.mass(nominal, &reach);
-            match enclosed::ln(&mass) {
+            let [mass, _] = chance.probability_bounds(nominal, &reach);
+            match enclosures::ln(&mass) {
                 Some([below, _]) => sum += below,
                 None => return Rational::from(NEVER),
             }
         }
-        enclosed::billionths_below(&sum).max(Rational::from(NEVER))
+        enclosures::floor_to_billionth(&sum).max(Rational::from(NEVER))
     }
 
     /// Returns an upper bound of the logarithm of the probability, rounded up to 10^-18, in a case
@@ -154,8 +154,8 @@ impl Chances {
                 above: [above.least.clone(), above.far.clone()?],
                 is_open: [below.is_open, above.is_open],
             };
-            let touching = touching(touch, &cell)?;
-            bound += chance.height(nominal, &cell, &touching, &slopes)?;
+            let touching = contact_point(touch, &cell)?;
+            bound += chance.gap(nominal, &cell, &touching, &slopes)?;
         }
         let fine = Rational::from(1_000_000_000_000_000_000_i64);
         (wanted == factors).then(|| (bound * &fine).ceil() / fine)
@@ -182,16 +182,19 @@ pub(crate) fn enclosure(
         let ever = Rational::from(EVER);
         let lower = lower.unwrap_or_else(|| -&ever);
         let inside = own
-            .reckoned()?
-            .inside([&lower, &upper.unwrap_or(ever)], &resolution);
-        least = enclosed::billionths_below(&(least * inside));
+            .to_exact()?
+            .probability_inside([&lower, &upper.unwrap_or(ever)], &resolution);
+        least = enclosures::floor_to_billionth(&(least * inside));
     }
-    let [_, most] = enclosed::exp_of_minus(&(-bound).max(Rational::ZERO));
-    Some([least, enclosed::billionths_above(&most).min(Rational::ONE)])
+    let [_, most] = enclosures::exp_of_minus(&(-bound).max(Rational::ZERO));
+    Some([
+        least,
+        enclosures::ceil_to_billionth(&most).min(Rational::ONE),
+    ])
 }
 
 /// Returns the point of contact with its numbers; `None` if it is not in the cell.
-fn touching(touch: &Touch, cell: &Cell) -> Option<Touching> {
+fn contact_point(touch: &Touch, cell: &Cell) -> Option<Touching> {
     Some(match touch {
         Touch::At([Exact(below), Exact(above)]) => {
             let is_in = |at: &Rational, [near, far]: &[Rational; 2]| near <= at && at <= far;
@@ -201,6 +204,6 @@ fn touching(touch: &Touch, cell: &Cell) -> Option<Touching> {
             Touching::At([below.clone(), above.clone()])
         }
         Touch::Mass(Exact(mass)) => Touching::Mass(mass.clone()),
-        Touch::Nowhere => Touching::Nowhere,
+        Touch::Nowhere => Touching::NoContact,
     })
 }

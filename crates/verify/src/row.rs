@@ -2,21 +2,21 @@
 
 use elbowroom_num::Rational;
 
-use crate::bounds::Ends;
-use crate::certificate::{Certificate, Constraint, End, Guarantee, Limit, Part, Proof, Sum, Way};
+use crate::bounds::EndExpression;
+use crate::certificate::{Certificate, Constraint, End, Guarantee, Limit, Part, Path, Proof, Sum};
 use crate::flaw::Flaw;
 
 /// Largest number of sums of one proof.
-const MOST_SUMS: usize = 256;
+const MAX_SUMS: usize = 256;
 
 /// Returns sums such that, in every box inside the envelope, at least one is not negative.
 ///
 /// # Errors
 /// When the proof is not valid.
-pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<Ends>, Flaw> {
-    let reader = Reader {
+pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<EndExpression>, Flaw> {
+    let reader = PathReader {
         certificate,
-        ways: &[],
+        paths: &[],
     };
     let mut sums = match proof {
         Proof::Cycle(parts) => vec![reader.cycle(parts)?],
@@ -24,15 +24,18 @@ pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<Ends>, Flaw>
             vec![reader.fixed(parts)?]
         }
         Proof::Semireducible { ways, cycle } if certificate.guarantee != Guarantee::Weak => {
-            let reader = Reader { certificate, ways };
+            let reader = PathReader {
+                certificate,
+                paths: ways,
+            };
             reader.is_tree(cycle)?;
             reader.semireducible(cycle)?
         }
         Proof::Fixed(_) | Proof::Semireducible { .. } => return Err(Flaw::WrongGuarantee),
-        Proof::Assumed { sums, .. } => sums.iter().map(stated).collect(),
+        Proof::Assumed { sums, .. } => sums.iter().map(convert_sum).collect(),
     };
     // Duplicates are removed, so that alternatives have definite positions.
-    let mut each: Vec<Ends> = Vec::new();
+    let mut each: Vec<EndExpression> = Vec::new();
     for sum in sums.drain(..) {
         if !each.contains(&sum) {
             each.push(sum);
@@ -42,8 +45,8 @@ pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<Ends>, Flaw>
 }
 
 /// Converts a sum of the certificate.
-fn stated(sum: &Sum) -> Ends {
-    let mut ends = Ends::number(sum.constant.clone());
+fn convert_sum(sum: &Sum) -> EndExpression {
+    let mut ends = EndExpression::number(sum.constant.clone());
     for term in &sum.terms {
         let end = 2 * term.parameter + usize::from(term.end == End::Upper);
         ends.add(end, &term.factor);
@@ -51,27 +54,29 @@ fn stated(sum: &Sum) -> Ends {
     ends
 }
 
-struct Reader<'a> {
+struct PathReader<'a> {
     certificate: &'a Certificate,
     /// Ways that parts of the proof refer to by position.
-    ways: &'a [Way],
+    paths: &'a [Path],
 }
 
-impl Reader<'_> {
-    fn way(&self, index: usize) -> Result<&Way, Flaw> {
-        self.ways.get(index).ok_or(Flaw::NoSuch("way", index))
+impl PathReader<'_> {
+    fn path(&self, index: usize) -> Result<&Path, Flaw> {
+        self.paths
+            .get(index)
+            .ok_or(Flaw::UnknownReference("way", index))
     }
 
     /// Checks that each way is mentioned once, by the cycle or by a later way.
     fn is_tree(&self, cycle: &[usize]) -> Result<(), Flaw> {
-        let mut is_mentioned = vec![false; self.ways.len()];
-        let inner = self.ways.iter().enumerate().flat_map(|(place, way)| {
+        let mut is_mentioned = vec![false; self.paths.len()];
+        let inner = self.paths.iter().enumerate().flat_map(|(place, way)| {
             way.parts.iter().filter_map(move |part| match part {
                 Part::Way(index) => Some((*index, place)),
                 _ => None,
             })
         });
-        let outer = cycle.iter().map(|&index| (index, self.ways.len()));
+        let outer = cycle.iter().map(|&index| (index, self.paths.len()));
         for (index, place) in inner.chain(outer) {
             if index >= place || std::mem::replace(&mut is_mentioned[index], true) {
                 return Err(Flaw::NoTree(index));
@@ -82,7 +87,7 @@ impl Reader<'_> {
 
     fn constraint(&self, index: usize) -> Result<&Constraint, Flaw> {
         let constraint = self.certificate.constraints.get(index);
-        constraint.ok_or(Flaw::NoSuch("constraint", index))
+        constraint.ok_or(Flaw::UnknownReference("constraint", index))
     }
 
     /// Returns an observed constraint and its parameter.
@@ -110,7 +115,7 @@ impl Reader<'_> {
                 let constraint = self.constraint(*index)?;
                 (constraint.from, constraint.to)
             }
-            Part::Way(way) => self.ends_of(&self.way(*way)?.parts)?,
+            Part::Way(way) => self.ends_of(&self.path(*way)?.parts)?,
         })
     }
 
@@ -121,7 +126,7 @@ impl Reader<'_> {
         for part in &parts[1..] {
             let (from, to) = self.points(part)?;
             if from != at {
-                return Err(Flaw::Broken);
+                return Err(Flaw::NoCycle);
             }
             at = to;
         }
@@ -129,15 +134,15 @@ impl Reader<'_> {
     }
 
     /// Checks that parts form a cycle.
-    fn is_circle(&self, parts: &[Part]) -> Result<(), Flaw> {
+    fn is_cyclic(&self, parts: &[Part]) -> Result<(), Flaw> {
         let (begin, end) = self.ends_of(parts)?;
-        (begin == end).then_some(()).ok_or(Flaw::Broken)
+        (begin == end).then_some(()).ok_or(Flaw::NoCycle)
     }
 
     /// Returns the sum of a cycle at the worst values: each parameter counts with one sign in
     /// total.
-    fn cycle(&self, parts: &[Part]) -> Result<Ends, Flaw> {
-        self.is_circle(parts)?;
+    fn cycle(&self, parts: &[Part]) -> Result<EndExpression, Flaw> {
+        self.is_cyclic(parts)?;
         let count = self.certificate.parameters.len();
         let mut counts = vec![0_i64; count];
         let mut constant = Rational::ZERO;
@@ -154,26 +159,26 @@ impl Reader<'_> {
                 Limit::Parameter(parameter) => {
                     *counts
                         .get_mut(*parameter)
-                        .ok_or(Flaw::NoSuch("parameter", *parameter))? += sign;
+                        .ok_or(Flaw::UnknownReference("parameter", *parameter))? += sign;
                 }
             }
         }
-        let mut sum = Ends::number(constant);
+        let mut sum = EndExpression::number(constant);
         for (parameter, &count) in counts.iter().enumerate() {
             let end = match count {
                 0 => continue,
                 1.. => 2 * parameter,
                 _ => 2 * parameter + 1,
             };
-            sum.add_sum(&Ends::end(end, count));
+            sum.add_sum(&EndExpression::end(end, count));
         }
         Ok(sum)
     }
 
     /// Returns a bound that has to hold for all values of its parameter.
-    fn requirement(&self, part: &Part) -> Result<Ends, Flaw> {
+    fn requirement(&self, part: &Part) -> Result<EndExpression, Flaw> {
         let (index, is_most) = match part {
-            Part::Beginning(_) => return Ok(Ends::default()),
+            Part::Beginning(_) => return Ok(EndExpression::default()),
             Part::Least(index) => (*index, false),
             Part::Most(index) => (*index, true),
             _ => return Err(Flaw::Rule),
@@ -189,12 +194,12 @@ impl Reader<'_> {
         };
         match limit {
             Limit::None => Err(Flaw::NoLimit),
-            Limit::Number(number) => Ok(Ends::number(&number.0 * &Rational::from(sign))),
+            Limit::Number(number) => Ok(EndExpression::number(&number.0 * &Rational::from(sign))),
             // An upper bound counts with its least value, a lower bound with its greatest value.
-            Limit::Parameter(parameter) if *parameter < self.certificate.parameters.len() => {
-                Ok(Ends::end(2 * parameter + usize::from(!is_most), sign))
-            }
-            Limit::Parameter(parameter) => Err(Flaw::NoSuch("parameter", *parameter)),
+            Limit::Parameter(parameter) if *parameter < self.certificate.parameters.len() => Ok(
+                EndExpression::end(2 * parameter + usize::from(!is_most), sign),
+            ),
+            Limit::Parameter(parameter) => Err(Flaw::UnknownReference("parameter", *parameter)),
         }
     }
 
@@ -217,8 +222,8 @@ impl Reader<'_> {
 
     /// Returns the sum of a cycle of bounds between points that the executor schedules. Each bound
     /// counts for the worst case of the durations between these points and the points of the bound.
-    fn fixed(&self, parts: &[Part]) -> Result<Ends, Flaw> {
-        let mut sum = Ends::default();
+    fn fixed(&self, parts: &[Part]) -> Result<EndExpression, Flaw> {
+        let mut sum = EndExpression::default();
         let mut way: Option<(usize, usize)> = None;
         for part in parts {
             sum.add_sum(&self.requirement(part)?);
@@ -231,34 +236,34 @@ impl Reader<'_> {
                 .take_while(|(one, other)| one == other)
                 .count();
             for &link in &from_links[shared..] {
-                sum.add_sum(&Ends::end(2 * self.observed(link)?.1, 1));
+                sum.add_sum(&EndExpression::end(2 * self.observed(link)?.1, 1));
             }
             for &link in &to_links[shared..] {
-                sum.add_sum(&Ends::end(2 * self.observed(link)?.1 + 1, -1));
+                sum.add_sum(&EndExpression::end(2 * self.observed(link)?.1 + 1, -1));
             }
             way = match way {
                 None => Some((from_root, to_root)),
                 Some((begin, at)) if from_root == at => Some((begin, to_root)),
-                Some(_) => return Err(Flaw::Broken),
+                Some(_) => return Err(Flaw::NoCycle),
             };
         }
         match way {
             None => Err(Flaw::Empty),
-            Some((begin, end)) if begin != end => Err(Flaw::Broken),
+            Some((begin, end)) if begin != end => Err(Flaw::NoCycle),
             Some(_) => Ok(sum),
         }
     }
 
     /// Returns the sums of a semi-reducible cycle: its own, and those that have to be negative for
     /// the reduction rules to apply.
-    fn semireducible(&self, cycle: &[usize]) -> Result<Vec<Ends>, Flaw> {
+    fn semireducible(&self, cycle: &[usize]) -> Result<Vec<EndExpression>, Flaw> {
         let parts: Vec<Part> = cycle.iter().copied().map(Part::Way).collect();
-        self.is_circle(&parts)?;
+        self.is_cyclic(&parts)?;
         let mut legal = Vec::new();
-        let mut total = vec![Ends::default()];
-        let mut flat = Ends::default();
+        let mut total = vec![EndExpression::default()];
+        let mut flat = EndExpression::default();
         for &way in cycle {
-            let way = self.way(way)?;
+            let way = self.path(way)?;
             if way.unlabelled.is_some() {
                 return Err(Flaw::Rule);
             }
@@ -266,7 +271,7 @@ impl Reader<'_> {
             total = all_sums(total, &lengths)?;
             flat.add_sum(&self.flat(way)?);
         }
-        if !flat.tears() {
+        if !flat.has_both_ends() {
             // With each parameter at one of its ends, the network has no schedule at all.
             return Ok(vec![flat]);
         }
@@ -275,13 +280,13 @@ impl Reader<'_> {
     }
 
     /// Returns the sum of all bounds of a way, with all waits in full.
-    fn flat(&self, way: &Way) -> Result<Ends, Flaw> {
-        let mut sum = Ends::default();
+    fn flat(&self, way: &Path) -> Result<EndExpression, Flaw> {
+        let mut sum = EndExpression::default();
         for part in &way.parts {
             sum.add_sum(&match part {
-                Part::Early(index) => Ends::end(2 * self.observed(*index)?.1, 1),
-                Part::Late(index) => Ends::end(2 * self.observed(*index)?.1 + 1, -1),
-                Part::Way(way) => self.flat(self.way(*way)?)?,
+                Part::Early(index) => EndExpression::end(2 * self.observed(*index)?.1, 1),
+                Part::Late(index) => EndExpression::end(2 * self.observed(*index)?.1 + 1, -1),
+                Part::Way(way) => self.flat(self.path(*way)?)?,
                 requirement => self.requirement(requirement)?,
             });
         }
@@ -290,27 +295,31 @@ impl Reader<'_> {
 
     /// Returns the possible lengths of a way; the greatest one counts. Adds to `legal` the sums
     /// that have to be negative for the rules to apply.
-    fn lengths(&self, way: &Way, legal: &mut Vec<Ends>) -> Result<Vec<Ends>, Flaw> {
+    fn lengths(
+        &self,
+        way: &Path,
+        legal: &mut Vec<EndExpression>,
+    ) -> Result<Vec<EndExpression>, Flaw> {
         self.ends_of(&way.parts)?;
         let waits_for = match way.parts.last() {
             Some(Part::Late(index)) => Some(*index),
             _ => None,
         };
-        let mut lengths = vec![Ends::default()];
+        let mut lengths = vec![EndExpression::default()];
         for (place, part) in way.parts.iter().enumerate().rev() {
             let is_last = place + 1 == way.parts.len();
             let own = match part {
                 // Another part must follow, and the way must not end with a wait for the same duration.
                 Part::Early(index) if !is_last && Some(*index) != waits_for => {
                     legal.extend(lengths.iter().cloned());
-                    vec![Ends::end(2 * self.observed(*index)?.1, 1)]
+                    vec![EndExpression::end(2 * self.observed(*index)?.1, 1)]
                 }
                 Part::Late(index) if is_last => {
-                    vec![Ends::end(2 * self.observed(*index)?.1 + 1, -1)]
+                    vec![EndExpression::end(2 * self.observed(*index)?.1 + 1, -1)]
                 }
                 Part::Early(_) | Part::Late(_) => return Err(Flaw::Rule),
                 Part::Way(inner) => {
-                    let inner = self.way(*inner)?;
+                    let inner = self.path(*inner)?;
                     let ends_late = matches!(inner.parts.last(), Some(Part::Late(_)));
                     if ends_late && inner.unlabelled.is_none() {
                         return Err(Flaw::Rule);
@@ -320,7 +329,7 @@ impl Reader<'_> {
                 requirement => vec![self.requirement(requirement)?],
             };
             lengths = all_sums(lengths, &own)?;
-            if legal.len() > MOST_SUMS {
+            if legal.len() > MAX_SUMS {
                 return Err(Flaw::TooLong);
             }
         }
@@ -328,15 +337,18 @@ impl Reader<'_> {
             if waits_for != Some(link) {
                 return Err(Flaw::Rule);
             }
-            lengths.push(Ends::end(2 * self.observed(link)?.1, -1));
+            lengths.push(EndExpression::end(2 * self.observed(link)?.1, -1));
         }
         Ok(lengths)
     }
 }
 
 /// Returns all sums of an element of each list.
-fn all_sums(mut some: Vec<Ends>, others: &[Ends]) -> Result<Vec<Ends>, Flaw> {
-    if some.len() * others.len() > MOST_SUMS {
+fn all_sums(
+    mut some: Vec<EndExpression>,
+    others: &[EndExpression],
+) -> Result<Vec<EndExpression>, Flaw> {
+    if some.len() * others.len() > MAX_SUMS {
         return Err(Flaw::TooLong);
     }
     if let [other] = others {

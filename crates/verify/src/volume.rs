@@ -4,23 +4,23 @@
 //! times a slope, is limited by a bound, the sum of their logarithms is limited by that of the
 //! tangents with these slopes.
 
-use elbowroom_num::{Rational, enclosed};
+use elbowroom_num::{Rational, enclosures};
 
 use crate::certificate::{Exact, Parameter};
 
 /// Returns the objective value of the widths, rounded down: `Σ weight · ln(width / scale + foot)`;
 /// `None` if it is not defined.
-pub(crate) fn worth<'a>(
+pub(crate) fn objective_value<'a>(
     foot: &Rational,
     widths: impl Iterator<Item = (&'a Parameter, Rational)>,
 ) -> Option<Rational> {
     let mut worth = Rational::ZERO;
     for (parameter, width) in widths {
         let footed = width.checked_div(&parameter.scale)? + foot;
-        let [below, _] = enclosed::ln(&footed)?;
+        let [below, _] = enclosures::ln(&footed)?;
         worth += below * &parameter.weight;
     }
-    Some(enclosed::billionths_below(&worth))
+    Some(enclosures::floor_to_billionth(&worth))
 }
 
 /// Returns an upper bound of the objective, rounded up, for all boxes whose widths, each times the
@@ -46,10 +46,10 @@ pub(crate) fn bound(
         if !scaled.is_positive() {
             return None;
         }
-        let [_, above] = enclosed::ln(&parameter.weight.checked_div(&scaled)?)?;
+        let [_, above] = enclosures::ln(&parameter.weight.checked_div(&scaled)?)?;
         bound += (above - Rational::ONE) * &parameter.weight + foot * &scaled;
     }
-    Some(enclosed::billionths_above(&bound))
+    Some(enclosures::ceil_to_billionth(&bound))
 }
 
 #[cfg(test)]
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn no_tangent_lies_below_what_boxes_are_worth() {
+    fn tangent_is_never_below_objective() {
         let foot = Rational::new(1, 1_000_000);
         let parameters = [parameter(1, 4), parameter(3, 10)];
         for slope in 1..40_i64 {
@@ -78,7 +78,7 @@ mod tests {
                 for width in [0, 1, 5, 30_i64] {
                     let widths = [Rational::from(width), Rational::new(width * 3 + 1, 2)];
                     let sum = widths.iter().zip(&slopes).map(|(w, c)| w * &c.0).sum();
-                    let worth = worth(&foot, parameters.iter().zip(widths)).unwrap();
+                    let worth = objective_value(&foot, parameters.iter().zip(widths)).unwrap();
                     assert!(bound(&foot, &parameters, &slopes, &sum).unwrap() >= worth);
                 }
             }
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tangent_that_touches_is_no_more_than_rounding_above() {
+    fn touching_tangent_exceeds_objective_only_by_rounding() {
         let foot = Rational::new(1, 1_000_000);
         let parameters = [parameter(3, 10)];
         let width = Rational::from(25);
@@ -97,12 +97,12 @@ mod tests {
             &[Exact(slope.clone())],
             &(&width * &slope),
         );
-        let worth = worth(&foot, parameters.iter().zip([width])).unwrap();
+        let worth = objective_value(&foot, parameters.iter().zip([width])).unwrap();
         assert!(above.unwrap() - worth <= Rational::new(1, 100_000_000));
     }
 
     #[test]
-    fn nothing_follows_from_slopes_that_are_missing_or_not_positive() {
+    fn missing_or_nonpositive_slopes_give_no_bound() {
         let foot = Rational::new(1, 1_000_000);
         let parameters = [parameter(1, 1)];
         for slopes in [

@@ -24,7 +24,7 @@ use elbowroom_pddl::{Source, read_plan, read_problem};
 use elbowroom_planner::{Answer, Settings, plan};
 use elbowroom_verify::Exact;
 use elbowroom_verify::no_plan::{
-    Instances, MOST_STEPS, NoPlan, NoPlanFlaw, Reached, no_plan_certificate, verify_no_plan,
+    Instances, MAX_STEPS, NoPlan, NoPlanFlaw, ReachedFacts, no_plan_certificate, verify_no_plan,
 };
 use game::Random;
 
@@ -38,11 +38,11 @@ fn task(domain: &str, problem: &str) -> Task {
 }
 
 /// Returns all reached facts with their earliest times.
-fn listed(task: &Task) -> Reached {
+fn listed(task: &Task) -> ReachedFacts {
     let mut instances = Instances::of(task).unwrap();
-    let mut reached = Reached::new();
+    let mut reached = ReachedFacts::new();
     loop {
-        instances.extend(&reached, MOST_STEPS).unwrap();
+        instances.extend(&reached, MAX_STEPS).unwrap();
         let breaches = instances.breaches(&reached);
         if breaches.is_empty() {
             return reached;
@@ -102,7 +102,7 @@ fn changed(certificate: &NoPlan) -> Vec<NoPlan> {
 }
 
 #[test]
-fn what_is_accepted_is_so_by_a_twin_and_by_a_planner() {
+fn accepted_certificate_agrees_with_reference_and_planner() {
     let mut random = Random(7);
     let (mut proofs, mut plans, mut refused, mut still) = (0, 0, 0, 0);
     for _ in 0..600 {
@@ -165,7 +165,7 @@ fn door(closes: u32) -> Task {
 }
 
 #[test]
-fn who_is_at_the_door_when_it_closes_does_not_get_in() {
+fn certificate_proves_door_unreachable_before_it_closes() {
     let task = door(8);
     let certificate = no_plan_certificate(&task, &listed(&task));
     assert_eq!(verify_no_plan(&task, &certificate), Ok(()));
@@ -189,7 +189,7 @@ fn who_is_at_the_door_when_it_closes_does_not_get_in() {
 }
 
 #[test]
-fn facts_are_those_of_the_problem_and_listed_once() {
+fn unknown_or_repeated_fact_is_rejected() {
     let task = door(8);
     let certificate = no_plan_certificate(&task, &listed(&task));
     let mut strange = certificate.clone();
@@ -204,7 +204,7 @@ fn facts_are_those_of_the_problem_and_listed_once() {
 
 /// Two actions that need each other can start at the same time, although neither can start first.
 #[test]
-fn what_starts_together_is_not_out_of_reach() {
+fn mutually_dependent_simultaneous_starts_are_reachable() {
     let action = |name: &str, gives: &str, needs: &str| {
         format!(
             "(:durative-action {name} :parameters () :duration (= ?duration 3)
@@ -224,7 +224,7 @@ fn what_starts_together_is_not_out_of_reach() {
         validate(&task, &together, &Strictness::default()),
         Verdict::Valid(_)
     ));
-    let none = no_plan_certificate(&task, &Reached::new());
+    let none = no_plan_certificate(&task, &ReachedFacts::new());
     assert!(matches!(
         verify_no_plan(&task, &none),
         Err(NoPlanFlaw::Breach { .. })
@@ -233,7 +233,7 @@ fn what_starts_together_is_not_out_of_reach() {
 
 /// A certificate is never accepted for a solvable problem, with various conditions and effects.
 #[test]
-fn no_plan_is_denied_that_rules_quantifiers_or_numbers_allow() {
+fn plans_enabled_by_rules_quantifiers_or_numbers_are_not_denied() {
     let solvable = [
         // A rule, and an existential goal.
         (

@@ -16,7 +16,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{ContingentLink, UncertainNetwork};
 use elbowroom_verify::sound::{Control, Edge, Endless, Sound, Strategy, Wait};
 use elbowroom_verify::{
-    Certificate, Constraint, End, Exact, Guarantee, Limit, Parameter, Reasons, added_up,
+    Certificate, Constraint, End, Exact, Guarantee, Limit, Parameter, Reasons, with_sums,
 };
 use game::{Board, Random};
 
@@ -81,7 +81,7 @@ fn certificate(network: &UncertainNetwork<i64>, strategy: Strategy) -> Certifica
 }
 
 fn is_accepted(network: &UncertainNetwork<i64>, strategy: &Strategy) -> bool {
-    let told = added_up(certificate(network, strategy.clone())).unwrap();
+    let told = with_sums(certificate(network, strategy.clone())).unwrap();
     told.sound.unwrap().control != Control::Assumed
 }
 
@@ -123,7 +123,7 @@ fn strategy_of(network: &UncertainNetwork<i64>) -> Option<Strategy> {
     });
     // A wait without limit is the longest.
     let mut longest: BTreeMap<(usize, usize), Option<i64>> = BTreeMap::new();
-    for (node, link, delay) in form.waits_found() {
+    for (node, link, delay) in form.derived_waits() {
         let own = network.link(link);
         if node != own.end && delay.is_none_or(|delay| delay > own.lower) {
             let known = longest.entry((node.index(), link.index())).or_insert(delay);
@@ -159,7 +159,10 @@ fn changed(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNet
 }
 
 /// Returns the network with a link of unbounded duration.
-fn without_end(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNetwork<i64> {
+fn with_unbounded_link(
+    network: &UncertainNetwork<i64>,
+    random: &mut Random,
+) -> UncertainNetwork<i64> {
     let mut links = network.links().to_vec();
     if !links.is_empty() {
         let index = random.below(links.len());
@@ -176,7 +179,7 @@ fn without_end(network: &UncertainNetwork<i64>, random: &mut Random) -> Uncertai
 }
 
 #[test]
-fn the_dispatchable_form_of_each_controllable_network_is_accepted() {
+fn dispatchable_form_of_controllable_network_is_accepted() {
     let mut random = Random(11);
     let (mut accepted, mut played, mut waits, mut endless) = (0, 0, 0, 0);
     for round in 0..20_000 {
@@ -184,7 +187,7 @@ fn the_dispatchable_form_of_each_controllable_network_is_accepted() {
         let mut network = board.network();
         let has_end = round % 4 > 0;
         if !has_end {
-            network = without_end(&network, &mut random);
+            network = with_unbounded_link(&network, &mut random);
         }
         let Some(strategy) = strategy_of(&network) else {
             continue;
@@ -206,7 +209,7 @@ fn the_dispatchable_form_of_each_controllable_network_is_accepted() {
 }
 
 #[test]
-fn a_strategy_that_is_accepted_for_another_network_wins_there_too() {
+fn strategy_accepted_for_another_network_is_correct_there() {
     let mut random = Random(13);
     let (mut accepted, mut refused, mut uncontrollable, mut played) = (0, 0, 0, 0);
     for _ in 0..20_000 {

@@ -18,7 +18,7 @@ const HEAD: usize = 4;
 /// Allocates a buffer of `length` bytes. The host must release it.
 #[unsafe(no_mangle)]
 pub extern "C" fn elbowroom_reserve(length: usize) -> *mut u8 {
-    handed_over(vec![0; length])
+    into_raw_reply(vec![0; length])
 }
 
 /// Frees a buffer.
@@ -30,7 +30,7 @@ pub extern "C" fn elbowroom_reserve(length: usize) -> *mut u8 {
 pub unsafe extern "C" fn elbowroom_release(start: *mut u8, length: usize) {
     let slice = std::ptr::slice_from_raw_parts_mut(start, length);
     // SAFETY: by this function's contract, the memory is a boxed slice of that length from
-    // `handed_over`.
+    // `into_raw_reply`.
     drop(unsafe { Box::from_raw(slice) });
 }
 
@@ -49,10 +49,10 @@ pub unsafe extern "C" fn elbowroom_ask(start: *const u8, length: usize) -> *mut 
     let mut whole = Vec::with_capacity(HEAD + reply.len());
     whole.extend(count.to_le_bytes());
     whole.extend(reply);
-    handed_over(whole)
+    into_raw_reply(whole)
 }
 
-fn handed_over(bytes: Vec<u8>) -> *mut u8 {
+fn into_raw_reply(bytes: Vec<u8>) -> *mut u8 {
     Box::into_raw(bytes.into_boxed_slice()).cast()
 }
 
@@ -77,7 +77,7 @@ mod tests {
     use super::{HEAD, elbowroom_ask, elbowroom_release, elbowroom_reserve};
 
     #[test]
-    fn a_reply_comes_with_its_length_and_can_be_given_back() {
+    fn reply_has_length_prefix_and_can_be_released() {
         let question = b"no question";
         let room = elbowroom_reserve(question.len());
         // SAFETY: the buffer is as long as the question, and buffer and reply are both released

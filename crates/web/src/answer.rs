@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, PlanChecked, check};
+use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, ValidationReport, check};
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Search, envelope};
 use elbowroom::answers::plan::{PlanFinding, PlanRequest, plan};
 use elbowroom::answers::region::{RegionFinding, RegionSettings, region};
@@ -24,12 +24,12 @@ use elbowroom::sim::WorldModel;
 use elbowroom::{AnyPlan, PlanKind, RoundingRule};
 use serde_json::json;
 
+use crate::deadline_observer::DeadlineObserver;
 use crate::question::{
     CheckQuestion, EnvelopeQuestion, Method, PageQuestion, PlanQuestion, Question, RunQuestion,
     StnQuestion, Text,
 };
 use crate::reply::{Failure, Reply, document};
-use crate::watch::Watch;
 
 /// Exit codes, see `docs/exit-codes.md`.
 const YES: u8 = 0;
@@ -43,24 +43,24 @@ type Clock<'a> = dyn FnMut() -> Duration + Send + 'a;
 pub(crate) fn answer(question: &Question, clock: &mut Clock<'_>) -> Result<Reply, Failure> {
     let mut clock = || clock();
     match question {
-        Question::Check(question) => checked(question),
-        Question::Plan(question) => planned(question, &mut clock),
-        Question::Stn(question) => relaxed(question),
-        Question::Envelope(question) => widened(question, &mut clock),
-        Question::Run(question) => ran(question, &mut clock),
+        Question::Check(question) => check_plan(question),
+        Question::Plan(question) => find_plan(question, &mut clock),
+        Question::Stn(question) => relax_plan(question),
+        Question::Envelope(question) => compute_envelope(question, &mut clock),
+        Question::Run(question) => execute_plan(question, &mut clock),
         Question::Page(question) => page(question),
         Question::About => about(),
     }
 }
 
 /// A problem, and the warnings about its texts.
-struct Read {
+struct ParsedProblem {
     task: Task,
     warnings: Vec<Diagnostic>,
 }
 
-impl Read {
-    fn of(domain: &Text, problem: &Text, epsilon: Option<&str>) -> Result<Self, Failure> {
+impl ParsedProblem {
+    fn parse(domain: &Text, problem: &Text, epsilon: Option<&str>) -> Result<Self, Failure> {
         let epsilon = match epsilon {
             Some(text) => positive("epsilon", text)?,
             None => Task::default_epsilon(),
@@ -72,10 +72,14 @@ impl Read {
 
     /// Reads a plan of either kind. The content, or the extension `.stn`, determines the kind.
     fn plan(&mut self, text: &Text) -> Result<AnyPlan, Failure> {
-        self.plan_by(text, &RoundingRule::default())
+        self.parse_plan_with_rounding(text, &RoundingRule::default())
     }
 
-    fn plan_by(&mut self, text: &Text, rule: &RoundingRule) -> Result<AnyPlan, Failure> {
+    fn parse_plan_with_rounding(
+        &mut self,
+        text: &Text,
+        rule: &RoundingRule,
+    ) -> Result<AnyPlan, Failure> {
         let has_name_of_stn = text.name.to_ascii_lowercase().ends_with(".stn");
         if has_name_of_stn || PlanKind::of_text(&text.text) == PlanKind::Stn {
             return Ok(AnyPlan::Stn(format::read(text.source(), &self.task)?));
@@ -90,7 +94,7 @@ impl Read {
         text: &Text,
         rule: &RoundingRule,
     ) -> Result<TimeTriggeredPlan, Failure> {
-        match self.plan_by(text, rule)? {
+        match self.parse_plan_with_rounding(text, rule)? {
             AnyPlan::TimeTriggered(plan) => Ok(plan),
             AnyPlan::Stn(_) => Err(Failure::new(format!(
                 "{} is an STN plan file, which describes many plans; give a plan with fixed times",
@@ -100,8 +104,8 @@ impl Read {
     }
 }
 
-fn checked(question: &CheckQuestion) -> Result<Reply, Failure> {
-    let mut read = Read::of(
+fn check_plan(question: &CheckQuestion) -> Result<Reply, Failure> {
+    let mut read = ParsedProblem::parse(
         &question.domain,
         &question.problem,
         question.epsilon.as_deref(),
@@ -127,7 +131,7 @@ fn checked(question: &CheckQuestion) -> Result<Reply, Failure> {
     let answer = check(&request).map_err(Failure::new)?;
     let is_invalid = matches!(
         answer,
-        CheckAnswer::Plan(PlanChecked {
+        CheckAnswer::Plan(ValidationReport {
             finding: CheckFinding::Invalid { .. },
             ..
         })
@@ -139,11 +143,11 @@ fn checked(question: &CheckQuestion) -> Result<Reply, Failure> {
     })
 }
 
-fn planned(
+fn find_plan(
     question: &PlanQuestion,
     clock: &mut (dyn FnMut() -> Duration + Send),
 ) -> Result<Reply, Failure> {
-    let read = Read::of(
+    let read = ParsedProblem::parse(
         &question.domain,
         &question.problem,
         question.epsilon.as_deref(),
@@ -156,7 +160,8 @@ fn planned(
         self_overlap: question.self_overlap,
         threads: 1,
     };
-    let mut outcome = plan(&mut request, &mut Watch::start(clock, limit)).map_err(Failure::new)?;
+    let mut outcome =
+        plan(&mut request, &mut DeadlineObserver::start(clock, limit)).map_err(Failure::new)?;
     let files = [&question.domain.name[..], &question.problem.name];
     outcome.answer.name_files(files);
     Ok(Reply {
@@ -170,8 +175,8 @@ fn planned(
     })
 }
 
-fn relaxed(question: &StnQuestion) -> Result<Reply, Failure> {
-    let mut read = Read::of(
+fn relax_plan(question: &StnQuestion) -> Result<Reply, Failure> {
+    let mut read = ParsedProblem::parse(
         &question.domain,
         &question.problem,
         question.epsilon.as_deref(),
@@ -197,13 +202,13 @@ fn relaxed(question: &StnQuestion) -> Result<Reply, Failure> {
     })
 }
 
-fn widened(
+fn compute_envelope(
     question: &EnvelopeQuestion,
     clock: &mut (dyn FnMut() -> Duration + Send),
 ) -> Result<Reply, Failure> {
     let limit = limit(question.time_limit.as_deref())?;
-    let mut watch = Watch::start(clock, limit);
-    let mut read = Read::of(
+    let mut watch = DeadlineObserver::start(clock, limit);
+    let mut read = ParsedProblem::parse(
         &question.domain,
         &question.problem,
         question.epsilon.as_deref(),
@@ -259,7 +264,7 @@ fn widened(
         ..EnvelopeRequest::new(&Arc::new(read.task), plan)
     };
     if question.method == Some(Method::Exact) {
-        return delimited(question, &request, &read.warnings, &mut watch);
+        return compute_exact_region(question, &request, &read.warnings, &mut watch);
     }
     let outcome = envelope(&request, &mut watch).map_err(Failure::new)?;
     Ok(Reply {
@@ -274,11 +279,11 @@ fn widened(
 }
 
 /// Computes the whole region.
-fn delimited(
+fn compute_exact_region(
     question: &EnvelopeQuestion,
     request: &EnvelopeRequest,
     warnings: &[Diagnostic],
-    watch: &mut Watch<'_>,
+    watch: &mut DeadlineObserver<'_>,
 ) -> Result<Reply, Failure> {
     if question.guarantee.is_some_and(|own| own != Guarantee::Weak) {
         return Err(Failure::new(
@@ -308,7 +313,7 @@ fn timeout(text: Option<&str>) -> Result<TimeoutRule, Failure> {
         .map_err(|error| Failure::new(format!("timeout: {error}")))
 }
 
-fn ran(
+fn execute_plan(
     question: &RunQuestion,
     clock: &mut (dyn FnMut() -> Duration + Send),
 ) -> Result<Reply, Failure> {
@@ -330,7 +335,7 @@ fn ran(
     if let Some(epsilon) = &question.epsilon {
         spec.epsilon = positive("epsilon", epsilon)?;
     }
-    let mut read = Read::of(
+    let mut read = ParsedProblem::parse(
         &question.domain,
         &question.problem,
         question.epsilon.as_deref(),
@@ -339,7 +344,7 @@ fn ran(
         Some(text) => Some(read.plan_with_times(text, &RoundingRule::default())?),
         None => None,
     };
-    spec.check().map_err(contradiction)?;
+    spec.check().map_err(spec_error)?;
     let task = Arc::new(read.task);
     let mut trace = String::new();
     let mut sink = |line: &str| trace.push_str(line);
@@ -349,7 +354,8 @@ fn ran(
     let request = RunRequest::new(&spec, &task)
         .beginning_with(first)
         .recorded_by(&mut writer);
-    let outcome = simulate(request, &mut Watch::start(clock, None)).map_err(contradiction)?;
+    let outcome =
+        simulate(request, &mut DeadlineObserver::start(clock, None)).map_err(spec_error)?;
     Ok(Reply {
         exit: match outcome.verdict() {
             Verdict::GoalReached => YES,
@@ -369,7 +375,7 @@ fn ran(
 }
 
 /// Converts a specification error. Errors of a world or of likelihoods refer to their texts.
-fn contradiction(error: SpecError) -> Failure {
+fn spec_error(error: SpecError) -> Failure {
     match error {
         SpecError::World(wrong) | SpecError::Likelihoods(wrong) => wrong.into(),
         error => Failure::new(error),

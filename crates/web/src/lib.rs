@@ -20,9 +20,9 @@
 
 pub mod abi;
 mod answer;
+mod deadline_observer;
 mod question;
 mod reply;
-mod watch;
 
 use std::time::Duration;
 

@@ -9,7 +9,7 @@ use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
-use super::number::{positive, positive_or_zero, timeout, whole};
+use super::number::{integer, positive, positive_or_zero, timeout};
 use crate::exit::Failure;
 
 #[derive(Args, Debug)]
@@ -97,7 +97,7 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long)]
     pub(crate) volume: bool,
     /// The seed of what --volume samples
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer)]
     #[arg(allow_negative_numbers = true, requires = "volume")]
     pub(crate) seed: u64,
     /// With --method exact: draw two parameters, all others having their nominal values, with IRR's
@@ -233,8 +233,8 @@ impl EnvelopeArgs {
     }
 
     /// Returns the multiple of the nominal value at which unbounded ends are capped.
-    pub(crate) fn most(&self) -> Rational {
-        let default = library::BestSettings::default().most;
+    pub(crate) fn cap_or_default(&self) -> Rational {
+        let default = library::BestSettings::default().max_deviation;
         self.cap.clone().unwrap_or(default)
     }
 
@@ -274,7 +274,7 @@ impl EnvelopeArgs {
         let best = library::BestSettings {
             objective: self.objective.map_or(default.objective, Into::into),
             symmetric: self.symmetric,
-            most: self.most(),
+            max_deviation: self.cap_or_default(),
             ..default
         };
         match (best.objective, &self.world) {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::number::{count, whole};
+use super::number::{count, integer};
 
 #[derive(Args, Debug)]
 #[command(after_long_help = FORMATS_HELP)]
@@ -24,7 +24,7 @@ pub(crate) struct NetworkArgs {
     #[arg(allow_negative_numbers = true)]
     pub(crate) simulate: Option<u64>,
     /// Seed of the random numbers
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer)]
     #[arg(allow_negative_numbers = true, requires = "simulate")]
     pub(crate) seed: u64,
     /// Distribution of the durations

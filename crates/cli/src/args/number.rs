@@ -17,14 +17,14 @@ pub(super) fn positive(text: &str) -> Result<Rational, String> {
 }
 
 /// A count or a seed.
-pub(super) fn whole(text: &str) -> Result<u64, String> {
+pub(super) fn integer(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_| format!("it must be a whole number from 0 to {}", u64::MAX))
 }
 
 /// A count that can be held in memory.
 pub(super) fn count(text: &str) -> Result<usize, String> {
-    let count = whole(text)?;
+    let count = integer(text)?;
     usize::try_from(count).map_err(|_| format!("it must be at most {}", usize::MAX))
 }
 

@@ -7,7 +7,7 @@ use elbowroom::answers::odds::OddsSemantics;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
-use super::number::{count, positive, whole};
+use super::number::{count, integer, positive};
 
 #[derive(Args, Debug)]
 #[expect(
@@ -42,12 +42,12 @@ pub(crate) struct OddsArgs {
     #[arg(long, value_name = "NAME", requires = "world")]
     pub(crate) executor: Vec<String>,
     /// Number of samples
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = whole)]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = integer)]
     #[arg(allow_negative_numbers = true)]
     #[arg(requires = "world")]
     pub(crate) samples: u64,
     /// The seed of the first sample; the others follow
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer)]
     #[arg(allow_negative_numbers = true)]
     #[arg(requires = "world")]
     pub(crate) seed: u64,

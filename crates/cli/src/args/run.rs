@@ -11,7 +11,7 @@ use elbowroom::num::Rational;
 
 use super::CalendarArgs;
 use super::envelope::{BoxMethod, Guarantee, Objective, controllable};
-use super::number::{count, factor, positive, positive_or_zero, timeout, whole};
+use super::number::{count, factor, integer, positive, positive_or_zero, timeout};
 use super::plan::EMBEDDED;
 use crate::exit::Failure;
 use elbowroom_executive::http::Address;
@@ -59,11 +59,11 @@ pub(crate) struct RunArgs {
     pub(crate) planning_budget: Rational,
     /// Number of states that the embedded planner may evaluate for a plan; without it, only
     /// --planning-budget limits them
-    #[arg(long, value_name = "N", value_parser = whole)]
+    #[arg(long, value_name = "N", value_parser = integer)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) planner_states: Option<u64>,
     /// Number of states after the first plan, in search of a better one
-    #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = whole)]
+    #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = integer)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) improve_states: u64,
     /// Let a ground action overlap itself in plans of the embedded planner: start again before it has ended.
@@ -124,7 +124,7 @@ pub(crate) struct RunArgs {
         long,
         value_name = "N",
         default_value_t = 0,
-        value_parser = whole,
+        value_parser = integer,
         allow_negative_numbers = true,
         conflicts_with = "world_process"
     )]
@@ -218,11 +218,11 @@ pub(crate) struct RunArgs {
     pub(crate) token: Option<PathBuf>,
     /// Resume a crashed run from its journal: the world reports the state of the actions that were
     /// running; all other options are taken from the journal
-    #[arg(long, value_name = "FILE", conflicts_with_all = IN_THE_TRACE, conflicts_with = "replay")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = FIXED_BY_TRACE, conflicts_with = "replay")]
     pub(crate) resume: Option<PathBuf>,
     /// Replay a stored trace and say whether the decisions are the same; all other options are
     /// taken from the trace
-    #[arg(long, value_name = "TRACE", conflicts_with_all = IN_THE_TRACE)]
+    #[arg(long, value_name = "TRACE", conflicts_with_all = FIXED_BY_TRACE)]
     #[arg(conflicts_with_all = ["answer_within", "restart_world", "strict_world"])]
     pub(crate) replay: Option<PathBuf>,
     /// Largest difference between a printed time or duration and that of a valid plan (T) that counts
@@ -246,7 +246,7 @@ impl RunArgs {
     }
 
     /// Returns `true` if the world is the spoiler.
-    pub(crate) fn is_spoiled(&self) -> bool {
+    pub(crate) fn has_adversary(&self) -> bool {
         self.world.as_deref() == Some(std::path::Path::new("spoiler"))
     }
 
@@ -285,7 +285,7 @@ pub(crate) enum FirstPlanChoice {
 }
 
 /// Options that a stored trace fixes, so that the command line cannot change them.
-const IN_THE_TRACE: &[&str] = &[
+const FIXED_BY_TRACE: &[&str] = &[
     "domain",
     "problem",
     "calendar",

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use elbowroom::RoundingRule;
 use elbowroom::answers::RequestError;
 use elbowroom::answers::check::{
-    CheckAnswer, CheckFinding, CheckRequest, FluentValue, MarginAnswer, PlanChecked,
-    PreferenceAnswer, ProblemRead, check,
+    CheckAnswer, CheckFinding, CheckRequest, FluentValue, MarginAnswer, PreferenceAnswer,
+    ProblemSummary, ValidationReport, check,
 };
 use elbowroom::model::Task;
 use elbowroom::model::validate::Settings;
@@ -15,13 +15,13 @@ use elbowroom::text::{Record, Severity};
 use crate::args::{CheckArgs, DiagnosticsForm};
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
-use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
 use crate::output::Output;
+use crate::terminal::{EMPHASIS, ERROR, SECONDARY, SUCCESS, TextLayout, styled};
 use crate::{input, number, output};
-use elbowroom_executive::messages::counted;
+use elbowroom_executive::messages::count_with_noun;
 
 /// Advice if the given plan is an STN plan.
-const FOR_NETWORKS: &str = "`elbowroom envelope` says whether all of them work; `check` judges a plan with \
+const NETWORK_ADVICE: &str = "`elbowroom envelope` says whether all of them work; `check` judges a plan with \
                             fixed times";
 
 /// Maximum number of margins printed, the tightest ones; `--json` has all.
@@ -29,7 +29,7 @@ const MARGINS_SHOWN: usize = 8;
 
 /// Checks a problem, or validates a plan for it.
 pub(crate) fn run(arguments: &CheckArgs, output: &mut Output) -> Answer {
-    let answer = judge(arguments, output);
+    let answer = validate_plan(arguments, output);
     if arguments.diagnostics == DiagnosticsForm::Lines {
         let failed = answer.as_ref().err().map(Failure::diagnostics);
         let findings = output.warnings().iter().chain(failed.unwrap_or_default());
@@ -55,7 +55,7 @@ fn line(finding: &Record) -> String {
     line.replace(['\n', '\r'], " ") + "\n"
 }
 
-fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
+fn validate_plan(arguments: &CheckArgs, output: &mut Output) -> Answer {
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let rule = RoundingRule::with_tolerance(arguments.tolerance.clone());
     let plan = match &arguments.plan {
@@ -63,7 +63,7 @@ fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
             &task,
             path,
             &rule,
-            FOR_NETWORKS,
+            NETWORK_ADVICE,
             output,
         )?),
         None => None,
@@ -88,7 +88,7 @@ fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
     })?;
     let is_invalid = matches!(
         &answer,
-        CheckAnswer::Plan(PlanChecked {
+        CheckAnswer::Plan(ValidationReport {
             finding: CheckFinding::Invalid { .. },
             ..
         })
@@ -96,17 +96,17 @@ fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&answer)?;
     } else {
-        output::print(&text(&task, &answer, Look::of_stdout()))?;
+        output::print(&text(&task, &answer, TextLayout::of_stdout()))?;
         if is_invalid {
-            input::tell_about_repairs();
+            input::advise_repair();
         }
     }
     Ok(if is_invalid { Exit::No } else { Exit::Yes })
 }
 
-fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
+fn text(task: &Task, answer: &CheckAnswer, look: TextLayout) -> String {
     match answer {
-        CheckAnswer::Problem(read) => readable(task, read),
+        CheckAnswer::Problem(read) => problem_text(task, read),
         CheckAnswer::Plan(checked) => match &checked.finding {
             CheckFinding::Valid {
                 makespan,
@@ -118,7 +118,7 @@ fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
             } => {
                 let mut text = format!(
                     "{}: {} reaches the goal at {}\n",
-                    styled(GOOD, "valid"),
+                    styled(SUCCESS, "valid"),
                     checked.plan,
                     number::nearest(makespan)
                 );
@@ -133,7 +133,7 @@ fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
             CheckFinding::Invalid { violation } => {
                 let mut text = format!(
                     "{}: {} does not work\n",
-                    styled(BAD, "invalid"),
+                    styled(ERROR, "invalid"),
                     checked.plan
                 );
                 push_wrapped(&mut text, &violation.message, 2, look.width);
@@ -144,18 +144,18 @@ fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
 }
 
 /// Reports that domain and problem are readable.
-fn readable(task: &Task, read: &ProblemRead) -> String {
+fn problem_text(task: &Task, read: &ProblemSummary) -> String {
     let problem = task.problem();
     format!(
         "{}: domain {} and problem {} can be read\n  {}, {}, {}, {}, {}\n",
-        styled(GOOD, "ok"),
+        styled(SUCCESS, "ok"),
         read.domain,
         read.problem,
-        counted(problem.schemas.len(), "action"),
-        counted(problem.predicates.len(), "predicate"),
-        counted(problem.functions.len(), "function"),
-        counted(problem.objects.len(), "object"),
-        counted(problem.timed.len(), "timed initial"),
+        count_with_noun(problem.schemas.len(), "action"),
+        count_with_noun(problem.predicates.len(), "predicate"),
+        count_with_noun(problem.functions.len(), "function"),
+        count_with_noun(problem.objects.len(), "object"),
+        count_with_noun(problem.timed.len(), "timed initial"),
     )
 }
 
@@ -163,7 +163,7 @@ fn readable(task: &Task, read: &ProblemRead) -> String {
 fn push_values(text: &mut String, values: &[FluentValue]) {
     let mut changed = values.iter().filter(|value| value.is_changed).peekable();
     if changed.peek().is_some() {
-        let _ = write!(text, "\n{}\n", styled(STRONG, "Values at the end"));
+        let _ = write!(text, "\n{}\n", styled(EMPHASIS, "Values at the end"));
     }
     for FluentValue { fluent, value, .. } in changed {
         let _ = writeln!(text, "  {fluent} = {}", number::nearest(&value.0));
@@ -171,9 +171,9 @@ fn push_values(text: &mut String, values: &[FluentValue]) {
 }
 
 /// Appends the preferences that the plan violates.
-fn push_preferences(text: &mut String, preferences: &[PreferenceAnswer], look: Look) {
+fn push_preferences(text: &mut String, preferences: &[PreferenceAnswer], look: TextLayout) {
     if !preferences.is_empty() {
-        let _ = write!(text, "\n{}\n", styled(STRONG, "Violated preferences"));
+        let _ = write!(text, "\n{}\n", styled(EMPHASIS, "Violated preferences"));
     }
     for PreferenceAnswer {
         name,
@@ -195,11 +195,11 @@ fn push_preferences(text: &mut String, preferences: &[PreferenceAnswer], look: L
 }
 
 /// Appends the tightest margins.
-fn push_margins(text: &mut String, margins: &[MarginAnswer], look: Look) {
+fn push_margins(text: &mut String, margins: &[MarginAnswer], look: TextLayout) {
     let mut margins: Vec<&MarginAnswer> = margins.iter().collect();
     margins.sort_by(|a, b| a.margin.cmp(&b.margin));
     if !margins.is_empty() {
-        let _ = write!(text, "\n{}\n", styled(STRONG, "Smallest margins"));
+        let _ = write!(text, "\n{}\n", styled(EMPHASIS, "Smallest margins"));
     }
     for margin in margins.iter().take(MARGINS_SHOWN) {
         let of = match &margin.action {
@@ -220,6 +220,6 @@ fn push_margins(text: &mut String, margins: &[MarginAnswer], look: Look) {
             "  and {} more (--json has all)",
             margins.len() - MARGINS_SHOWN
         );
-        let _ = writeln!(text, "{}", styled(FAINT, &more));
+        let _ = writeln!(text, "{}", styled(SECONDARY, &more));
     }
 }

@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use elbowroom::answers::{Event, Halt, Watcher};
+use elbowroom::answers::{Event, Observer, StopRequest};
 use elbowroom::report::table::Table;
 use elbowroom_laboratory::answer::{
-    AnyExperiment, CompareAnswer, CompareError, CompareRequest, FailurePlace, compare_recorded,
+    AnyExperiment, CompareAnswer, CompareError, CompareRequest, FailurePosition, compare_recorded,
 };
 use elbowroom_laboratory::compare::Part;
 use elbowroom_laboratory::record::TrialRecords;
@@ -15,17 +15,17 @@ use elbowroom_laboratory::record::TrialRecords;
 use crate::args::CompareArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::interrupt::Interrupt;
-use crate::look::{BAD, Look, styled};
 use crate::output::Output;
 use crate::progress::Progress;
-use crate::stopwatch::Stopwatch;
+use crate::terminal::{ERROR, TextLayout, styled};
+use crate::time_limit::Stopwatch;
 use crate::{input, output};
-use elbowroom_executive::messages::plain;
+use elbowroom_executive::messages::io_error_message;
 
 /// Folder for the traces of failed trials, inside the folder of the results.
 pub(crate) const FAILURES: &str = "failures";
 /// Maximum number of kinds of failure, for each executor and world, whose trace is written.
-const MOST_OF_A_CELL: usize = 3;
+const MOST_PER_CELL: usize = 3;
 /// Maximum number of traces written in total.
 const MOST_FAILURES: usize = 60;
 
@@ -39,8 +39,13 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
         .unwrap_or_default();
     let file = |name: &str| {
         let path = folder.join(name);
-        fs::read_to_string(&path)
-            .map_err(|error| format!("cannot read {}: {}", path.display(), plain(&error)))
+        fs::read_to_string(&path).map_err(|error| {
+            format!(
+                "cannot read {}: {}",
+                path.display(),
+                io_error_message(&error)
+            )
+        })
     };
     // An unwritable folder is reported before the trials, not after hours of them.
     if let Some(folder) = &arguments.output {
@@ -52,9 +57,9 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     }
     let records = arguments.each_trial.then(TrialRecords::default);
     let answer = if arguments.merge.is_empty() {
-        make(arguments, &experiment, records.as_ref())?
+        run_trials(arguments, &experiment, records.as_ref())?
     } else {
-        merged(&arguments.merge, &experiment)?
+        merge_results(&arguments.merge, &experiment)?
     };
     let table = answer.table(&experiment)?;
     // The results are printed even if the files cannot be written.
@@ -66,16 +71,18 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.json(&answer.json())?;
     } else {
-        output::print(&table.within(Look::of_stdout().width))?;
+        output::print(&table.fit_to_width(TextLayout::of_stdout().width))?;
     }
     // The results of an interrupted experiment are printed and written, but the exit code is not 0.
     written.map(|()| {
         let invalid = answer.invalid_notes();
         if !invalid.is_empty() {
             for note in invalid {
-                output::tell(&styled(BAD, &note));
+                output::print_to_stderr(&styled(ERROR, &note));
             }
-            output::tell("Please report it. With `-o DIR`, DIR/failures has the traces.");
+            output::print_to_stderr(
+                "Please report it. With `-o DIR`, DIR/failures has the traces.",
+            );
             Exit::Bug
         } else if answer.is_interrupted() {
             Exit::Interrupted
@@ -85,7 +92,7 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     })
 }
 
-fn make(
+fn run_trials(
     arguments: &CompareArgs,
     experiment: &AnyExperiment,
     records: Option<&TrialRecords>,
@@ -97,7 +104,7 @@ fn make(
         shards,
         jobs: arguments.jobs,
     };
-    let mut watch = Watch {
+    let mut watch = TrialMonitor {
         line: Progress::new(),
         stopwatch: Stopwatch::start(&Interrupt::listen()),
     };
@@ -107,20 +114,20 @@ fn make(
 }
 
 /// Watcher that shows the number of trials made, and ends them on request.
-struct Watch {
+struct TrialMonitor {
     line: Progress,
     stopwatch: Stopwatch,
 }
 
-impl Watcher for Watch {
-    fn flow(&mut self) -> ControlFlow<Halt> {
+impl Observer for TrialMonitor {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         self.stopwatch.flow()
     }
 
     fn notice(&mut self, event: &Event<'_>) {
         if let Event::Trials(progress) = event {
             let elapsed = self.stopwatch.elapsed();
-            let (done, of) = (progress.done, progress.of);
+            let (done, of) = (progress.done, progress.total);
             self.line.show(elapsed, || {
                 let left = of.saturating_sub(done) * elapsed.as_secs() / done.max(1);
                 format!("{done} of {of} trials, about {left} s left")
@@ -129,12 +136,12 @@ impl Watcher for Watch {
     }
 }
 
-fn merged(paths: &[PathBuf], experiment: &AnyExperiment) -> Result<CompareAnswer, Failure> {
+fn merge_results(paths: &[PathBuf], experiment: &AnyExperiment) -> Result<CompareAnswer, Failure> {
     let mut parts = Vec::new();
     for path in paths {
         let text = input::source(path, "results")?;
         let part = CompareAnswer::read(text.text(), experiment).map_err(|error| match error {
-            CompareError::OfAnother => Failure::new(
+            CompareError::WrongExperiment => Failure::new(
                 format!("{} is not of this experiment", path.display()),
                 "give the results of its parts, made from the same files",
             ),
@@ -142,7 +149,7 @@ fn merged(paths: &[PathBuf], experiment: &AnyExperiment) -> Result<CompareAnswer
         });
         parts.push(part?);
     }
-    Ok(CompareAnswer::merged(&parts)?)
+    Ok(CompareAnswer::merge_results(&parts)?)
 }
 
 fn write(
@@ -176,7 +183,7 @@ fn write_failures(
     if folder.is_dir() {
         for old in traces(&folder)? {
             fs::remove_file(&old.1).map_err(|error| {
-                let words = plain(&error);
+                let words = io_error_message(&error);
                 Failure::new(format!("cannot replace {}: {words}", old.1.display()), "")
             })?;
         }
@@ -185,14 +192,14 @@ fn write_failures(
     let mut failed = if answer.is_interrupted() {
         Vec::new()
     } else {
-        answer.failed_trials(MOST_OF_A_CELL, MOST_FAILURES)
+        answer.failed_trials(MOST_PER_CELL, MOST_FAILURES)
     };
-    failed.retain(|failed| experiment.can_be_made_again(failed));
+    failed.retain(|failed| experiment.is_repeatable(failed));
     if !failed.is_empty() {
         make_folder(&folder)?;
     }
     for (failed, trace) in failed.iter().zip(experiment.traces(&failed)?) {
-        let (row, column, kind) = failed.place;
+        let (row, column, kind) = failed.position;
         let name = format!("{row}-{column}-{kind}.jsonl");
         output::write_file(&folder.join(name), &trace)?;
     }
@@ -201,9 +208,9 @@ fn write_failures(
 
 /// Returns the traces of failed trials in the folder of an experiment: row, column and kind of
 /// each, and its file.
-pub(crate) fn traces(folder: &Path) -> Result<Vec<(FailurePlace, PathBuf)>, Failure> {
+pub(crate) fn traces(folder: &Path) -> Result<Vec<(FailurePosition, PathBuf)>, Failure> {
     let wrong = |error: &io::Error| {
-        let words = plain(error);
+        let words = io_error_message(error);
         Failure::new(format!("cannot read {}: {words}", folder.display()), "")
     };
     let mut found = Vec::new();
@@ -229,7 +236,7 @@ fn make_folder(folder: &Path) -> Result<(), Failure> {
             format!(
                 "cannot make the folder {}: {}",
                 folder.display(),
-                plain(&error)
+                io_error_message(&error)
             ),
             "choose a folder that you may make, or that exists already",
         )

@@ -17,13 +17,13 @@ use serde_json::Value;
 
 use crate::args::{CtlArgs, CtlCommand};
 use crate::exit::{Answer, Exit, Failure};
-use crate::look::{Look, STRONG, styled};
 use crate::number::nearest;
 use crate::output::{self, Output};
-use crate::wrap::wrapped;
+use crate::terminal::{EMPHASIS, TextLayout, styled};
+use crate::wrap::wrap;
 use elbowroom::num::work::Stop;
 use elbowroom_executive::http::{self, AccessControl};
-use elbowroom_executive::messages::{counted, escape_control, plain};
+use elbowroom_executive::messages::{count_with_noun, escape_control, io_error_message};
 
 /// Sends the request and prints the answer.
 pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         CtlCommand::Next => client.show(output, "/v1/next", next),
         CtlCommand::Events { after } => client.events(*after),
         CtlCommand::Openapi => {
-            let (document, _) = client.ask::<Value>(("GET", "/v1/openapi.json"), None)?;
+            let (document, _) = client.request::<Value>(("GET", "/v1/openapi.json"), None)?;
             output.json(&document)?;
             Ok(Exit::Yes)
         }
@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
                 within: within.clone().map(GivenNumber),
             };
             if *wait {
-                return client.give_and_wait(output, &new);
+                return client.submit_goal_and_wait(output, &new);
             }
             client.change(output, ("POST", "/v1/goals"), Some(&new))
         }
@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
                     "`elbowroom ctl state` lists the goals with their names",
                 ));
             }
-            client.change(output, ("DELETE", &format!("/v1/goals/{name}")), NOTHING)
+            client.change(output, ("DELETE", &format!("/v1/goals/{name}")), NO_BODY)
         }
         CtlCommand::Action { ticket, becomes } => {
             let (ticket, becomes) = (*ticket, becomes.clone());
@@ -102,9 +102,9 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
                 Some(&NewProblem { problem }),
             )
         }
-        CtlCommand::Pause => client.change(output, ("POST", "/v1/pause"), NOTHING),
-        CtlCommand::Resume => client.change(output, ("POST", "/v1/resume"), NOTHING),
-        CtlCommand::Stop => client.change(output, ("POST", "/v1/stop"), NOTHING),
+        CtlCommand::Pause => client.change(output, ("POST", "/v1/pause"), NO_BODY),
+        CtlCommand::Resume => client.change(output, ("POST", "/v1/resume"), NO_BODY),
+        CtlCommand::Stop => client.change(output, ("POST", "/v1/stop"), NO_BODY),
     }
 }
 
@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
 const GOAL_POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// A request without a body.
-const NOTHING: Option<&NewFact> = None;
+const NO_BODY: Option<&NewFact> = None;
 
 /// A client of an executive.
 struct Client<'a> {
@@ -134,13 +134,13 @@ impl Client<'_> {
             format!(
                 "cannot ask the executive at {}: {}",
                 self.arguments.to,
-                plain(error)
+                io_error_message(error)
             ),
             "`elbowroom serve` says where it listens; --to names another address",
         )
     }
 
-    fn asked(&self, what: (&str, &str), body: Option<&str>) -> Result<http::Response, Failure> {
+    fn send(&self, what: (&str, &str), body: Option<&str>) -> Result<http::Response, Failure> {
         let control = match &self.arguments.token {
             Some(path) => Some(AccessControl::read(path, Stop::default())?),
             None => None,
@@ -151,18 +151,18 @@ impl Client<'_> {
     }
 
     /// Sends a request. Returns the answer, parsed and as received.
-    fn ask<T: DeserializeOwned>(
+    fn request<T: DeserializeOwned>(
         &self,
         what: (&str, &str),
         body: Option<&str>,
     ) -> Result<(T, Value), Failure> {
-        let answer = self.asked(what, body)?;
+        let answer = self.send(what, body)?;
         let status = answer.status;
         let text = answer.text().map_err(|error| self.unreachable(&error))?;
         if status >= 300 {
             return Err(self.refused(status, &text));
         }
-        let unlike = |error: serde_json::Error| self.unlike(&error.to_string());
+        let unlike = |error: serde_json::Error| self.invalid_answer(&error.to_string());
         let value: Value = serde_json::from_str(&text).map_err(unlike)?;
         let document = T::deserialize(&value).map_err(unlike)?;
         Ok((document, value))
@@ -175,11 +175,11 @@ impl Client<'_> {
                 escape_control(&refusal.error),
                 escape_control(&refusal.help),
             ),
-            Err(_) => self.unlike(&format!("it answers with status {status}")),
+            Err(_) => self.invalid_answer(&format!("it answers with status {status}")),
         }
     }
 
-    fn unlike(&self, why: &str) -> Failure {
+    fn invalid_answer(&self, why: &str) -> Failure {
         Failure::new(
             format!(
                 "what answers at {} is no executive: {}",
@@ -196,7 +196,7 @@ impl Client<'_> {
         path: &str,
         words: fn(&T) -> String,
     ) -> Answer {
-        let (document, value) = self.ask::<T>(("GET", path), None)?;
+        let (document, value) = self.request::<T>(("GET", path), None)?;
         if self.arguments.json {
             output.json(&value)?;
         } else {
@@ -212,7 +212,7 @@ impl Client<'_> {
         body: Option<&impl Serialize>,
     ) -> Answer {
         let body = body.and_then(|body| serde_json::to_string(body).ok());
-        let (taken, value) = self.ask::<Taken>(what, body.as_deref())?;
+        let (taken, value) = self.request::<Taken>(what, body.as_deref())?;
         if self.arguments.json {
             output.json(&value)?;
             return Ok(Exit::Yes);
@@ -231,13 +231,13 @@ impl Client<'_> {
     }
 
     /// Submits a goal, and waits until it is closed or the executive is idle without a plan for it.
-    fn give_and_wait(&self, output: &mut Output, new: &NewGoal) -> Answer {
-        let (before, _) = self.ask::<State>(("GET", "/v1/state"), None)?;
+    fn submit_goal_and_wait(&self, output: &mut Output, new: &NewGoal) -> Answer {
+        let (before, _) = self.request::<State>(("GET", "/v1/state"), None)?;
         let body = serde_json::to_string(new).ok();
-        let (taken, _) = self.ask::<Taken>(("POST", "/v1/goals"), body.as_deref())?;
+        let (taken, _) = self.request::<Taken>(("POST", "/v1/goals"), body.as_deref())?;
         let name = taken.name.unwrap_or_default();
         loop {
-            let (all, _) = self.ask::<GoalsNow>(("GET", "/v1/goals"), None)?;
+            let (all, _) = self.request::<GoalsNow>(("GET", "/v1/goals"), None)?;
             let is_it = |goal: &GoalNow| {
                 let is_later = |given: &Exact| given.0 >= before.now.0;
                 goal.name == name && goal.given.as_ref().is_some_and(is_later)
@@ -270,7 +270,7 @@ impl Client<'_> {
         let path = after.map_or("/v1/events".to_owned(), |after| {
             format!("/v1/events?after={after}")
         });
-        let answer = self.asked(("GET", &path), None)?;
+        let answer = self.send(("GET", &path), None)?;
         let status = answer.status;
         if status != 200 {
             let text = answer.text().map_err(|error| self.unreachable(&error))?;
@@ -300,7 +300,7 @@ fn goals(goals: &GoalsNow) -> String {
     let mut text = String::new();
     for goal in &goals.goals {
         let name = escape_control(&goal.name);
-        let state = styled(STRONG, &goal.state.replace('-', " "));
+        let state = styled(EMPHASIS, &goal.state.replace('-', " "));
         let since = nearest(&goal.since.0);
         let value = match &goal.value.0 {
             value if *value == Rational::ONE => String::new(),
@@ -315,7 +315,7 @@ fn goals(goals: &GoalsNow) -> String {
         if let Some(why) = &goal.why {
             let _ = write!(line, "; {}", escape_control(why));
         }
-        let _ = writeln!(text, "{}", wrapped(&line, Look::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&line, TextLayout::of_stdout().width, 2));
     }
     if text.is_empty() {
         text.push_str("there is no goal\n");
@@ -326,7 +326,7 @@ fn goals(goals: &GoalsNow) -> String {
 fn state(state: &State) -> String {
     let mut text = format!(
         "{} at {}, plan {}",
-        styled(STRONG, &state.activity.to_string()),
+        styled(EMPHASIS, &state.activity.to_string()),
         nearest(&state.now.0),
         state.plans
     );
@@ -338,7 +338,7 @@ fn state(state: &State) -> String {
         let why = format!(
             "the world has not answered for {seconds} s: nothing is started, and no request taken in, until it does"
         );
-        let _ = writeln!(text, "{}", wrapped(&why, Look::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&why, TextLayout::of_stdout().width, 2));
     }
     for goal in &state.goals {
         let (name, pddl) = (escape_control(&goal.name), escape_control(&goal.goal));
@@ -381,9 +381,9 @@ fn state(state: &State) -> String {
             "{name} is in doubt since {since}: {}",
             escape_control(&doubt.why)
         );
-        let _ = writeln!(text, "{}", wrapped(&line, Look::of_stdout().width, 2));
+        let _ = writeln!(text, "{}", wrap(&line, TextLayout::of_stdout().width, 2));
     }
-    let _ = writeln!(text, "  {}", counted(state.facts.len(), "fact"));
+    let _ = writeln!(text, "  {}", count_with_noun(state.facts.len(), "fact"));
     for fact in &state.facts {
         let _ = writeln!(text, "    {fact}");
     }

@@ -1,9 +1,9 @@
 //! `elbowroom envelope`: tolerated deviations of quantities.
 
 mod exact;
+mod monitor;
 mod repair;
 mod text;
-mod watch;
 
 use std::sync::Arc;
 
@@ -14,10 +14,10 @@ use elbowroom::plan::parametrize::VarySpec;
 
 use crate::args::{self, EnvelopeArgs};
 use crate::exit::{Answer, Exit, Failure};
-use crate::look::Look;
 use crate::output::Output;
+use crate::terminal::TextLayout;
 use crate::{input, output};
-use watch::Watch;
+use monitor::EnvelopeMonitor;
 
 /// Computes an envelope, or checks if a box is inside.
 pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         return exact::run(arguments, output);
     }
     let (method, best) = arguments.method()?;
-    let watch = Watch::start(arguments);
+    let watch = EnvelopeMonitor::start(arguments);
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let mut vary = specifications(&arguments.vary)?;
     vary.extend(specifications(&args::controllable(
@@ -75,10 +75,10 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
             &request,
             &outcome,
             arguments.order.unwrap_or(args::Order::Plan),
-            Look::of_stdout(),
+            TextLayout::of_stdout(),
         ))?;
         if matches!(outcome.answer.finding, EnvelopeFinding::Fails(_)) {
-            input::tell_about_repairs();
+            input::advise_repair();
         }
     }
     Ok(exit(&outcome))

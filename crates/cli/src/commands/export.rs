@@ -9,18 +9,18 @@ use elbowroom::RoundingRule;
 use elbowroom::answers::{EnvelopeAnswer, EnvelopeRequest};
 use elbowroom::envelope::Guarantee;
 use elbowroom::export::{self, ExportError};
-use elbowroom::flow::FlowError;
 use elbowroom::model::Task;
 use elbowroom::network::{NetworkFile, write_graphml, write_json, write_plain};
 use elbowroom::parse_box;
+use elbowroom::pipeline::PipelineError;
 use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
 
 use crate::args::{self, ExportArgs, ExportFormat};
 use crate::commands::envelope::specifications;
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
-use crate::look::{BAD, HINT, Look, styled};
 use crate::output::Output;
+use crate::terminal::{ERROR, HINT, TextLayout, styled};
 use crate::{input, output};
 
 /// Writes a network, a box check or a region.
@@ -30,12 +30,12 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         write(arguments, &text)?;
         return Ok(Exit::Yes);
     }
-    refuse_what_is_about_processes(arguments)?;
+    reject_process_options(arguments)?;
     if arguments.format == ExportFormat::Pddl {
         return timed_problem(arguments, output);
     }
     if arguments.format == ExportFormat::Stnu {
-        refuse_what_networks_do_not_have(arguments)?;
+        reject_options_without_networks(arguments)?;
     }
     let Some(file) = &arguments.plan else {
         return Err(Failure::new(
@@ -54,19 +54,24 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         enforce: arguments.enforce,
         ..EnvelopeRequest::new(&task, plan)
     };
-    let plan = match export::opened(&request) {
+    let plan = match export::parametrized_plan(&request) {
         Ok(plan) => plan,
-        Err(FlowError::Invalid(violation)) => {
+        Err(PipelineError::Invalid(violation)) => {
             let file = file.display();
-            let mut text = format!("{}: {file} does not work\n", styled(BAD, "invalid"));
-            push_wrapped(&mut text, &violation.to_string(), 2, Look::PLAIN.width);
-            output::tell(text.trim_end());
-            input::tell_about_repairs();
+            let mut text = format!("{}: {file} does not work\n", styled(ERROR, "invalid"));
+            push_wrapped(
+                &mut text,
+                &violation.to_string(),
+                2,
+                TextLayout::PLAIN.width,
+            );
+            output::print_to_stderr(text.trim_end());
+            input::advise_repair();
             return Ok(Exit::No);
         }
         Err(error) => return Err(Failure::new(error, "")),
     };
-    let asked = asked(arguments, &plan, &task)?;
+    let asked = requested_box(arguments, &plan, &task)?;
     let written = match (arguments.format, asked) {
         (ExportFormat::Stnu, Some((envelope, _))) => {
             let file = export::stnu(&task, &plan, &envelope);
@@ -87,7 +92,7 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
     let text = match written {
         // A box that is not inside is a valid answer.
         Err(error @ ExportError::NoSchedule) => {
-            output::tell(&format!("{}: {error}", styled(BAD, "outside")));
+            output::print_to_stderr(&format!("{}: {error}", styled(ERROR, "outside")));
             return Ok(Exit::No);
         }
         written => written.map_err(failure)?,
@@ -104,7 +109,7 @@ fn timed_problem(arguments: &ExportArgs, output: &mut Output) -> Answer {
             "give one with --calendar (docs/calendars.md)",
         ));
     }
-    prism::refuse_what_is_about_plans(arguments, "is about plans, and this is about a problem")?;
+    prism::reject_plan_options(arguments, "is about plans, and this is about a problem")?;
     let (read, warnings) = input::read(&arguments.problem, &arguments.epsilon)?;
     output.warn_about(&warnings);
     write(arguments, read.problem.text())?;
@@ -118,9 +123,9 @@ fn write(arguments: &ExportArgs, text: &str) -> Result<(), Failure> {
     }
 }
 
-fn refuse_what_is_about_processes(arguments: &ExportArgs) -> Result<(), Failure> {
+fn reject_process_options(arguments: &ExportArgs) -> Result<(), Failure> {
     let process = &arguments.process;
-    prism::refuse(
+    prism::reject_first_given(
         &[
             ("--likelihoods", process.likelihoods.is_some()),
             ("--world", process.world.is_some()),
@@ -134,7 +139,7 @@ fn refuse_what_is_about_processes(arguments: &ExportArgs) -> Result<(), Failure>
     )
 }
 
-fn refuse_what_networks_do_not_have(arguments: &ExportArgs) -> Result<(), Failure> {
+fn reject_options_without_networks(arguments: &ExportArgs) -> Result<(), Failure> {
     match arguments.guarantee {
         None => Ok(()),
         Some(_) => Err(Failure::new(
@@ -145,7 +150,7 @@ fn refuse_what_networks_do_not_have(arguments: &ExportArgs) -> Result<(), Failur
 }
 
 /// Returns the requested box and guarantee; `None` for the region.
-fn asked(
+fn requested_box(
     arguments: &ExportArgs,
     plan: &ParametrizedPlan,
     task: &Task,
@@ -220,7 +225,7 @@ fn network(path: Option<&Path>, file: &NetworkFile) -> Result<String, Failure> {
         ));
     }
     if factor != 1.into() {
-        output::tell(&format!(
+        output::print_to_stderr(&format!(
             "{}: in whole numbers; the unit of time is 1/{factor} of the plan's",
             styled(HINT, "note")
         ));

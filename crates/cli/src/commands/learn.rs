@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use elbowroom::RoundingRule;
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::learn::{
-    ActionLearnt, ConformalBox, DriftAnswer, DurationsLearnt, FitAnswer, GroupAnswer,
-    InsideRequest, LearnAnswer, LearnRequest, Log, LogError, PredictionAnswer, RateLearnt,
-    Settings, Verdict, expectation_and_reality, learn,
+    ConformalBox, ConformalRequest, DriftAnswer, FitAnswer, GroupAnswer, LearnAnswer, LearnRequest,
+    LearntAction, LearntDurations, LearntRate, Log, LogError, PredictionAnswer, Settings, Verdict,
+    learn, mean_planned_and_actual,
 };
 use elbowroom::num::{End, Rational};
 use elbowroom::report::table::Table;
@@ -17,9 +17,9 @@ use crate::args::{LearnArgs, ProblemArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::limits::{push_paragraph, push_wrapped};
-use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
-use elbowroom_executive::messages::counted;
+use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, TextLayout, styled};
+use elbowroom_executive::messages::count_with_noun;
 
 /// Reads the logs and prints the learnt model.
 pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
             "name a file for the world",
         ));
     }
-    let inside = inside(arguments, output)?;
+    let inside = conformal_request(arguments, output)?;
     let mut logs = Vec::new();
     for path in &arguments.logs {
         let source = input::record(path, "log")?;
@@ -56,20 +56,20 @@ pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
             drift_limit: arguments.drift.to_f64(),
             seed: arguments.seed,
         },
-        inside,
+        conformal_box: inside,
         expected: match &arguments.world {
             Some(path) => Some(input::source(path, "world")?),
             None => None,
         },
     };
-    let answer = learn(&request, &mut Unwatched).map_err(|error| Failure::new(error, ""))?;
+    let answer = learn(&request, &mut NoObserver).map_err(|error| Failure::new(error, ""))?;
     if let Some(path) = &arguments.output {
         output::write_file(path, &answer.world)?;
     }
     if arguments.json {
         output.document(&answer)?;
     } else if !is_on_stdout {
-        output::print(&text(&request, &answer, Look::of_stdout()))?;
+        output::print(&text(&request, &answer, TextLayout::of_stdout()))?;
     }
     Ok(match &answer.inside {
         Some(found) if found.verdict != Verdict::Inside => Exit::No,
@@ -77,7 +77,10 @@ pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
     })
 }
 
-fn inside(arguments: &LearnArgs, output: &mut Output) -> Result<Option<InsideRequest>, Failure> {
+fn conformal_request(
+    arguments: &LearnArgs,
+    output: &mut Output,
+) -> Result<Option<ConformalRequest>, Failure> {
     let (Some(probability), Some(domain), Some(problem), Some(plan)) = (
         &arguments.inside,
         &arguments.domain,
@@ -95,7 +98,7 @@ fn inside(arguments: &LearnArgs, output: &mut Output) -> Result<Option<InsideReq
     let problem = ProblemArgs::new(domain.clone(), problem.clone());
     let task = Arc::new(input::task(&problem, &arguments.epsilon, output)?);
     let plan = input::any_plan(&task, plan, &RoundingRule::default(), output)?;
-    Ok(Some(InsideRequest {
+    Ok(Some(ConformalRequest {
         task,
         plan,
         guarantee: arguments.guarantee.into(),
@@ -103,11 +106,11 @@ fn inside(arguments: &LearnArgs, output: &mut Output) -> Result<Option<InsideReq
     }))
 }
 
-fn text(request: &LearnRequest, answer: &LearnAnswer, look: Look) -> String {
-    let logs = counted(answer.logs.len(), "log");
-    let attempts = counted(answer.attempts, "attempt");
+fn text(request: &LearnRequest, answer: &LearnAnswer, look: TextLayout) -> String {
+    let logs = count_with_noun(answer.logs.len(), "log");
+    let attempts = count_with_noun(answer.attempts, "attempt");
     let title = format!("What {logs} with {attempts} say");
-    let mut text = format!("{}\n\n", styled(STRONG, &title));
+    let mut text = format!("{}\n\n", styled(EMPHASIS, &title));
     if answer.actions.is_empty() {
         text.push_str("No action was started.\n");
         return text;
@@ -125,7 +128,7 @@ fn text(request: &LearnRequest, answer: &LearnAnswer, look: Look) -> String {
         rows: rows.collect(),
         notes: Vec::new(),
     };
-    text.push_str(table.within(look.width).trim_start_matches('\n'));
+    text.push_str(table.fit_to_width(look.width).trim_start_matches('\n'));
     predictions(&mut text, answer, look);
     changes(&mut text, answer, look);
     for action in &answer.actions {
@@ -143,10 +146,10 @@ fn text(request: &LearnRequest, answer: &LearnAnswer, look: Look) -> String {
 }
 
 /// Returns the rows of an action: one, or one for each ground action with a separate distribution.
-fn rows(request: &LearnRequest, action: &ActionLearnt) -> Vec<Vec<String>> {
+fn rows(request: &LearnRequest, action: &LearntAction) -> Vec<Vec<String>> {
     let records = request.logs.iter().flat_map(|log| &log.records);
     let records: Vec<_> = records.cloned().collect();
-    let (planned, actual) = match expectation_and_reality(&records, &action.action) {
+    let (planned, actual) = match mean_planned_and_actual(&records, &action.action) {
         Some((planned, actual)) => (short(planned), short(actual)),
         None => (String::new(), String::new()),
     };
@@ -162,15 +165,15 @@ fn rows(request: &LearnRequest, action: &ActionLearnt) -> Vec<Vec<String>> {
         ]
     };
     match &action.durations {
-        DurationsLearnt::Unknown => vec![row(&action.action, "not known".to_owned(), failed)],
-        DurationsLearnt::Together { group } => {
+        LearntDurations::Unknown => vec![row(&action.action, "not known".to_owned(), failed)],
+        LearntDurations::Together { group } => {
             vec![row(&action.action, distribution(group, ""), failed)]
         }
-        DurationsLearnt::Relative { group } => {
+        LearntDurations::Relative { group } => {
             let words = distribution(group, " x planned");
             vec![row(&action.action, words, failed)]
         }
-        DurationsLearnt::Apart { groups } => {
+        LearntDurations::Apart { groups } => {
             let mut rows = vec![row(&action.action, "each by itself:".to_owned(), failed)];
             for named in groups {
                 let words = distribution(&named.group, "");
@@ -189,8 +192,8 @@ fn rows(request: &LearnRequest, action: &ActionLearnt) -> Vec<Vec<String>> {
 }
 
 /// Appends a table of predictions and observations.
-fn predictions(text: &mut String, answer: &LearnAnswer, look: Look) {
-    let row = |action: &ActionLearnt| {
+fn predictions(text: &mut String, answer: &LearnAnswer, look: TextLayout) {
+    let row = |action: &LearntAction| {
         let prediction = action.prediction.filter(|it| it.ended > 0)?;
         let PredictionAnswer {
             durations,
@@ -231,17 +234,17 @@ fn predictions(text: &mut String, answer: &LearnAnswer, look: Look) {
     };
     text.push('\n');
     text.push_str("Predictions of the world file and observations (within: durations in the central 90 %):\n\n");
-    text.push_str(table.within(look.width).trim_start_matches('\n'));
+    text.push_str(table.fit_to_width(look.width).trim_start_matches('\n'));
 }
 
 /// Appends a table of the changes that no action and no timed initial makes.
-fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
+fn changes(text: &mut String, answer: &LearnAnswer, look: TextLayout) {
     if answer.changes.is_empty() {
         return;
     }
     // Expected rates are shown if a world file was given for comparison.
     let is_expected = answer.changes.iter().any(|it| it.all.expected.is_some());
-    let row = |name: &str, becomes: bool, rate: &RateLearnt| {
+    let row = |name: &str, becomes: bool, rate: &LearntRate| {
         let (lower, upper) = rate.interval.unwrap_or((0.0, f64::INFINITY));
         let mut row = vec![name.to_owned(), becomes.to_string()];
         if is_expected {
@@ -275,7 +278,7 @@ fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
     };
     text.push('\n');
     text.push_str("Changes that no action and no timed initial makes:\n\n");
-    text.push_str(table.within(look.width).trim_start_matches('\n'));
+    text.push_str(table.fit_to_width(look.width).trim_start_matches('\n'));
     for learnt in answer.changes.iter().filter(|it| is_surprising(&it.all)) {
         let becomes = if learnt.becomes { "true" } else { "false" };
         let words = format!(
@@ -295,7 +298,7 @@ fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
 }
 
 /// Returns `true` if the expected rate lies outside the 95 % interval of the observations.
-fn is_surprising(rate: &RateLearnt) -> bool {
+fn is_surprising(rate: &LearntRate) -> bool {
     let Some((expected, (lower, upper))) = rate.expected.zip(rate.interval) else {
         return false;
     };
@@ -328,7 +331,7 @@ fn fit(fit: &FitAnswer) -> String {
     }
 }
 
-fn remarks(text: &mut String, action: &ActionLearnt, look: Look) {
+fn remarks(text: &mut String, action: &LearntAction, look: TextLayout) {
     let mut remark = |words: String| {
         text.push('\n');
         push_paragraph(text, &words, look.width);
@@ -358,18 +361,18 @@ fn remarks(text: &mut String, action: &ActionLearnt, look: Look) {
     }
 }
 
-fn conformal(text: &mut String, inside: &ConformalBox, look: Look) {
+fn conformal(text: &mut String, inside: &ConformalBox, look: TextLayout) {
     let percent = short(100.0 * inside.probability);
     let verdict = match inside.verdict {
         Verdict::Inside => format!(
             "{}: with a probability of at least {percent} %, all durations of the next run lie in these \
              intervals, and the plan survives whatever lies in them.",
-            styled(GOOD, "inside")
+            styled(SUCCESS, "inside")
         ),
         Verdict::Outside => format!(
             "{}: with a probability of at least {percent} %, all durations of the next run lie in these \
              intervals, but the plan does not survive everything in them.",
-            styled(BAD, "outside")
+            styled(ERROR, "outside")
         ),
         Verdict::Undecided => format!(
             "{}: with a probability of at least {percent} %, all durations of the next run lie in these \
@@ -379,11 +382,11 @@ fn conformal(text: &mut String, inside: &ConformalBox, look: Look) {
         ),
         Verdict::TooFew => format!(
             "{}: there are too few samples to promise {percent} %.",
-            styled(BAD, "too few")
+            styled(ERROR, "too few")
         ),
         Verdict::NoEnvelope => format!(
             "{}: the plan does not work even as planned; `elbowroom check` says why.",
-            styled(BAD, "no envelope")
+            styled(ERROR, "no envelope")
         ),
     };
     text.push('\n');
@@ -422,7 +425,7 @@ fn conformal(text: &mut String, inside: &ConformalBox, look: Look) {
         notes: Vec::new(),
     };
     text.push('\n');
-    text.push_str(table.within(look.width).trim_start_matches('\n'));
+    text.push_str(table.fit_to_width(look.width).trim_start_matches('\n'));
 }
 
 /// Formats a number with about three significant digits.

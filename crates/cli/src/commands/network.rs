@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use elbowroom::network::{
-    self, Answer as Found, Durations, NetworkFile, Promise, Reason, Request, Simulated, Simulation,
-    Verdict,
+    self, Answer as Found, ControllabilityCheck, Durations, NetworkFile, Reason, Request,
+    Simulated, Simulation, Verdict,
 };
 use serde_json::Value;
 
@@ -14,9 +14,9 @@ use crate::args::{DurationsChoice, NetworkArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::limits::push_wrapped;
-use crate::look::{BAD, FAINT, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
-use elbowroom_executive::messages::counted;
+use crate::terminal::{EMPHASIS, ERROR, HINT, SECONDARY, SUCCESS, TextLayout, styled};
+use elbowroom_executive::messages::count_with_noun;
 
 /// Maximum number of bounds printed of a reason; `--json` has all.
 const STEPS_SHOWN: usize = 12;
@@ -57,12 +57,12 @@ pub(crate) fn run(arguments: &NetworkArgs, output: &mut Output) -> Answer {
             },
         }),
     };
-    let found = network::examine(&file, &request).map_err(|error| Failure::new(error, ""))?;
+    let found = network::analyze(&file, &request).map_err(|error| Failure::new(error, ""))?;
     write_forms(arguments, &file)?;
     if arguments.json {
         output.json(&document(&arguments.file, &found)?)?;
     } else if on_stdout == 0 {
-        output::print(&report(text.name(), &found, Look::of_stdout()))?;
+        output::print(&report(text.name(), &found, TextLayout::of_stdout()))?;
     }
     Ok(if found.is_executable() {
         Exit::Yes
@@ -86,20 +86,20 @@ fn write_forms(arguments: &NetworkArgs, file: &NetworkFile) -> Result<(), Failur
     if let Some(path) = &arguments.minimal {
         match file.minimal() {
             Ok(minimal) => write_network(path, &minimal)?,
-            Err(_) => not_written(path, "the network is not consistent"),
+            Err(_) => warn_not_written(path, "the network is not consistent"),
         }
     }
     if let Some(path) = &arguments.dispatchable {
         match file.network.dispatchable() {
             Ok(form) => write_network(path, &file.dispatchable(&form))?,
-            Err(_) => not_written(path, "the network is not dynamically controllable"),
+            Err(_) => warn_not_written(path, "the network is not dynamically controllable"),
         }
     }
     Ok(())
 }
 
-fn not_written(path: &Path, why: &str) {
-    output::tell(&format!(
+fn warn_not_written(path: &Path, why: &str) {
+    output::print_to_stderr(&format!(
         "{}: {why}, so {} is not written",
         styled(HINT, "note"),
         path.display()
@@ -124,14 +124,14 @@ fn write_network(path: &Path, file: &NetworkFile) -> Result<(), Failure> {
 }
 
 /// Renders the answer as text.
-fn report(name: &str, found: &Found, look: Look) -> String {
+fn report(name: &str, found: &Found, look: TextLayout) -> String {
     let mut text = String::new();
     let mut parts = vec![
-        counted(found.points, "time point"),
-        counted(found.requirements, "requirement"),
+        count_with_noun(found.points, "time point"),
+        count_with_noun(found.requirements, "requirement"),
     ];
     if found.links > 0 {
-        parts.push(counted(found.links, "contingent link"));
+        parts.push(count_with_noun(found.links, "contingent link"));
     }
     let head = format!("{name}: {}, {}", found.read_as, parts.join(", "));
     push_wrapped(&mut text, &head, 0, look.width);
@@ -145,8 +145,8 @@ fn report(name: &str, found: &Found, look: Look) -> String {
     for (what, promise) in promises {
         let Some(promise) = promise else { continue };
         let (style, word) = match promise.verdict {
-            Verdict::Yes => (GOOD, "yes"),
-            Verdict::No => (BAD, "no"),
+            Verdict::Yes => (SUCCESS, "yes"),
+            Verdict::No => (ERROR, "no"),
             Verdict::Undecided => (HINT, "undecided"),
         };
         let _ = writeln!(text, "  {what:<24}  {}", styled(style, word));
@@ -160,14 +160,18 @@ fn report(name: &str, found: &Found, look: Look) -> String {
 
 /// Appends the reasons why properties do not hold. After a reason why the network is not consistent
 /// or not weakly controllable, further reasons are omitted.
-fn push_reasons(text: &mut String, promises: &[(&str, Option<&Promise>)], look: Look) {
+fn push_reasons(
+    text: &mut String,
+    promises: &[(&str, Option<&ControllabilityCheck>)],
+    look: TextLayout,
+) {
     let mut is_explained = false;
     for (what, promise) in promises {
         let Some(promise) = promise else { continue };
         if let Some(branches) = promise.branches {
             let line = format!(
                 "Whether it is {what} was not found out in {}; --branches allows for more.",
-                counted(branches, "branch").replace("branchs", "branches")
+                count_with_noun(branches, "branch").replace("branchs", "branches")
             );
             text.push('\n');
             push_wrapped(text, &line, 0, look.width);
@@ -184,13 +188,13 @@ fn push_reasons(text: &mut String, promises: &[(&str, Option<&Promise>)], look: 
     }
 }
 
-fn push_reason(text: &mut String, what: &str, reason: &Reason, look: Look) {
+fn push_reason(text: &mut String, what: &str, reason: &Reason, look: TextLayout) {
     let by = match reason.by.exact.as_str() {
         "inf" => "without limit".to_owned(),
         _ => format!("by {}", reason.by.short()),
     };
     let title = format!("Not {what}: these contradict each other {by}");
-    let _ = writeln!(text, "\n{}", styled(STRONG, &title));
+    let _ = writeln!(text, "\n{}", styled(EMPHASIS, &title));
     for step in reason.steps.iter().take(STEPS_SHOWN) {
         push_wrapped(text, &step.words, 2, look.width);
     }
@@ -201,7 +205,7 @@ fn push_reason(text: &mut String, what: &str, reason: &Reason, look: Look) {
         } else {
             "and more than can be listed".to_owned()
         };
-        let _ = writeln!(text, "  {}", styled(FAINT, &more));
+        let _ = writeln!(text, "  {}", styled(SECONDARY, &more));
     }
     // Other steps state the used end of a link themselves.
     let are_fixed = reason.steps.iter().any(|step| step.given == "duration");
@@ -228,7 +232,7 @@ fn push_reason(text: &mut String, what: &str, reason: &Reason, look: Look) {
     }
 }
 
-fn push_simulated(text: &mut String, simulated: &Simulated, look: Look) {
+fn push_simulated(text: &mut String, simulated: &Simulated, look: TextLayout) {
     let percent = |share: f64| format!("{:.1}%", share * 100.0);
     let [least, most] = simulated.interval;
     let durations = match simulated.durations {
@@ -243,7 +247,7 @@ fn push_simulated(text: &mut String, simulated: &Simulated, look: Look) {
         "{} of {} succeed: {}, with 95% confidence between {} and {}. Durations are drawn \
          {durations} (seed {}); points are dispatched {executor}.",
         simulated.successes,
-        counted(usize::try_from(simulated.runs).unwrap_or(usize::MAX), "run"),
+        count_with_noun(usize::try_from(simulated.runs).unwrap_or(usize::MAX), "run"),
         percent(simulated.share),
         percent(least),
         percent(most),
@@ -253,7 +257,7 @@ fn push_simulated(text: &mut String, simulated: &Simulated, look: Look) {
         let _ = write!(
             line,
             " In {} a duration lies outside the bounds of its link.",
-            counted(
+            count_with_noun(
                 usize::try_from(simulated.outside).unwrap_or(usize::MAX),
                 "run"
             )
@@ -262,7 +266,7 @@ fn push_simulated(text: &mut String, simulated: &Simulated, look: Look) {
     text.push('\n');
     push_wrapped(text, &line, 0, look.width);
     if !simulated.broken.is_empty() {
-        let _ = writeln!(text, "\n{}", styled(STRONG, "Broken most often"));
+        let _ = writeln!(text, "\n{}", styled(EMPHASIS, "Broken most often"));
         for broken in &simulated.broken {
             let line = format!("{} ({})", broken.requirement, broken.runs);
             push_wrapped(text, &line, 2, look.width);

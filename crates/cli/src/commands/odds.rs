@@ -12,9 +12,9 @@ use crate::args::OddsArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::look::Look;
 use crate::output::{self, Output};
-use crate::stopwatch::Stopwatch;
+use crate::terminal::TextLayout;
+use crate::time_limit::Stopwatch;
 
 /// Computes the success probability of a plan.
 pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
@@ -25,7 +25,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
             &task,
             path,
             &RoundingRule::default(),
-            input::FIXED_TIMES,
+            input::FIXED_TIMES_ADVICE,
             output,
         )?),
         None => None,
@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&answer)?;
     } else {
-        let text = text::of(&answer, arguments.layers, Look::of_stdout());
+        let text = text::render(&answer, arguments.layers, TextLayout::of_stdout());
         output::print(&text)?;
     }
     written?;
@@ -99,7 +99,11 @@ fn settings(arguments: &OddsArgs) -> Result<OddsSettings, Failure> {
                 Failure::new(error, "`elbowroom run --help` describes them all")
             },
         )?;
-        if let Some(odd) = settings.executors.iter().find(|spec| spec.asks_odds()) {
+        if let Some(odd) = settings
+            .executors
+            .iter()
+            .find(|spec| spec.needs_comparator())
+        {
             return Err(Failure::new(
                 format!("`{odd}` compares plans while it executes one, which is not sampled here"),
                 "leave out the number, or use `elbowroom compare`",
@@ -115,7 +119,8 @@ fn read_likelihoods(
     task: &elbowroom::model::Task,
 ) -> Result<Arc<elbowroom::probability::Likelihoods>, Failure> {
     let read = likelihoods::read(text.clone(), task).map_err(|wrong| {
-        Failure::from(wrong).advised("docs/formats/likelihoods.md describes likelihood files")
+        Failure::from(wrong)
+            .with_default_advice("docs/formats/likelihoods.md describes likelihood files")
     })?;
     Ok(Arc::new(read))
 }

@@ -1,16 +1,16 @@
 //! `elbowroom plan`: planning with the embedded planner or another one.
 
-mod reading;
+mod monitor;
+mod problem_input;
 mod text;
-mod watch;
 
 use std::sync::Arc;
 
 use elbowroom::answers::plan::{
     BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, plan, plan_with,
-    unread,
+    stopped_before_reading,
 };
-use elbowroom::answers::{RequestError, Watcher};
+use elbowroom::answers::{Observer, RequestError};
 use elbowroom::execute::SpecError;
 use elbowroom::external::Planner;
 use elbowroom::model::Task;
@@ -18,15 +18,15 @@ use elbowroom::pddl::write_plan;
 use elbowroom::sim::WorldModel;
 use elbowroom_calendar::Calendar;
 
-use super::run::spec::contradiction;
-use super::threads::{self, EVERY_PROCESSOR};
+use super::run::spec::contradiction_failure;
+use super::threads::{self, ALL_PROCESSORS};
 use crate::args::{EMBEDDED, PlanArgs, PlanObjectiveChoice};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input::ReadProblem;
-use crate::look::Look;
 use crate::output::Output;
+use crate::terminal::TextLayout;
 use crate::{input, output};
-use watch::Watch;
+use monitor::PlanMonitor;
 
 /// Number of variants of the problem for which plans are compared without a time limit.
 const SEARCHES: usize = 40;
@@ -37,25 +37,25 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     let planner = if arguments.planner.eq_ignore_ascii_case(EMBEDDED) {
         None
     } else {
-        Some(named(arguments)?)
+        Some(planner_of(arguments)?)
     };
-    let threads = threads::of(arguments.jobs, EVERY_PROCESSOR, planner.is_none())?;
+    let threads = threads::thread_count(arguments.jobs, ALL_PROCESSORS, planner.is_none())?;
     if let (true, Some(planner)) = (arguments.self_overlap, &planner) {
         let error = SpecError::SelfOverlap(planner.name.clone());
-        return Err(contradiction(error));
+        return Err(contradiction_failure(error));
     }
-    let mut watch = Watch::start(arguments);
-    let read = match reading::read(arguments, &mut watch, output)? {
+    let mut watch = PlanMonitor::start(arguments);
+    let read = match problem_input::read(arguments, &mut watch, output)? {
         Ok(read) => read,
         Err(halt) => {
             let name = planner.as_ref().map_or(EMBEDDED, |planner| &planner.name);
-            let outcome = unread(name, halt, watch.elapsed());
+            let outcome = stopped_before_reading(name, halt, watch.elapsed());
             drop(watch);
             return print(arguments, &outcome, None, output);
         }
     };
     if let Some(objective) = arguments.objective {
-        return best(arguments, objective, planner.as_ref(), read, watch, output);
+        return run_with_objective(arguments, objective, planner.as_ref(), read, watch, output);
     }
     let ReadProblem {
         task,
@@ -74,7 +74,7 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
         None => plan(&mut request, &mut watch).map_err(unsupported)?,
         Some(planner) => {
             // This planner enforces the limits itself.
-            let limit = watch.hand_over_the_limits();
+            let limit = watch.take_limits();
             let sources = [&domain, &problem];
             plan_with(planner, &mut request, sources, limit, &mut watch).map_err(text::failure)?
         }
@@ -97,12 +97,12 @@ fn write_exactly(arguments: &PlanArgs, task: &Task, outcome: &mut PlanOutcome) {
 }
 
 /// Searches for the best plan by an objective and prints it.
-fn best(
+fn run_with_objective(
     arguments: &PlanArgs,
     objective: PlanObjectiveChoice,
     planner: Option<&Planner>,
     read: ReadProblem,
-    mut watch: Watch,
+    mut watch: PlanMonitor,
     output: &mut Output,
 ) -> Answer {
     if planner.is_some() {
@@ -130,7 +130,7 @@ fn best(
         (PlanObjectiveChoice::Probability, Some(path)) => {
             let source = input::source(path, "world")?;
             world = WorldModel::read(source, task.problem())
-                .map_err(|wrong| contradiction(SpecError::World(wrong)))?;
+                .map_err(|wrong| contradiction_failure(SpecError::World(wrong)))?;
             PlanAim::Probability(&world)
         }
     };
@@ -151,7 +151,7 @@ fn best(
 }
 
 /// Returns the planner of the arguments.
-fn named(arguments: &PlanArgs) -> Result<Planner, Failure> {
+fn planner_of(arguments: &PlanArgs) -> Result<Planner, Failure> {
     Planner::named(&arguments.planner).map_err(|error| {
         Failure::new(
             error,
@@ -179,7 +179,7 @@ fn print(
         ..
     } = &answer.finding
     {
-        output::tell(&text::repaired(&answer.planner, objection));
+        output::print_to_stderr(&text::repair_text(&answer.planner, objection));
     }
     let plan = text::plan(&answer.finding);
     let plan = match calendar {
@@ -198,12 +198,12 @@ fn print(
     } else if let (Some(plan), None) = (&plan, &arguments.output) {
         output::print(plan)?;
     }
-    let certified = text::certified(answer, Look::of_stdout());
+    let certified = text::certificate_text(answer, TextLayout::of_stdout());
     if let Some(line) = certified.filter(|_| !arguments.json) {
-        output::tell(&line);
+        output::print_to_stderr(&line);
     }
     if let Some(summary) = text::summary(answer).filter(|_| !arguments.json) {
-        output::tell(&summary);
+        output::print_to_stderr(&summary);
     }
     Ok(match &answer.finding {
         PlanFinding::Plan { .. } => Exit::Yes,

@@ -25,7 +25,7 @@ pub(crate) fn run(arguments: &ReportArgs) -> Answer {
         (None, false) if io::stdout().is_terminal() => {
             return Err(Failure::new(
                 "a page is not for a terminal",
-                format!("write it to a file: -o {}", suggested(&path).display()),
+                format!("write it to a file: -o {}", default_output(&path).display()),
             ));
         }
         (None, false) => Some(PathBuf::from("-")),
@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &ReportArgs) -> Answer {
 }
 
 /// Returns the input's name with another extension.
-fn suggested(input: &Path) -> PathBuf {
+fn default_output(input: &Path) -> PathBuf {
     let stem = input.file_stem().filter(|stem| *stem != "-");
     Path::new(stem.unwrap_or_else(|| "report".as_ref())).with_extension("html")
 }

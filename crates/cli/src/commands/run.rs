@@ -35,17 +35,17 @@ use elbowroom_executive::run::{JournaledOutcome, RunError, RunHost, RunInputs};
 use elbowroom_executive::trace_buffer::TraceBuffer;
 
 use crate::args::RunArgs;
-use crate::calendar::dated;
+use crate::calendar::with_calendar;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::look::{BAD, styled};
 use crate::output::{self, Output};
-use crate::stopwatch::Stopwatch;
+use crate::terminal::{ERROR, styled};
+use crate::time_limit::Stopwatch;
 use page::Page;
 use progress_line::ProgressLine;
 use resume::ResumeHost;
-use spec::contradiction;
+use spec::contradiction_failure;
 use trace_file::TraceFile;
 use viewers::Viewers;
 
@@ -73,12 +73,12 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
             Some(_) => Some(Rational::ONE),
             None => arguments.realtime.clone(),
         };
-        let (problem, at) = dated((&arguments.calendar, factor), domain, problem, output)?;
+        let (problem, at) = with_calendar((&arguments.calendar, factor), domain, problem, output)?;
         since = at;
         Ok((&problem).into())
     };
     let (mut spec, worlds) = spec::of(arguments, domain, problem)?;
-    spec.is_attended = arguments.token.is_some();
+    spec.is_interactive = arguments.token.is_some();
     let (task, first) = checked(arguments, &mut spec, &worlds, output)?;
     let interrupt = Interrupt::listen_with_world();
     let journal = journal(arguments, RESUME)?;
@@ -86,10 +86,10 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let job = Job {
         journal,
         started: &|| (),
-        since,
+        clock: since,
         spec: &spec,
         task: &task,
-        first,
+        first_plan: first,
         interrupt: &interrupt,
         operator: &page.operator,
     };
@@ -124,7 +124,7 @@ pub(super) fn background(arguments: &RunArgs, interrupt: &Interrupt) -> Backgrou
     BackgroundSettings {
         stop: interrupt.stop().clone(),
         signal: CompletionSignal::default(),
-        most_memory: arguments.planner_memory.map(|megabytes| megabytes << 20),
+        memory_limit: arguments.planner_memory.map(|megabytes| megabytes << 20),
     }
 }
 
@@ -157,20 +157,20 @@ pub(super) fn checked(
             &task,
             path,
             &RoundingRule::with_tolerance(arguments.tolerance.clone()),
-            input::FIXED_TIMES,
+            input::FIXED_TIMES_ADVICE,
             output,
         )?),
         None => None,
     };
-    spec.likelihoods(&task).map_err(contradiction)?;
+    spec.likelihoods(&task).map_err(contradiction_failure)?;
     for source in worlds {
         WorldModel::read(source, task.problem())
-            .map_err(|wrong| contradiction(SpecError::World(wrong)))?;
+            .map_err(|wrong| contradiction_failure(SpecError::World(wrong)))?;
     }
     check_vary(&task, &spec.vary).map_err(|error| {
         Failure::new(error, "`elbowroom help envelope` says what --vary can name")
     })?;
-    spec.check().map_err(contradiction)?;
+    spec.check().map_err(contradiction_failure)?;
     Ok((Arc::new(task), first))
 }
 
@@ -183,24 +183,24 @@ fn show(
     if arguments.json {
         output.document(&outcome.answer)
     } else {
-        let ends = text::Ends {
-            has_lost,
-            is_lasting: spec.is_lasting,
+        let ends = text::RunEnd {
+            has_lost_journal: has_lost,
+            is_persistent: spec.is_persistent,
         };
-        output::print(&text::human(&outcome.answer, &outcome.report, ends))?;
+        output::print(&text::render(&outcome.answer, &outcome.report, ends))?;
         let is_given = arguments.plan().is_some() && outcome.report.starts == 0;
         if let Verdict::NoPlan { why, .. } = outcome.verdict()
             && is_given
             && why.starts_with("the plan is not valid")
         {
-            input::tell_about_repairs();
+            input::advise_repair();
         }
         Ok(())
     }
 }
 
 /// Prints the outcome of a run with a journal.
-pub(super) fn conclude(
+pub(super) fn print_outcome(
     asked: (&RunArgs, &RunSpec),
     JournaledOutcome {
         mut outcome,
@@ -219,7 +219,7 @@ pub(super) fn conclude(
         outcome.answer.report.why = Some(format!("the journal cannot be written: {why}"));
     }
     show(asked, &outcome, has_lost, output)?;
-    let resume = if asked.1.is_lasting {
+    let resume = if asked.1.is_persistent {
         RESUME_SERVE
     } else {
         RESUME
@@ -260,7 +260,7 @@ fn limits(arguments: &RunArgs) -> ProcessLimits {
 fn failure(error: RunError) -> Failure {
     match error {
         RunError::Problem(mistakes) => mistakes.into(),
-        RunError::Spec(error) => contradiction(error),
+        RunError::Spec(error) => contradiction_failure(error),
         RunError::Failed(error) => error.into(),
     }
 }
@@ -270,7 +270,7 @@ struct CommandHost<'a> {
     arguments: &'a RunArgs,
     interrupt: &'a Interrupt,
     /// The viewers, once they are open.
-    views: OnceCell<Viewers<'a>>,
+    viewers: OnceCell<Viewers<'a>>,
     /// Called when execution begins.
     started: &'a dyn Fn(),
     /// Support for operators of a resumed run.
@@ -280,7 +280,7 @@ struct CommandHost<'a> {
 impl CommandHost<'_> {
     /// Closes the viewers after a run with an outcome.
     fn close<T, E>(self, outcome: Result<T, E>) -> Result<T, E> {
-        if let (Ok(_), Some(views)) = (&outcome, self.views.into_inner()) {
+        if let (Ok(_), Some(views)) = (&outcome, self.viewers.into_inner()) {
             views.close();
         }
         outcome
@@ -306,7 +306,7 @@ impl RunHost for CommandHost<'_> {
         _: &OperatorInterface,
     ) -> Result<Option<TraceBuffer>, Error> {
         let views = Viewers::open(self.arguments, spec, task)?;
-        Ok(self.views.get_or_init(|| views).buffer().cloned())
+        Ok(self.viewers.get_or_init(|| views).buffer().cloned())
     }
 
     fn started(&self) {
@@ -318,7 +318,7 @@ impl RunHost for CommandHost<'_> {
 pub(super) struct Job<'a> {
     pub(super) spec: &'a RunSpec,
     pub(super) task: &'a Arc<Task>,
-    pub(super) first: Option<TimeTriggeredPlan>,
+    pub(super) first_plan: Option<TimeTriggeredPlan>,
     pub(super) interrupt: &'a Interrupt,
     pub(super) operator: &'a OperatorInterface,
     /// The journal, still empty, if the run has one.
@@ -326,7 +326,7 @@ pub(super) struct Job<'a> {
     /// Called when execution begins. The first record is on the disk if there is a journal.
     pub(super) started: &'a dyn Fn(),
     /// Clock that started at time 0, if that is a date; otherwise time 0 is the start of the run.
-    pub(super) since: Option<Clock>,
+    pub(super) clock: Option<Clock>,
 }
 
 impl Job<'_> {
@@ -343,12 +343,12 @@ impl Job<'_> {
         let inputs = RunInputs {
             spec,
             task: self.task,
-            first_plan: self.first,
+            first_plan: self.first_plan,
             embedded: None,
             operator: self.operator,
             background: background(arguments, interrupt),
             limits: limits(arguments),
-            since: self.since,
+            since: self.clock,
             observer: Some(Box::new(move |entry| {
                 line.update(entry);
                 if let Some(learns) = &mut learns {
@@ -360,7 +360,7 @@ impl Job<'_> {
         let host = CommandHost {
             arguments,
             interrupt,
-            views: OnceCell::new(),
+            viewers: OnceCell::new(),
             started: self.started,
             resume: None,
         };
@@ -371,7 +371,7 @@ impl Job<'_> {
                 learning.finish();
             }
             let outcome = host.close(outcome).map_err(failure)?;
-            return conclude((arguments, spec), outcome, output);
+            return print_outcome((arguments, spec), outcome, output);
         }
         let mut file = TraceFile::open(arguments.trace.as_deref())?;
         let outcome = inputs.execute(&mut |line| file.write(line), &host, &mut watcher);
@@ -396,8 +396,8 @@ fn exit(outcome: &RunOutcome, trace: Option<String>) -> Answer {
         let record = trace.map_or_else(String::new, |trace| {
             format!(" The record of the run is {trace}.")
         });
-        let label = styled(BAD, "bug");
-        output::tell(&format!(
+        let label = styled(ERROR, "bug");
+        output::print_to_stderr(&format!(
             "{label}: this execution is not valid:\n  {}\nPlease report it, with domain and problem.{record}",
             invalid.join("\n  ")
         ));

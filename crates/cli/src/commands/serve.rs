@@ -12,7 +12,7 @@ use super::run::resume::{self, ResumeHost};
 use super::run::spec;
 use super::run::{Job, RESUME_SERVE, access, checked, journal};
 use crate::args::ServeArgs;
-use crate::calendar::dated;
+use crate::calendar::with_calendar;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
@@ -24,10 +24,10 @@ use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::{Error, make_persistent};
 
 /// Default length of a journal at which it is rotated, in bytes.
-const LONG: u64 = 10_000_000;
+const DEFAULT_JOURNAL_SIZE: u64 = 10_000_000;
 
 /// The name of a problem submitted by a client.
-const GIVEN: &str = "the problem that was given";
+const SUBMITTED_PROBLEM: &str = "the problem that was given";
 
 /// Runs the executive until it is stopped.
 pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
@@ -44,7 +44,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         if let Some(router) = server.router.get() {
             router.close();
         }
-        return in_order(answer);
+        return interrupt_as_success(answer);
     }
     let Some(domain) = &arguments.run.domain else {
         return Err(Failure::new(
@@ -57,22 +57,22 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     let problem = |domain: &NamedText| match &arguments.run.problem {
         Some(problem) => {
             let problem = input::source(problem, "problem")?;
-            let (problem, at) = dated(arguments.calendar(), domain, problem, output)?;
+            let (problem, at) = with_calendar(arguments.calendar(), domain, problem, output)?;
             since = at;
             Ok((&problem).into())
         }
         None => Ok(NamedText {
-            name: GIVEN.to_owned(),
+            name: SUBMITTED_PROBLEM.to_owned(),
             text: String::new(),
         }),
     };
     let (mut spec, worlds) = spec::of(&arguments.run, domain, problem)?;
-    lasting(&mut spec, arguments);
+    configure_executive(&mut spec, arguments);
     let given = if arguments.run.problem.is_some() {
         Some(checked(&arguments.run, &mut spec, &worlds, output)?)
     } else {
         check_domain(&domain_text)?;
-        spec.check().map_err(spec::contradiction)?;
+        spec.check().map_err(spec::contradiction_failure)?;
         None
     };
     let journal = journal(&arguments.run, RESUME_SERVE)?;
@@ -99,7 +99,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         }
     };
     let answer = router
-        .begin(&spec, &task)
+        .begin_run(&spec, &task)
         .map_err(Failure::from)
         .and_then(|operator| {
             if client.is_none() {
@@ -108,12 +108,12 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
             let job = Job {
                 spec: &spec,
                 task: &task,
-                first,
+                first_plan: first,
                 interrupt: &interrupt,
                 operator: &operator,
                 journal,
                 started: &started,
-                since,
+                clock: since,
             };
             job.execute(&arguments.run, output)
         });
@@ -121,11 +121,11 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         client.refuse(refusal(503, failure));
     }
     router.close();
-    in_order(answer)
+    interrupt_as_success(answer)
 }
 
 /// A problem, and its first plan if one is given.
-type Begun = (Arc<Task>, Option<TimeTriggeredPlan>);
+type InitialRun = (Arc<Task>, Option<TimeTriggeredPlan>);
 
 /// Waits for a problem that can be executed. Rejects other problems with the reason. Returns `None`
 /// if the executive is stopped before.
@@ -134,16 +134,17 @@ fn await_problem(
     arguments: &ServeArgs,
     (spec, worlds): (&mut RunSpec, &[Source]),
     output: &mut Output,
-) -> Option<(Begun, Option<Clock>, Client)> {
+) -> Option<(InitialRun, Option<Clock>, Client)> {
     let interrupt = Interrupt::listen_with_world();
     loop {
         let (text, client) = router.initial_problem().wait(interrupt.stop())?.parts();
-        let given = Source::new(GIVEN, text);
-        let begun =
-            dated(arguments.calendar(), &spec.domain, given, output).and_then(|(problem, at)| {
+        let given = Source::new(SUBMITTED_PROBLEM, text);
+        let begun = with_calendar(arguments.calendar(), &spec.domain, given, output).and_then(
+            |(problem, at)| {
                 spec.problem = (&problem).into();
                 Ok((checked(&arguments.run, spec, worlds, output)?, at))
-            });
+            },
+        );
         match begun {
             Ok((begun, at)) => return Some((begun, at, client)),
             Err(failure) => {
@@ -164,8 +165,8 @@ fn refusal(status: u16, failure: &Failure) -> ApiError {
 }
 
 /// Adapts a specification for an executive.
-fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) {
-    spec.is_lasting = true;
+fn configure_executive(spec: &mut RunSpec, arguments: &ServeArgs) {
+    spec.is_persistent = true;
     // An explicitly requested first plan is kept, so that an error is reported if it is not
     // available.
     if arguments.run.first_plan_by.is_none() {
@@ -190,14 +191,16 @@ fn check_domain(domain: &NamedText) -> Result<(), Failure> {
     let nothing = format!("(define (problem nothing) (:domain {name}) (:init) (:goal (and)))");
     let nothing = Source::new("nothing", nothing);
     let (problem, _) = pddl::read_problem(&domain.source(), &nothing)?;
-    match Task::new(problem).only_judged() {
-        Some(feature) => Err(spec::contradiction(SpecError::Unheeded(feature))),
+    match Task::new(problem).validator_only_feature() {
+        Some(feature) => Err(spec::contradiction_failure(SpecError::UnsupportedFeature(
+            feature,
+        ))),
         None => Ok(()),
     }
 }
 
 /// Maps an interrupt to success: an executive normally ends by a request to stop.
-fn in_order(answer: Answer) -> Answer {
+fn interrupt_as_success(answer: Answer) -> Answer {
     answer.map(|exit| match exit {
         Exit::Interrupted => Exit::Yes,
         other => other,
@@ -224,7 +227,7 @@ fn check(arguments: &ServeArgs) -> Result<(), Failure> {
             "give --journal FILE, or leave out --journal-size and --journal-segments",
         ));
     }
-    if run.is_spoiled() {
+    if run.has_adversary() {
         return Err(Failure::new(
             "--world spoiler has no wall clock",
             "name a world file, or a program with --world-process",
@@ -255,15 +258,15 @@ fn announce(arguments: &ServeArgs, router: &ApiRouter) {
         None => "; read-only, as there is no --token",
     };
     let own = router.address();
-    output::tell(&format!("listening at http://{own}/{with_token}"));
+    output::print_to_stderr(&format!("listening at http://{own}/{with_token}"));
     if let Some(path) = &arguments.socket {
-        output::tell(&format!("listening at {}", path.display()));
+        output::print_to_stderr(&format!("listening at {}", path.display()));
     }
 }
 
 fn segments(arguments: &ServeArgs) -> Segments {
     Segments {
-        size: arguments.journal_size.unwrap_or(LONG),
+        size: arguments.journal_size.unwrap_or(DEFAULT_JOURNAL_SIZE),
         kept: arguments.journal_segments.unwrap_or(1),
     }
 }
@@ -281,14 +284,14 @@ impl ResumeHost for Server<'_> {
         task: &Arc<Task>,
         interrupt: &Interrupt,
     ) -> Result<OperatorInterface, Error> {
-        if !spec.is_lasting {
+        if !spec.is_persistent {
             return Err(Error::new(
                 "this is the journal of a run that ends with its goal",
                 "continue with `elbowroom run --resume`",
             ));
         }
         let router = open(self.arguments, interrupt, &spec.domain)?;
-        let operator = router.begin(spec, task);
+        let operator = router.begin_run(spec, task);
         announce(self.arguments, &router);
         let _ = self.router.set(router);
         operator

@@ -2,15 +2,15 @@
 
 use elbowroom::RoundingRule;
 use elbowroom::answers::stn::{StnFinding, StnOutcome, StnRequest, stn};
-use elbowroom::graph;
+use elbowroom::dot;
 use elbowroom::model::Task;
 use elbowroom::plan::{ParametrizedPlan, format};
 
 use crate::args::StnArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
-use crate::look::{BAD, Look, styled};
 use crate::output::Output;
+use crate::terminal::{ERROR, TextLayout, styled};
 use crate::{input, output};
 
 /// Writes the STN plan and the other requested output.
@@ -34,7 +34,7 @@ fn network(
     output: &mut Output,
 ) -> Answer {
     if let Some(path) = &arguments.dot {
-        output::write_file(path, &graph::to_dot(task, plan))?;
+        output::write_file(path, &dot::to_dot(task, plan))?;
     }
     let is_dot_on_stdout = arguments
         .dot
@@ -58,10 +58,10 @@ fn invalid(arguments: &StnArgs, outcome: &StnOutcome, output: &mut Output) -> An
     if arguments.json {
         output.document(&outcome.answer)?;
     } else if let StnFinding::Invalid { violation } = &outcome.answer.finding {
-        let mut text = format!("{}: {file} does not work\n", styled(BAD, "invalid"));
-        push_wrapped(&mut text, &violation.message, 2, Look::PLAIN.width);
-        output::tell(text.trim_end());
-        input::tell_about_repairs();
+        let mut text = format!("{}: {file} does not work\n", styled(ERROR, "invalid"));
+        push_wrapped(&mut text, &violation.message, 2, TextLayout::PLAIN.width);
+        output::print_to_stderr(text.trim_end());
+        input::advise_repair();
     }
     Ok(Exit::No)
 }

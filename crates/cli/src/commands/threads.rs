@@ -3,10 +3,14 @@
 use crate::exit::Failure;
 
 /// Value of `jobs` that requests one thread per processor.
-pub(super) const EVERY_PROCESSOR: usize = 0;
+pub(super) const ALL_PROCESSORS: usize = 0;
 
 /// Returns the requested number of threads, or else `usual`.
-pub(super) fn of(jobs: Option<usize>, usual: usize, is_embedded: bool) -> Result<usize, Failure> {
+pub(super) fn thread_count(
+    jobs: Option<usize>,
+    usual: usize,
+    is_embedded: bool,
+) -> Result<usize, Failure> {
     if jobs.is_some() && !is_embedded {
         return Err(Failure::new(
             "--jobs says how many threads the embedded planner uses; another one has its own settings",
@@ -14,7 +18,7 @@ pub(super) fn of(jobs: Option<usize>, usual: usize, is_embedded: bool) -> Result
         ));
     }
     Ok(match jobs.unwrap_or(usual) {
-        EVERY_PROCESSOR => std::thread::available_parallelism().map_or(1, usize::from),
+        ALL_PROCESSORS => std::thread::available_parallelism().map_or(1, usize::from),
         jobs => jobs,
     })
 }

@@ -4,19 +4,19 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use elbowroom::RoundingRule;
-use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, PlanChecked, check};
+use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, ValidationReport, check};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 
 use crate::args::ValArgs;
 use crate::exit::{Answer, Exit, Failure};
-use crate::look::{HINT, styled};
 use crate::output::Output;
+use crate::terminal::{HINT, styled};
 use crate::{input, output};
 
 /// Advice if the given plan is an STN plan.
-const FOR_NETWORKS: &str = "`elbowroom envelope` says whether all of them work";
+const NETWORK_ADVICE: &str = "`elbowroom envelope` says whether all of them work";
 
 /// Number of decimal digits printed for times.
 const DIGITS: u32 = 6;
@@ -31,16 +31,16 @@ pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
         }
     };
     let settings = Settings::like_val(arguments.tolerance.clone());
-    let mut tally = Tally::default();
+    let mut tally = ValidationSummary::default();
     // VAL has its own rules about rounded numbers.
     let as_printed = RoundingRule::with_tolerance(Some(Rational::ZERO));
     for path in &arguments.plans {
-        let plan = match input::time_triggered(&task, path, &as_printed, FOR_NETWORKS, output) {
+        let plan = match input::time_triggered(&task, path, &as_printed, NETWORK_ADVICE, output) {
             Ok(plan) => plan,
             Err(failure) => {
                 output::print("Bad plan description!\n")?;
                 output.fail(&failure, false);
-                tally.bad.push(path.display().to_string());
+                tally.unreadable.push(path.display().to_string());
                 continue;
             }
         };
@@ -66,31 +66,33 @@ pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
         output::print(&text)?;
     }
     output::print(&tally.text())?;
-    Ok(match (tally.bad.is_empty(), tally.failed.is_empty()) {
-        (false, _) => Exit::BadInput,
-        (true, false) => Exit::No,
-        (true, true) => Exit::Yes,
-    })
+    Ok(
+        match (tally.unreadable.is_empty(), tally.failed.is_empty()) {
+            (false, _) => Exit::BadInput,
+            (true, false) => Exit::No,
+            (true, true) => Exit::Yes,
+        },
+    )
 }
 
 /// The results of the plans so far.
 #[derive(Default)]
-struct Tally {
+struct ValidationSummary {
     /// Plan value and file name.
     valid: Vec<(String, String)>,
     failed: Vec<String>,
     /// Unreadable plans.
-    bad: Vec<String>,
+    unreadable: Vec<String>,
 }
 
-impl Tally {
+impl ValidationSummary {
     fn add(
         &mut self,
         text: &mut String,
         is_verbose: bool,
         task: &Task,
         plan: &TimeTriggeredPlan,
-        checked: PlanChecked,
+        checked: ValidationReport,
     ) {
         let name = checked.plan;
         match checked.finding {
@@ -140,8 +142,8 @@ impl Tally {
         if self.failed.len() > 1 {
             let _ = writeln!(text, "\nFailed plans:\n {} ", self.failed.join(" "));
         }
-        if !self.bad.is_empty() {
-            let _ = writeln!(text, "\nBad plans:\n {} ", self.bad.join(" "));
+        if !self.unreadable.is_empty() {
+            let _ = writeln!(text, "\nBad plans:\n {} ", self.unreadable.join(" "));
         }
         text
     }
@@ -196,7 +198,7 @@ fn equal_times(settings: &Settings, times: &BTreeSet<Rational>) -> Option<[Ratio
 fn warn_about_equal_times(plan: &str, first: &Rational, later: &Rational, tolerance: &Rational) {
     // The group width is a tenth of the tolerance.
     let finer = later - first;
-    output::tell(&format!(
+    output::print_to_stderr(&format!(
         "{}: {plan}: the times {} and {} count as equal at -t {}, and so do others that are \
          no more than {} apart\n  {}: try -t {}",
         styled(HINT, "warning"),

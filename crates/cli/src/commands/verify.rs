@@ -10,24 +10,24 @@ use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::sim::WorldModel;
 use elbowroom::verify::{
-    AnswerError, Distributions, Inside, Plan, Verified, epsilon_of, verify_answer,
+    AnswerError, Distributions, InsideCheck, Plan, Verified, epsilon_of, verify_answer,
     verify_answer_in_world,
 };
-use elbowroom::{AnyPlan, RoundingRule, chance, given_plan};
+use elbowroom::{AnyPlan, RoundingRule, duration_distribution, given_plan};
 use serde_json::{Value, json};
 
 use crate::args::{ProblemArgs, VerifyArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
-use crate::look::{BAD, GOOD, Look, styled};
 use crate::output::{self, Output};
+use crate::terminal::{ERROR, SUCCESS, TextLayout, styled};
 use crate::{input, number};
 
 /// Checks an answer and prints the proved claims.
 pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
     let source = input::source(&arguments.answer, "answer")?;
     let name = source.name();
-    if no_plan::is_meant(source.text()) {
+    if no_plan::is_plan_answer(source.text()) {
         return no_plan::run(arguments, &source, output);
     }
     let (verdict, is_derived) = match files(arguments)? {
@@ -43,7 +43,10 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
             let plan = input::any_plan(&task, plan, &RoundingRule::default(), output)?;
             let world = arguments.world.as_deref();
             let world = world.map(|path| input::world(path, &task)).transpose()?;
-            (derived(source.text(), &task, &plan, world.as_ref()), true)
+            (
+                verify_against_files(source.text(), &task, &plan, world.as_ref()),
+                true,
+            )
         }
     };
     match verdict {
@@ -51,7 +54,12 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
             if arguments.json {
                 output.json(&document(Ok(&verified), is_derived))?;
             } else {
-                output::print(&proven(name, &verified, is_derived, Look::of_stdout()))?;
+                output::print(&proof_text(
+                    name,
+                    &verified,
+                    is_derived,
+                    TextLayout::of_stdout(),
+                ))?;
             }
             Ok(Exit::Yes)
         }
@@ -63,8 +71,13 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
             if arguments.json {
                 output.json(&document(Err(&wrong), is_derived))?;
             } else {
-                let mut text = format!("{}: {name}\n", styled(BAD, "not proved"));
-                push_wrapped(&mut text, &format!("{wrong}."), 2, Look::of_stdout().width);
+                let mut text = format!("{}: {name}\n", styled(ERROR, "not proved"));
+                push_wrapped(
+                    &mut text,
+                    &format!("{wrong}."),
+                    2,
+                    TextLayout::of_stdout().width,
+                );
                 output::print(&text)?;
             }
             Ok(if wrong.is_limit() {
@@ -77,7 +90,7 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
 }
 
 /// Checks an answer against a problem, a plan, and a world if there is one.
-fn derived(
+fn verify_against_files(
     answer: &str,
     task: &Task,
     plan: &AnyPlan,
@@ -85,7 +98,7 @@ fn derived(
 ) -> Result<Verified, AnswerError> {
     let of_world = world.map(|world| {
         |action: &str, planned: &Rational| {
-            chance(action, planned, world).map_err(|wrong| wrong.to_string())
+            duration_distribution(action, planned, world).map_err(|wrong| wrong.to_string())
         }
     });
     let world = of_world.as_ref().map(|own| own as Distributions<'_>);
@@ -150,7 +163,7 @@ fn document(verdict: Result<&Verified, &AnswerError>, is_derived: bool) -> Value
     document
 }
 
-fn proven(name: &str, verified: &Verified, is_derived: bool, look: Look) -> String {
+fn proof_text(name: &str, verified: &Verified, is_derived: bool, look: TextLayout) -> String {
     let mut text = String::new();
     if !verified.assumes.is_empty() {
         let without = if is_derived {
@@ -165,7 +178,7 @@ fn proven(name: &str, verified: &Verified, is_derived: bool, look: Look) -> Stri
         }
         text.push('\n');
     }
-    let _ = writeln!(text, "{}: {name}", styled(GOOD, "proved"));
+    let _ = writeln!(text, "{}: {name}", styled(SUCCESS, "proved"));
     let value = number::nearest(&verified.value);
     let bound = number::nearest(&verified.bound);
     let claim = if verified.value == verified.bound {
@@ -209,13 +222,13 @@ fn proven(name: &str, verified: &Verified, is_derived: bool, look: Look) -> Stri
         );
         push_wrapped(&mut text, &derived, 2, look.width);
     } else {
-        push_wrapped(&mut text, &inside(verified.inside), 2, look.width);
+        push_wrapped(&mut text, &containment_text(verified.inside), 2, look.width);
     }
     text
 }
 
 /// Describes the proof that the box is inside the envelope.
-fn inside(inside: Option<Inside>) -> String {
+fn containment_text(inside: Option<InsideCheck>) -> String {
     let Some(inside) = inside else {
         return "That the box is inside is not part of the certificate: `elbowroom envelope ... \
                 --contains` checks the box."

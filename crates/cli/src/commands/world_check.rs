@@ -1,7 +1,7 @@
 //! `elbowroom world-check`: conformance test of a program with the world protocol.
 
-mod player;
-mod resumed;
+mod protocol_driver;
+mod restart_check;
 mod table;
 
 use std::fmt::Write as _;
@@ -17,13 +17,13 @@ use serde_json::json;
 use crate::args::{ProblemArgs, WorldCheckArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
-use crate::look::{BAD, GOOD, HINT, Look, styled};
 use crate::output::{self, Output};
-use crate::wrap::wrapped;
+use crate::terminal::{ERROR, HINT, SUCCESS, TextLayout, styled};
+use crate::wrap::wrap;
 use elbowroom_executive::messages::{escape_control, excerpt};
 use elbowroom_executive::world_protocol::{Capability, Greeting, launch};
-use player::{Gone, Player};
-use resumed::resumed;
+use protocol_driver::{ProtocolDriver, WorldLost};
+use restart_check::check_restart;
 use table::{Check, Findings, Outcome, Row};
 
 /// Default domain, for checks without a plan.
@@ -36,10 +36,10 @@ const PROBLEM: &str =
 const ACTION: &str = "(wait-a-second)";
 
 /// Maximum time of an action beyond three times its planned duration, in seconds of the world.
-const PATIENCE: i64 = 10;
+const END_TOLERANCE: i64 = 10;
 
 /// Maximum time from a cancel to the end of the action, in seconds of the world.
-const OBEDIENCE: i64 = 5;
+const CANCEL_TOLERANCE: i64 = 5;
 
 /// Runs the protocol with the world and prints the violations.
 pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
@@ -53,28 +53,28 @@ pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
     let patience = Duration::try_from_secs_f64(arguments.answer_within.to_f64());
     let patience = patience.unwrap_or(Duration::MAX);
     let task = Arc::new(task);
-    let (rows, greeting) = match Player::new(program, &task, patience) {
+    let (rows, greeting) = match ProtocolDriver::new(program, &task, patience) {
         Ok(mut player) => {
-            let outcome = play(&mut player, &task, &actions);
+            let outcome = run_actions(&mut player, &task, &actions);
             let greeting = player.greeting().cloned();
             let is_over = outcome.is_err();
             if !is_over {
-                player.note_what_it_cannot();
+                player.skip_unclaimed_checks();
             }
             let last = if is_over {
                 Err(player.abandon())
             } else if player.can(Capability::Resume) {
-                resumed(player, &arguments.command, &task, &actions[0])
+                check_restart(player, &arguments.command, &task, &actions[0])
             } else {
                 Ok(player)
             };
             let rows = match last {
                 Ok(player) => player.stop().rows(None),
-                Err(findings) => cut_short(findings),
+                Err(findings) => rows_of_aborted_check(findings),
             };
             (rows, greeting)
         }
-        Err((Gone, findings)) => (cut_short(findings), None),
+        Err((WorldLost, findings)) => (rows_of_aborted_check(findings), None),
     };
     let conforms = rows.iter().all(|row| row.outcome != Outcome::Wrong);
     if arguments.json {
@@ -94,7 +94,7 @@ pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
     Ok(if conforms { Exit::Yes } else { Exit::No })
 }
 
-fn cut_short(findings: Findings) -> Vec<Row> {
+fn rows_of_aborted_check(findings: Findings) -> Vec<Row> {
     findings.rows(Some("the conversation had come to its end"))
 }
 
@@ -118,7 +118,7 @@ fn script(
         &task,
         plan,
         &RoundingRule::default(),
-        input::FIXED_TIMES,
+        input::FIXED_TIMES_ADVICE,
         output,
     )?
     .steps;
@@ -136,16 +136,20 @@ fn script(
     Ok((task, actions))
 }
 
-fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Result<(), Gone> {
+fn run_actions(
+    player: &mut ProtocolDriver,
+    task: &Task,
+    actions: &[(String, Rational)],
+) -> Result<(), WorldLost> {
     // Time must pass although no action was started.
-    pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
+    advance_until(player, &Rational::ONE, &Rational::ONE, |_| false)?;
     if player.can(Capability::Beliefs) {
-        let faults = player.findings.faults();
-        player.findings.look_at(Check::HearsBeliefs);
-        let heard = beliefs(player, task);
-        if heard.is_err() || player.findings.faults() > faults {
+        let faults = player.findings.violation_count();
+        player.findings.mark_done(Check::AcceptsBeliefs);
+        let heard = send_beliefs(player, task);
+        if heard.is_err() || player.findings.violation_count() > faults {
             let why = "it failed after a message `believed`, which needs no answer";
-            player.findings.wrong(Check::HearsBeliefs, why);
+            player.findings.record_violation(Check::AcceptsBeliefs, why);
         }
         heard?;
     }
@@ -156,85 +160,87 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
 
     // One action until its end.
     player.start(0, name, Some(duration))?;
-    until_begun(player, &[0], &long, &step)?;
-    until_ended(player, &[0], &long, &step)?;
+    wait_for_starts(player, &[0], &long, &step)?;
+    wait_for_ends(player, &[0], &long, &step)?;
     if let Some(why) = player.failure(0) {
         let why = format!(
             "{} failed, so there was nothing to see: {}",
             name,
             excerpt(why)
         );
-        player.findings.wrong(Check::Starts, why);
-        return player.look();
+        player.findings.record_violation(Check::Starts, why);
+        return player.poll();
     }
 
     // Messages about a finished start and about unknown ones.
-    player.findings.look_at(Check::IgnoresTheUnknown);
+    player.findings.mark_done(Check::IgnoresUnknownMessages);
     player.cancel(0)?;
-    player.mumble()?;
-    player.look()?;
-    pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
+    player.send_unknown_message()?;
+    player.poll()?;
+    advance_until(player, &Rational::ONE, &Rational::ONE, |_| false)?;
 
     // Two actions at a time. If the plan has only one action, it is started twice.
     player.start(1, name, Some(duration))?;
     player.start(2, other, Some(other_duration))?;
-    until_begun(player, &[1, 2], &long, &step)?;
-    player.findings.look_at(Check::DoesTwoAtOnce);
+    wait_for_starts(player, &[1, 2], &long, &step)?;
+    player.findings.mark_done(Check::RunsConcurrently);
     if player.failure(1).or(player.failure(2)).is_some() {
         let why = "one of two actions that were started together was refused";
-        player.findings.wrong(Check::DoesTwoAtOnce, why);
+        player
+            .findings
+            .record_violation(Check::RunsConcurrently, why);
     }
-    until_ended(player, &[1, 2], &long, &step)?;
+    wait_for_ends(player, &[1, 2], &long, &step)?;
 
     // An action that is cancelled.
     if player.can_cancel() {
         player.start(3, name, Some(duration))?;
-        until_begun(player, &[3], &long, &step)?;
+        wait_for_starts(player, &[3], &long, &step)?;
         player.cancel(3)?;
-        let limit = Rational::from(OBEDIENCE);
-        pass(player, &limit, &Rational::ONE, |player| player.has_ended(3))?;
-        player.findings.look_at(Check::Cancels);
+        let limit = Rational::from(CANCEL_TOLERANCE);
+        advance_until(player, &limit, &Rational::ONE, |player| player.has_ended(3))?;
+        player.findings.mark_done(Check::Cancels);
         if !player.has_ended(3) {
-            let why = format!("{OBEDIENCE} s after its cancel, {name} had not ended");
-            player.findings.wrong(Check::Cancels, why);
+            let why = format!("{CANCEL_TOLERANCE} s after its cancel, {name} had not ended");
+            player.findings.record_violation(Check::Cancels, why);
         }
     }
     // Repeated reports would arrive within this time.
-    pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
-    player.findings.look_at(Check::EndsOnce);
+    advance_until(player, &Rational::ONE, &Rational::ONE, |_| false)?;
+    player.findings.mark_done(Check::EndsOnce);
     Ok(())
 }
 
 /// Sends the initial beliefs, then that a value is unknown, then that it is known again.
-fn beliefs(player: &mut Player, task: &Task) -> Result<(), Gone> {
+fn send_beliefs(player: &mut ProtocolDriver, task: &Task) -> Result<(), WorldLost> {
     let initial = task.initial();
     let values = || initial.values.iter();
     let known = values().map(|(fluent, value)| (*fluent, Some(value)));
-    player.believe(task, initial.facts.iter().copied(), known)?;
-    player.look()?;
+    player.send_beliefs(task, initial.facts.iter().copied(), known)?;
+    player.poll()?;
     for is_known in [false, true] {
         let one = values().take(1);
         let one = one.map(|(fluent, value)| (*fluent, is_known.then_some(value)));
-        player.believe(task, std::iter::empty(), one)?;
-        player.look()?;
+        player.send_beliefs(task, std::iter::empty(), one)?;
+        player.poll()?;
     }
     Ok(())
 }
 
 fn longest(duration: &Rational) -> Rational {
-    duration * Rational::from(3) + Rational::from(PATIENCE)
+    duration * Rational::from(3) + Rational::from(END_TOLERANCE)
 }
 
 /// Waits until the start or the refusal of each action is reported.
-fn until_begun(
-    player: &mut Player,
+fn wait_for_starts(
+    player: &mut ProtocolDriver,
     tickets: &[u64],
     long: &Rational,
     step: &Rational,
-) -> Result<(), Gone> {
-    let have_begun = |player: &Player| tickets.iter().all(|it| player.has_begun(*it));
-    pass(player, long, step, have_begun)?;
-    player.findings.look_at(Check::Starts);
+) -> Result<(), WorldLost> {
+    let have_begun = |player: &ProtocolDriver| tickets.iter().all(|it| player.has_begun(*it));
+    advance_until(player, long, step, have_begun)?;
+    player.findings.mark_done(Check::Starts);
     for ticket in tickets {
         if player.has_begun(*ticket) {
             continue;
@@ -243,42 +249,42 @@ fn until_begun(
             "nothing was heard of start {ticket} within {} s",
             long.to_f64()
         );
-        player.findings.wrong(Check::Starts, why);
+        player.findings.record_violation(Check::Starts, why);
     }
     Ok(())
 }
 
 /// Waits until each action has ended.
-fn until_ended(
-    player: &mut Player,
+fn wait_for_ends(
+    player: &mut ProtocolDriver,
     tickets: &[u64],
     long: &Rational,
     step: &Rational,
-) -> Result<(), Gone> {
-    let have_ended = |player: &Player| {
+) -> Result<(), WorldLost> {
+    let have_ended = |player: &ProtocolDriver| {
         tickets
             .iter()
             .all(|it| player.has_ended(*it) || !player.is_running(*it))
     };
-    pass(player, long, step, have_ended)?;
-    player.findings.look_at(Check::Ends);
+    advance_until(player, long, step, have_ended)?;
+    player.findings.mark_done(Check::Ends);
     for ticket in tickets {
         if !player.is_running(*ticket) {
             continue;
         }
         let why = format!("start {ticket} had not ended {} s later", long.to_f64());
-        player.findings.wrong(Check::Ends, why);
+        player.findings.record_violation(Check::Ends, why);
     }
     Ok(())
 }
 
 /// Lets time pass in steps until `is_enough`, at most for `long`.
-fn pass(
-    player: &mut Player,
+fn advance_until(
+    player: &mut ProtocolDriver,
     long: &Rational,
     step: &Rational,
-    is_enough: impl Fn(&Player) -> bool,
-) -> Result<(), Gone> {
+    is_enough: impl Fn(&ProtocolDriver) -> bool,
+) -> Result<(), WorldLost> {
     let last = &player.now + long;
     // Answers without progress of the clock are limited, because each of them should contain a
     // report.
@@ -293,8 +299,8 @@ fn pass(
                 "its clock does not advance beyond {}: {MOST_IDLE} answers brought no progress",
                 before.to_f64()
             );
-            player.findings.wrong(Check::KeepsTime, why);
-            return Err(Gone);
+            player.findings.record_violation(Check::KeepsTime, why);
+            return Err(WorldLost);
         }
     }
     Ok(())
@@ -304,7 +310,7 @@ fn pass(
 const MOST_IDLE: usize = 100;
 
 fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
-    let width = Look::of_stdout().width;
+    let width = TextLayout::of_stdout().width;
     let mut text = match greeting {
         Some(greeting) => {
             let name = match greeting.name.as_str() {
@@ -325,14 +331,14 @@ fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
     };
     for row in rows {
         let mark = match row.outcome {
-            Outcome::Passed => styled(GOOD, "ok"),
-            Outcome::Wrong => styled(BAD, "wrong"),
+            Outcome::Passed => styled(SUCCESS, "ok"),
+            Outcome::Wrong => styled(ERROR, "wrong"),
             Outcome::Skipped => styled(HINT, "skipped"),
         };
         let line = format!("{mark}  {}: {}", row.check, row.what);
-        let _ = writeln!(text, "{}", wrapped(&line, width, 2));
+        let _ = writeln!(text, "{}", wrap(&line, width, 2));
         for why in &row.why {
-            let _ = writeln!(text, "{}", wrapped(&escape_control(why), width, 6));
+            let _ = writeln!(text, "{}", wrap(&escape_control(why), width, 6));
         }
     }
     let wrong = rows
@@ -340,9 +346,12 @@ fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
         .filter(|row| row.outcome == Outcome::Wrong)
         .count();
     let verdict = if conforms {
-        styled(GOOD, "nothing is wrong")
+        styled(SUCCESS, "nothing is wrong")
     } else {
-        styled(BAD, &format!("{wrong} of {} checks went wrong", rows.len()))
+        styled(
+            ERROR,
+            &format!("{wrong} of {} checks went wrong", rows.len()),
+        )
     };
     let _ = writeln!(text, "{verdict}");
     text

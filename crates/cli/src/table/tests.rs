@@ -3,9 +3,9 @@ use insta::assert_snapshot;
 use unicode_width::UnicodeWidthStr;
 
 use super::{Row, render};
-use crate::look::Look;
+use crate::terminal::TextLayout;
 
-const UTF8: Look = Look {
+const UTF8: TextLayout = TextLayout {
     width: 80,
     unicode: true,
 };
@@ -27,7 +27,7 @@ fn row(name: &str, quantity: &str, nominal: &str, lower: &str, upper: &str) -> R
 }
 
 /// Renders the table without escape sequences.
-fn shown(rows: &[Row], look: Look) -> String {
+fn shown(rows: &[Row], look: TextLayout) -> String {
     let text = anstream::adapter::strip_str(&render(rows, look)).to_string();
     for line in text.lines() {
         assert!(
@@ -55,7 +55,7 @@ fn a_row_shows_the_interval_and_where_the_nominal_value_sits_in_it() {
 
 #[test]
 fn without_unicode_the_table_is_plain_ascii() {
-    let text = shown(&delivery(), Look::PLAIN);
+    let text = shown(&delivery(), TextLayout::PLAIN);
     assert!(text.is_ascii());
     assert_snapshot!(text);
 }
@@ -77,7 +77,7 @@ fn long_names_move_the_numbers_to_a_line_of_their_own() {
 
 #[test]
 fn a_narrow_terminal_loses_the_bar_but_no_number() {
-    let narrow = Look {
+    let narrow = TextLayout {
         width: 44,
         unicode: true,
     };

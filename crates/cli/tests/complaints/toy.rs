@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex};
 use elbowroom::execute::Execution;
 use elbowroom::execution::run::{Report, RunSettings};
 use elbowroom::execution::{
-    Cause, Command, Ending, Entry, Event, Observation, Passage, Recorder, Ticket, World, WorldError,
+    ActionHandle, Cause, Command, Ending, Entry, Event, Observation, Recorder, TimeAdvance, World,
+    WorldError,
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -44,7 +45,7 @@ pub(crate) struct Toy {
     /// Events reported when an action has ended.
     pub(crate) seen: Vec<Event>,
     /// Started actions that have not ended.
-    pub(crate) open: Vec<Ticket>,
+    pub(crate) open: Vec<ActionHandle>,
     /// Time from a cancel to the end of the action, in seconds.
     pub(crate) slides: i64,
 }
@@ -117,7 +118,7 @@ impl World for Toy {
         Ok(())
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let next = self.coming.iter().map(|it| it.time.clone()).min();
         let now = next.into_iter().chain([until.clone()]).min();
         self.now = now.unwrap_or_default().max(self.now.clone());
@@ -128,19 +129,19 @@ impl World for Toy {
                 self.open.retain(|open| *open != ticket);
             }
         }
-        Ok(Passage { now, observations })
+        Ok(TimeAdvance { now, observations })
     }
 }
 
 pub(crate) fn run(task: &Arc<Task>, world: &mut Toy) -> Report {
     let settings = RunSettings {
-        watches_room: true,
+        monitors_slack: true,
         time_limit: Rational::from(100_000),
         ..RunSettings::default()
     };
     Execution::of(task)
         .with_settings(settings)
-        .explaining()
+        .with_explanations()
         .run_in(world)
 }
 

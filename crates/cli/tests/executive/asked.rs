@@ -11,7 +11,7 @@ use super::{command, ctl, exact, lines, python_is_there, signal, simulated, with
 
 /// A hanging program is named, and requests are not reported as waiting for a plan.
 #[test]
-fn a_world_that_stands_still_is_named() {
+fn stalled_world_is_reported() {
     if !python_is_there() {
         return;
     }
@@ -62,14 +62,14 @@ fn a_world_that_stands_still_is_named() {
 
 /// Time advances although nothing happens.
 #[test]
-fn who_asks_is_told_what_time_it_is() {
+fn state_reports_the_current_time() {
     let own = simulated("time");
     let rested = own.await_state(|state| state["why"] == "reached: problem");
     own.await_state(|state| exact(&state["now"]) > exact(&rested["now"]) + 1.0);
 }
 
 #[test]
-fn the_guarantee_says_what_its_quantities_are() {
+fn guarantee_describes_its_quantities() {
     let own = simulated("meanings");
     own.await_state(|state| state["activity"] == "executing");
     let (_, guarantee) = own.get("/v1/guarantee");
@@ -89,7 +89,7 @@ fn the_guarantee_says_what_its_quantities_are() {
 /// A reported number is used in the next plan: if the battery needs a larger reserve, it is charged
 /// first.
 #[test]
-fn a_number_is_taken_in_and_planned_with() {
+fn changed_number_is_used_in_planning() {
     let battery = ["domain", "problem"].map(|it| format!("cases/battery/{it}.pddl"));
     let run = |name: &str, reserve: Option<&str>| {
         let place = folder(name);
@@ -132,7 +132,7 @@ fn a_number_is_taken_in_and_planned_with() {
 
 /// By default, only this machine can connect.
 #[test]
-fn only_this_machine_reaches_an_executive() {
+fn executive_accepts_local_connections_only() {
     let own = simulated("local");
     let text = fs::read_to_string(format!("/proc/{}/net/tcp", own.process()));
     let Ok(text) = text else {
@@ -207,7 +207,7 @@ fn conforms(value: &Value, schema: &Value, all: &Value) -> Result<(), String> {
 }
 
 #[test]
-fn answers_are_as_the_interface_says() {
+fn answers_conform_to_the_interface_description() {
     let own = simulated("answers");
     let (_, interface) = own.get("/v1/openapi.json");
     let all = &interface["components"]["schemas"];
@@ -240,7 +240,7 @@ fn answers_are_as_the_interface_says() {
 
 /// A suspended process keeps its port open.
 #[test]
-fn an_executive_that_does_not_answer_is_told_apart_from_one_that_is_not_there() {
+fn unresponsive_and_absent_executives_are_distinguished() {
     let stopped = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = stopped.local_addr().expect("an address").to_string();
     let asked = ctl(&["--to", &address, "state"]);

@@ -16,7 +16,7 @@ use super::{DOMAIN, PROBLEM, ctl, python_is_there, signal, with_robot};
 
 /// A resumed executive shuts down in order, like a new one.
 #[test]
-fn signals_end_an_executive_that_goes_on_after_a_crash() {
+fn signals_end_a_resumed_executive() {
     if !python_is_there() {
         return;
     }
@@ -46,7 +46,7 @@ fn signals_end_an_executive_that_goes_on_after_a_crash() {
 /// The client whose request fails because of the full disk receives that reason. The report does
 /// not claim that a stop was requested.
 #[test]
-fn when_the_disk_is_full_the_client_and_the_report_say_so() {
+fn full_disk_is_reported_to_client_and_in_report() {
     if !python_is_there() || Command::new("bash").arg("--version").output().is_err() {
         skipped("there is no bash, or no python3");
         return;
@@ -93,7 +93,7 @@ fn when_the_disk_is_full_the_client_and_the_report_say_so() {
 
 /// Opening a named pipe blocks until another process writes to it.
 #[test]
-fn what_is_no_file_is_no_journal_and_is_not_waited_for() {
+fn non_file_journal_is_rejected_without_waiting() {
     let place = folder("no-file");
     let pipe = place.join("pipe");
     let made = Command::new("mkfifo").arg(&pipe).status();
@@ -136,7 +136,7 @@ fn ended(line: &[&str]) -> (Option<i32>, String) {
 
 /// The client receives the executive's reason if its request for trace lines is refused.
 #[test]
-fn ctl_events_says_why_it_is_refused() {
+fn ctl_events_reports_reason_of_rejection() {
     let refusal =
         json!({"error": "the lines up to 7 are no longer kept here", "help": "ask for later ones"});
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
@@ -164,7 +164,7 @@ fn ctl_events_says_why_it_is_refused() {
 }
 
 #[test]
-fn a_journal_that_exists_is_gone_on_with_by_the_command_that_has_begun_it() {
+fn existing_journal_is_resumed_by_its_own_command() {
     let place = folder("existing");
     let journal = place.join("journal");
     fs::write(&journal, "something").expect("written");

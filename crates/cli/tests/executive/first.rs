@@ -18,7 +18,7 @@ fn problem() -> Value {
 
 /// Errors in the command line are reported at the start, before a client sends a problem.
 #[test]
-fn what_is_wrong_is_told_before_it_listens_for_a_problem() {
+fn errors_are_reported_before_listening() {
     let place = folder("told-early");
     let existing = place.join("existing").display().to_string();
     fs::write(&existing, "something").expect("written");
@@ -74,7 +74,7 @@ fn what_is_wrong_is_told_before_it_listens_for_a_problem() {
 
 /// An accepted problem survives any crash and need not be sent again.
 #[test]
-fn a_first_problem_that_is_taken_survives_kill_9() {
+fn accepted_first_problem_survives_kill_9() {
     if !python_is_there() {
         return;
     }
@@ -99,7 +99,7 @@ fn a_first_problem_that_is_taken_survives_kill_9() {
 
 /// A readable problem that cannot be executed with this command line.
 #[test]
-fn a_first_problem_that_cannot_be_executed_is_refused_and_another_one_is_taken() {
+fn unsupported_first_problem_is_rejected_and_next_accepted() {
     let vary = ["--vary", "deadline (open nothing)"];
     let line = [&[DOMAIN, "--realtime", "10"], &vary[..]].concat();
     let mut own = Executive::start(&folder("first-refused"), &line);
@@ -120,7 +120,7 @@ fn a_first_problem_that_cannot_be_executed_is_refused_and_another_one_is_taken()
 
 /// The program exists but cannot be started. This cannot be detected in advance.
 #[test]
-fn who_gives_a_first_problem_that_is_not_begun_is_told_why() {
+fn rejected_first_problem_reports_the_reason() {
     let place = folder("first-not-begun");
     let world = place.join("world");
     fs::write(&world, "#!/nowhere/at/all\n").expect("written");
@@ -137,7 +137,7 @@ fn who_gives_a_first_problem_that_is_not_begun_is_told_why() {
 }
 
 #[test]
-fn an_executive_without_a_problem_ends_when_it_is_told_to() {
+fn executive_without_problem_can_be_stopped() {
     let mut own = Executive::start(&folder("first-stopped"), &[DOMAIN, "--realtime", "10"]);
     assert_eq!(own.post("/v1/stop", &Value::Null).0, 200);
     assert_eq!(own.end().status.code(), Some(0));

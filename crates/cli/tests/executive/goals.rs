@@ -115,7 +115,7 @@ fn operators_report_and_cancel_running_actions() {
 }
 
 #[test]
-fn goal_that_misses_its_deadline_says_by_how_much() {
+fn missed_deadline_reports_the_lateness() {
     let own = simulated("late");
     own.await_state(|state| state["activity"] == "resting");
     assert_eq!(

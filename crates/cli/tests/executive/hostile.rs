@@ -39,7 +39,7 @@ fn crowd(own: &Executive, count: usize) -> (Vec<TcpStream>, Vec<UnixStream>) {
 }
 
 #[test]
-fn five_hundred_hostile_clients_lock_nobody_out_who_has_the_token() {
+fn hostile_clients_do_not_block_authorized_client() {
     let mut own = Executive::start(&folder("hostile"), &[DOMAIN, PROBLEM, "--realtime", "1"]);
     own.await_state(|state| state["activity"] == "executing");
     let held = crowd(&own, 500);
@@ -75,7 +75,7 @@ fn status(own: &Executive, headers: &str) -> u16 {
 }
 
 #[test]
-fn pages_from_elsewhere_and_other_protocols_are_refused() {
+fn foreign_origins_and_protocols_are_rejected() {
     let own = Executive::start(&folder("foreign"), &[DOMAIN, PROBLEM, "--realtime", "1"]);
     let (address, get) = (own.address(), "GET /v1/state HTTP/1.1\r\nHost: localhost");
     for (headers, expected) in [
@@ -110,7 +110,7 @@ fn pages_from_elsewhere_and_other_protocols_are_refused() {
 }
 
 #[test]
-fn journals_are_for_their_owner_alone() {
+fn journals_are_readable_by_owner_only() {
     use std::os::unix::fs::PermissionsExt as _;
     if !super::python_is_there() {
         return;

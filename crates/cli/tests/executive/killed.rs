@@ -26,9 +26,9 @@ const DONE: [&str; 6] = ["a1", "a2", "a3", "b1", "b2", "b3"];
 const SEGMENTS: [&str; 4] = ["--journal-size", "30K", "--journal-segments", "1000"];
 
 /// Pseudo-random numbers.
-struct Dice(u64);
+struct Rng(u64);
 
-impl Dice {
+impl Rng {
     fn below(&mut self, limit: u64) -> u64 {
         self.0 = self
             .0
@@ -40,15 +40,15 @@ impl Dice {
 
 /// Requests sent to an executive, and its answers.
 #[derive(Default)]
-struct Asked {
+struct SentRequests {
     goals: u64,
     /// Accepted goals, with `true` if they may have been cancelled since.
     taken: BTreeMap<String, bool>,
 }
 
-impl Asked {
+impl SentRequests {
     /// Sends a random request. Returns `None` if the executive is gone.
-    fn ask(&mut self, own: &Executive, dice: &mut Dice) -> Option<()> {
+    fn ask(&mut self, own: &Executive, dice: &mut Rng) -> Option<()> {
         let job = DONE[usize::try_from(dice.below(6)).expect("small")];
         if dice.below(5) == 0 {
             let names: Vec<String> = self.taken.keys().cloned().collect();
@@ -125,20 +125,20 @@ fn reached(journal: &str) -> BTreeSet<String> {
 #[derive(Clone, Copy, Debug, Default)]
 struct Killed {
     kills: u64,
-    at_rest: usize,
-    amid: usize,
+    while_idle: usize,
+    while_busy: usize,
     /// Rotations while actions were running.
-    under_way: usize,
+    with_running_actions: usize,
 }
 
 /// Kills an executive several times.
 fn killed(number: u64) -> Killed {
-    let (place, mut dice) = (folder(&format!("serve-kill-{number}")), Dice(number));
+    let (place, mut dice) = (folder(&format!("serve-kill-{number}")), Rng(number));
     dice.below(2);
     let journal = place.join("journal").display().to_string();
     let mut beginning = with_robot(&place, &journal);
     beginning.extend(["--max-replans", "100000"].map(str::to_owned));
-    let mut asked = Asked::default();
+    let mut asked = SentRequests::default();
     let kills = 3 + dice.below(4);
     for _ in 0..kills {
         let mut own = launched(&place, &journal, &beginning);
@@ -204,9 +204,9 @@ fn killed(number: u64) -> Killed {
         let second = text.lines().nth(1).unwrap_or_default();
         if second.contains("\"event\":\"snapshot\"") {
             let is_amid = second.contains("\"plan\":{");
-            told.at_rest += usize::from(!is_amid);
-            told.amid += usize::from(is_amid);
-            told.under_way += usize::from(second.contains("\"under_way\":["));
+            told.while_idle += usize::from(!is_amid);
+            told.while_busy += usize::from(is_amid);
+            told.with_running_actions += usize::from(second.contains("\"under_way\":["));
         }
         let replayed = command::elbowroom(&["run", "--replay", segment]);
         assert_eq!(
@@ -238,7 +238,7 @@ fn launched(place: &Path, journal: &str, beginning: &[String]) -> Executive {
 /// No accepted goal is lost, nothing is started twice, and every segment of the journal can be
 /// replayed.
 #[test]
-fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
+fn killed_executive_resumes_with_accepted_requests() {
     if !python_is_there() {
         return;
     }
@@ -256,8 +256,8 @@ fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
     }
     let kills: u64 = all.iter().map(|it| it.kills).sum();
     let sum = |of: fn(&Killed) -> usize| all.iter().map(of).sum::<usize>();
-    let (at_rest, amid) = (sum(|it| it.at_rest), sum(|it| it.amid));
-    let under_way = sum(|it| it.under_way);
+    let (at_rest, amid) = (sum(|it| it.while_idle), sum(|it| it.while_busy));
+    let under_way = sum(|it| it.with_running_actions);
     println!(
         "{count} executives, killed {kills} times; their journals were begun anew {at_rest} times at rest, and \
          {amid} times with a plan; {under_way} times, something was under way"
@@ -268,7 +268,7 @@ fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
 /// The run can be resumed wherever the program is killed during a rotation: from the old segment
 /// until the new one is renamed.
 #[test]
-fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
+fn journal_killed_during_rotation_is_resumed() {
     if !python_is_there() {
         return;
     }

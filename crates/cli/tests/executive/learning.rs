@@ -50,7 +50,7 @@ fn learn(folder: &Path, experience: &str) {
 }
 
 #[test]
-fn executors_believe_what_was_learnt_from_journals() {
+fn executors_use_world_learnt_from_journals() {
     if !python_is_there() {
         return;
     }
@@ -109,7 +109,7 @@ fn executors_believe_what_was_learnt_from_journals() {
 }
 
 #[test]
-fn executors_that_try_plans_out_pursue_changing_goals() {
+fn executors_with_rollouts_pursue_changing_goals() {
     let folder = folder("believed-goals");
     let world = folder.join("world.toml");
     let slow = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"short-road\"\nconstant = 12\n";

@@ -43,7 +43,7 @@ fn has_reached_all(state: &Value) -> bool {
 }
 
 #[test]
-fn requests_are_taken_in_and_answered_while_the_first_plan_is_made() {
+fn requests_are_answered_during_first_planning() {
     let place = folder("first-search");
     let mut own = with_a_slow_planner(&place);
     let there_is_none = json!("there is no plan yet");
@@ -103,7 +103,7 @@ fn is_start(line: &Value) -> bool {
 }
 
 /// Returns the lines since the last request for a plan, if the search is still running.
-fn of_the_search(lines: &[Value]) -> Option<&[Value]> {
+fn lines_since_search(lines: &[Value]) -> Option<&[Value]> {
     let asked = lines.iter().rposition(|it| is_event(it, "planning"))?;
     let since = &lines[asked..];
     (!since.iter().any(|it| is_event(it, "planned"))).then_some(since)
@@ -114,7 +114,7 @@ fn of_the_search(lines: &[Value]) -> Option<&[Value]> {
 /// dispatched and requests are answered. The goal is added before there is a plan, so that no
 /// action of that plan has started when the next search begins, even on a slow machine.
 #[test]
-fn the_running_plan_is_dispatched_while_a_slow_planner_plans() {
+fn current_plan_is_dispatched_during_slow_planning() {
     let place = folder("dispatched-meanwhile");
     let (go, once) = (place.join("go"), place.join("once"));
     fs::write(&once, "").expect("written");
@@ -128,7 +128,7 @@ fn the_running_plan_is_dispatched_while_a_slow_planner_plans() {
     let state = own.await_state(|state| {
         let lines = trace(&place);
         let plans = lines.iter().filter(|it| is_event(it, "plan")).count();
-        let has_started = of_the_search(&lines).is_some_and(|it| it.iter().any(is_start));
+        let has_started = lines_since_search(&lines).is_some_and(|it| it.iter().any(is_start));
         plans == 1 && has_started && is_planning(state)
     });
     assert_eq!(
@@ -144,7 +144,7 @@ fn the_running_plan_is_dispatched_while_a_slow_planner_plans() {
     own.await_state(|_| {
         let lines = trace(&place);
         let heard = |it: &Value| is_event(it, "observed") && it["observation"]["type"] == "fact";
-        of_the_search(&lines).is_some_and(|it| it.iter().any(heard))
+        lines_since_search(&lines).is_some_and(|it| it.iter().any(heard))
     });
     fs::remove_file(&once).expect("it is there");
     fs::write(&go, "").expect("written");
@@ -156,7 +156,7 @@ fn the_running_plan_is_dispatched_while_a_slow_planner_plans() {
 
 /// A domain that cannot be executed is refused before the executive listens for a problem.
 #[test]
-fn a_domain_that_cannot_be_executed_is_refused_before_it_listens() {
+fn unsupported_domain_is_rejected_before_listening() {
     let place = folder("plus");
     let domain = place.join("plus.pddl");
     let text = "(define (domain plus) (:requirements :time :fluents) (:predicates (on)) (:functions (level))

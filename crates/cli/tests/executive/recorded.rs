@@ -33,7 +33,7 @@ fn cuts(lines: &[&str]) -> Vec<usize> {
 }
 
 #[test]
-fn recorded_journal_plays_back_wherever_it_is_cut() {
+fn recorded_journal_replays_after_any_truncation() {
     let text = fs::read_to_string(root().join(JOURNAL)).expect("a journal");
     let lines: Vec<&str> = text.lines().collect();
     let place = folder("played-back");
@@ -54,7 +54,7 @@ fn recorded_journal_plays_back_wherever_it_is_cut() {
 /// A resumed executive ends with success on a stop request only if the replay made the same
 /// decisions.
 #[test]
-fn recorded_journal_is_resumed_wherever_it_is_cut() {
+fn recorded_journal_resumes_after_any_truncation() {
     if !python_is_there() {
         return;
     }

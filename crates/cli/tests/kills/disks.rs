@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::command::root;
 use super::skipped::skipped;
-use super::{awaited, beginning, folder, judge, lines, python_is_there, started};
+use super::{awaited, beginning, check_outcome, folder, lines, python_is_there, started};
 
 /// A run can be resumed from the records written before the disk was full. Nothing was started
 /// without a record.
@@ -37,7 +37,7 @@ fn a_journal_that_cannot_be_written_starts_nothing() {
 
 /// A limit on the file size simulates a disk that fills up during the run.
 #[test]
-fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
+fn full_disk_ends_the_run_in_resumable_state() {
     if !python_is_there() {
         return;
     }
@@ -69,7 +69,7 @@ fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
     assert!((1..6).contains(&begun), "in the middle: {begun} begun");
     let resume = ["run".to_owned(), "--resume".to_owned(), journal];
     let output = awaited(started(&resume), "after the disk was full");
-    judge(&folder, &output, "after the disk was full");
+    check_outcome(&folder, &output, "after the disk was full");
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
@@ -98,7 +98,7 @@ fn a_journal_on_a_disk_that_is_read_only_starts_nothing() {
 
 /// A disk of a few pages fills up and is enlarged. Needs root, and uses its own name spaces.
 #[test]
-fn a_run_goes_on_from_a_small_disk_that_was_full_when_there_is_room_again() {
+fn run_resumes_after_space_is_freed() {
     let can_mount = Command::new("unshare").args(["-m", "true"]).output();
     if !python_is_there() || !can_mount.is_ok_and(|it| it.status.success()) {
         skipped("no disk can be mounted: that takes root");
@@ -139,14 +139,14 @@ fn a_run_goes_on_from_a_small_disk_that_was_full_when_there_is_room_again() {
     assert!(first.contains("the run was ended in order"), "{first}");
     let half = lines(&folder, "half").len();
     assert!((1..6).contains(&half), "in the middle: {half} begun");
-    judge(&folder, &output, "with room again");
+    check_outcome(&folder, &output, "with room again");
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
 /// Slow disk: each record that must be synced waits until this test releases it. Until then no
 /// command is sent.
 #[test]
-fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk() {
+fn slow_disk_delays_commands_until_they_are_stored() {
     if !python_is_there() {
         return;
     }
@@ -181,7 +181,7 @@ fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk()
         }
         // The executive waits for the sync and can send nothing. The starts that the robot has
         // received by now must be on the disk.
-        let told = told_to_start(&journal);
+        let told = commanded_starts(&journal);
         // All starts of one decision are synced together.
         let (before, held) = told.split_at(released);
         if held.is_empty() {
@@ -210,7 +210,7 @@ fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk()
         (&go).write_all(b"g").expect("it waits for that");
     }
     let output = child.wait_with_output().expect("its output");
-    judge(&folder, &output, "on the slow disk");
+    check_outcome(&folder, &output, "on the slow disk");
     assert!(released >= 6, "{released} starts were held");
     assert!(
         held_for_long > 0,
@@ -247,7 +247,7 @@ fn pipe(path: &Path) -> fs::File {
 }
 
 /// Returns the starts in the journal, in the format of the robot's records.
-fn told_to_start(journal: &str) -> Vec<String> {
+fn commanded_starts(journal: &str) -> Vec<String> {
     let text = fs::read_to_string(journal).expect("there is a journal");
     let records = text.lines().filter_map(|line| {
         let (_, record) = line.split_once(' ')?;

@@ -15,7 +15,7 @@ const LIMIT: Duration = Duration::from_secs(1);
 const MOST_FACTS: usize = 8;
 
 /// Plans for each variant of a problem that has a plan.
-pub(crate) fn each(name: &str, task: &Task, sums: &mut Sums) {
+pub(crate) fn plan_variants(name: &str, task: &Task, sums: &mut Sums) {
     let whole = first_plan(task, &Situation::initial(task), LIMIT);
     if !matches!(whole, Answer::Plan { .. }) {
         return;
@@ -23,7 +23,7 @@ pub(crate) fn each(name: &str, task: &Task, sums: &mut Sums) {
     let mut ask = |what: &str, task: &Task| {
         let situation = Situation::initial(task);
         let answer = first_plan(task, &situation, LIMIT);
-        sums.note(&format!("{name} {what}"), task, &situation, &answer);
+        sums.count_answer(&format!("{name} {what}"), task, &situation, &answer);
     };
     if !task.timed().is_empty() {
         for eighths in [1, 2, 3, 4, 5, 6, 7] {

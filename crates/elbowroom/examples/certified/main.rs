@@ -40,11 +40,13 @@ const LIMIT: Duration = Duration::from_secs(2);
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["problems", folder, ref texts @ ..] => problems(Path::new(folder), texts, &mut whole),
-        ["changed", folder, ref texts @ ..] => {
-            problems(Path::new(folder), texts, &mut changed::each)
+        ["problems", folder, ref texts @ ..] => {
+            problems(Path::new(folder), texts, &mut plan_problem)
         }
-        ["from-here", folder] => situations::all(Path::new(folder)),
+        ["changed", folder, ref texts @ ..] => {
+            problems(Path::new(folder), texts, &mut changed::plan_variants)
+        }
+        ["from-here", folder] => situations::plan_situations(Path::new(folder)),
         _ => Err(
             "`certified problems|changed FOLDER [TEXT]…` or `certified from-here FOLDER`"
                 .to_owned(),
@@ -59,9 +61,9 @@ fn main() -> ExitCode {
     }
 }
 
-type Each<'a> = &'a mut dyn FnMut(&str, &Task, &mut Sums);
+type Visitor<'a> = &'a mut dyn FnMut(&str, &Task, &mut Sums);
 
-fn problems(folder: &Path, texts: &[&str], each: Each<'_>) -> Result<(), String> {
+fn problems(folder: &Path, texts: &[&str], each: Visitor<'_>) -> Result<(), String> {
     let manifest = folder.join("manifest.csv");
     let text = std::fs::read_to_string(&manifest).map_err(|error| error.to_string())?;
     let mut lines = text.lines();
@@ -95,9 +97,9 @@ fn task(domain: &PathBuf, problem: &PathBuf) -> Option<Task> {
     Some(Task::new(problem))
 }
 
-fn whole(name: &str, task: &Task, sums: &mut Sums) {
+fn plan_problem(name: &str, task: &Task, sums: &mut Sums) {
     let situation = Situation::initial(task);
-    sums.note(name, task, &situation, &first_plan(task, &situation, LIMIT));
+    sums.count_answer(name, task, &situation, &first_plan(task, &situation, LIMIT));
 }
 
 fn first_plan(task: &Task, situation: &Situation, limit: Duration) -> Answer {

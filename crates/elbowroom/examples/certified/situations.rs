@@ -34,7 +34,7 @@ const SITUATIONS: usize = 1000;
 const LIMIT: Duration = Duration::from_secs(5);
 
 /// Plans from a thousand situations.
-pub(crate) fn all(folder: &Path) -> Result<(), String> {
+pub(crate) fn plan_situations(folder: &Path) -> Result<(), String> {
     let mut random = ChaCha8Rng::seed_from_u64(7);
     let mut plans: Vec<(&str, Task, TimeTriggeredPlan)> = Vec::new();
     for (domain, problem) in PROBLEMS {
@@ -57,7 +57,7 @@ pub(crate) fn all(folder: &Path) -> Result<(), String> {
         count += 1;
         let answer = first_plan(task, &situation, LIMIT);
         let name = format!("{name} at {}", situation.time);
-        sums.note(&name, task, &situation, &answer);
+        sums.count_answer(&name, task, &situation, &answer);
     }
     sums.print();
     Ok(())

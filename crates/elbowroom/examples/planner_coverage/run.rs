@@ -10,11 +10,11 @@ use std::thread;
 use std::time::Duration;
 
 use elbowroom::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
-use elbowroom::flow;
 use elbowroom::model::expression::Expression;
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{Source, read_problem};
+use elbowroom::pipeline;
 
 use crate::manifest;
 use crate::row::{self, Row};
@@ -243,7 +243,7 @@ fn run(job: &Job, options: &Options) -> Row {
             problem: &problem,
         },
         &settings,
-        &mut flow::repaired,
+        &mut pipeline::reschedule,
         &mut |event| {
             if let Event::Plan { found, .. } = event {
                 makespans.push(found.makespan.clone());

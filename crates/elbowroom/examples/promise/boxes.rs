@@ -6,15 +6,15 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use elbowroom::envelope::Guarantee;
-use elbowroom::flow;
 use elbowroom::num::Rational;
+use elbowroom::pipeline;
 use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
 
 use super::options::Options;
 use super::sources::Source;
 use super::subject::Subject;
 use super::trial::{Boxed, Search, boxed};
-use super::{counted, not_counted};
+use super::{results_by_family, skipped_table};
 
 /// Boxes of one plan, weak and dynamic.
 struct Row {
@@ -27,7 +27,7 @@ struct Row {
 }
 
 pub(crate) fn main(options: &Options) {
-    let (families, skipped) = counted(options, &|source| {
+    let (families, skipped) = results_by_family(options, &|source| {
         row(source, options).map(|row| (source.family.clone(), row))
     });
     println!(
@@ -41,7 +41,7 @@ pub(crate) fn main(options: &Options) {
     }
     let all: Vec<&Row> = families.values().flatten().collect();
     println!("| **all** {}", line(&all));
-    print!("{}", not_counted(&skipped));
+    print!("{}", skipped_table(&skipped));
 }
 
 fn line(rows: &[&Row]) -> String {
@@ -94,14 +94,14 @@ fn line(rows: &[&Row]) -> String {
 
 fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let subject = Subject::of_source(source, &options.planning)?;
-    let open = flow::open(&subject.task, subject.freed.clone(), &[]);
+    let open = pipeline::open(&subject.task, subject.freed.clone(), &[]);
     let open = Arc::new(open.map_err(|_| "durations cannot be left open")?);
     let (weak, weak_time) = timed(&subject, &open, Guarantee::Weak, options)?;
     let (dynamic, dynamic_time) = timed(&subject, &open, Guarantee::Dynamic, options)?;
     if !weak.is_finished || !dynamic.is_finished {
         return Err("a box that was still growing when the time was up".to_owned());
     }
-    let enforced = match elbowroom::envelope::enforced(&subject.task, &open) {
+    let enforced = match elbowroom::envelope::with_obligations(&subject.task, &open) {
         Ok((plan, count)) if count > 0 => {
             let plan = Arc::new(plan);
             let (with, _) = timed(&subject, &plan, Guarantee::Dynamic, options)?;
@@ -126,7 +126,7 @@ fn timed(
     options: &Options,
 ) -> Result<(Boxed, Duration), String> {
     let begin = Instant::now();
-    let goes_on = || begin.elapsed() < options.widening;
+    let goes_on = || begin.elapsed() < options.time_per_box;
     let search = Search {
         most_checks: usize::MAX,
         goes_on: &goes_on,

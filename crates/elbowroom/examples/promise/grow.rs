@@ -15,7 +15,7 @@ use super::sources::Source;
 use super::subject::Subject;
 use super::trial::{Ready, Search};
 use super::worlds::Worlds;
-use super::{counted, not_counted};
+use super::{results_by_family, skipped_table};
 
 /// Step size of an end (β).
 const PRECISION: Rational = Rational::ONE;
@@ -34,11 +34,11 @@ struct Row {
     broken: usize,
     uncontrollable: usize,
     /// Number of uncontrollable ends for which the spoiler defeats each executor.
-    spoiled: [usize; EXECUTORS.len()],
+    defeated: [usize; EXECUTORS.len()],
 }
 
 pub(crate) fn main(options: &Options) {
-    let (families, skipped) = counted(options, &|source| {
+    let (families, skipped) = results_by_family(options, &|source| {
         row(source, options).map(|row| (source.family.clone(), row))
     });
     println!(
@@ -52,7 +52,7 @@ pub(crate) fn main(options: &Options) {
     }
     let all: Vec<&Row> = families.values().flatten().collect();
     println!("| **all** {}", line(&all));
-    print!("{}", not_counted(&skipped));
+    print!("{}", skipped_table(&skipped));
 }
 
 fn line(rows: &[&Row]) -> String {
@@ -64,8 +64,8 @@ fn line(rows: &[&Row]) -> String {
         sum(&|row| row.no_schedule),
         sum(&|row| row.broken),
         sum(&|row| row.uncontrollable),
-        sum(&|row| row.spoiled[0]),
-        sum(&|row| row.spoiled[1]),
+        sum(&|row| row.defeated[0]),
+        sum(&|row| row.defeated[1]),
         sum(&|row| row.accepted),
     )
 }
@@ -77,7 +77,7 @@ fn line(rows: &[&Row]) -> String {
 fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let subject = Subject::of_source(source, &options.planning)?;
     let begin = Instant::now();
-    let goes_on = || begin.elapsed() < options.widening;
+    let goes_on = || begin.elapsed() < options.time_per_box;
     let search = Search {
         most_checks: usize::MAX,
         goes_on: &goes_on,
@@ -117,7 +117,11 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
             Some(Objection::NoSchedule(_)) => row.no_schedule += 1,
             Some(Objection::Uncontrollable(_)) => {
                 row.uncontrollable += 1;
-                for (count, is_spoiled) in row.spoiled.iter_mut().zip(spoiled(&ready, &grown)) {
+                for (count, is_spoiled) in row
+                    .defeated
+                    .iter_mut()
+                    .zip(defeated_executors(&ready, &grown))
+                {
                     *count += usize::from(is_spoiled);
                 }
             }
@@ -144,7 +148,7 @@ fn grown(
 }
 
 /// Returns `true` for each executor that fails against the spoiler.
-fn spoiled(ready: &Ready<'_>, envelope: &DecoupledEnvelope) -> [bool; EXECUTORS.len()] {
+fn defeated_executors(ready: &Ready<'_>, envelope: &DecoupledEnvelope) -> [bool; EXECUTORS.len()] {
     let worlds = Worlds::new(&ready.subject.task, &ready.open, envelope);
     EXECUTORS.map(|executor| {
         let world = worlds.spoiled(&TimeoutRule::Off);

@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 
 use elbowroom::execution::run::{ExecutedStep, Report};
-use elbowroom::execution::{Cause, Prepared};
+use elbowroom::execution::{Cause, PreparationResult};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::plan::{InstanceId, Node, NodeId, ParameterId, ParametrizedPlan};
@@ -15,7 +15,12 @@ use elbowroom::plan::{InstanceId, Node, NodeId, ParameterId, ParametrizedPlan};
 /// Returns `true` if a run ended because this action started too late and the executor could not
 /// know. It must be the only instance of its action in the plan, and its start must not have been
 /// reported. Either there was no time left, or an action failed that was overtaken.
-pub(crate) fn excuses(task: &Task, prepared: &Prepared, report: &Report, late: &str) -> bool {
+pub(crate) fn excuses(
+    task: &Task,
+    prepared: &PreparationResult,
+    report: &Report,
+    late: &str,
+) -> bool {
     let Some(reason) = report.reasons.first() else {
         return false;
     };
@@ -41,7 +46,7 @@ pub(crate) fn excuses(task: &Task, prepared: &Prepared, report: &Report, late: &
 /// puts that action after the late start only because of such an end.
 fn is_overtaken(
     task: &Task,
-    prepared: &Prepared,
+    prepared: &PreparationResult,
     report: &Report,
     [late, failed]: [&str; 2],
 ) -> bool {
@@ -91,7 +96,7 @@ fn is_overtaken(
 /// Returns the nodes that an executor relying on the box executes or allows only after `first`.
 /// Actions may end at the lower ends of their durations, so conditions of their ends must not wait
 /// any longer.
-fn later_than(prepared: &Prepared, first: NodeId) -> BTreeSet<NodeId> {
+fn later_than(prepared: &PreparationResult, first: NodeId) -> BTreeSet<NodeId> {
     let plan = &prepared.plan;
     let mut values = plan.nominal();
     let lower_ends = (0..plan.parameters.len()).map(ParameterId::from).map(|id| {

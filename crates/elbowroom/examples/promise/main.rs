@@ -80,7 +80,7 @@ fn main() -> ExitCode {
 }
 
 /// Returns the selected sources.
-fn wanted(options: &Options) -> Vec<Source> {
+fn selected_sources(options: &Options) -> Vec<Source> {
     let mut sources = sources::sources(&options.data);
     let only = &options.only;
     sources.retain(|source| {
@@ -91,14 +91,14 @@ fn wanted(options: &Options) -> Vec<Source> {
 }
 
 /// Function that returns the family of a plan and its result, or why the plan does not count.
-type Say<'a, T> = dyn Fn(&Source) -> Result<(String, T), String> + Sync + 'a;
+type PlanReport<'a, T> = dyn Fn(&Source) -> Result<(String, T), String> + Sync + 'a;
 
 /// Returns the results by family, and the number of plans that do not count by reason.
-fn counted<T: Send>(
+fn results_by_family<T: Send>(
     options: &Options,
-    say: &Say<'_, T>,
+    say: &PlanReport<'_, T>,
 ) -> (BTreeMap<String, Vec<T>>, BTreeMap<String, usize>) {
-    let sources = wanted(options);
+    let sources = selected_sources(options);
     let done = AtomicUsize::new(0);
     let said: Vec<_> = sources
         .par_iter()
@@ -124,7 +124,7 @@ fn counted<T: Send>(
 }
 
 /// Returns a table of the plans that do not count.
-fn not_counted(skipped: &BTreeMap<String, usize>) -> String {
+fn skipped_table(skipped: &BTreeMap<String, usize>) -> String {
     let mut text = String::from("\n| not counted | plans |\n|---|--:|\n");
     for (why, count) in skipped {
         let _ = writeln!(text, "| {why} | {count} |");
@@ -134,7 +134,7 @@ fn not_counted(skipped: &BTreeMap<String, usize>) -> String {
 
 /// Computes and stores plans.
 fn plan(options: &Options) {
-    let mut sources = wanted(options);
+    let mut sources = selected_sources(options);
     sources.retain(|source| source.origin == Origin::Planned);
     let done = AtomicUsize::new(0);
     sources.par_iter().for_each(|source| {

@@ -7,7 +7,7 @@ use super::options::Options;
 use super::sources::Source;
 use super::subject::Subject;
 use super::trial::{Ready, Search};
-use super::{counted, not_counted};
+use super::{results_by_family, skipped_table};
 
 /// Executors with a promise, and two for comparison.
 const EXECUTORS: [&str; 5] = ["guarded", "live", "stn", "fixed:60", "esterel"];
@@ -24,7 +24,7 @@ struct Row {
 }
 
 pub(crate) fn main(options: &Options) {
-    let (families, skipped) = counted(options, &|source| {
+    let (families, skipped) = results_by_family(options, &|source| {
         row(source, options).map(|row| (source.family.clone(), row))
     });
     println!(
@@ -37,7 +37,7 @@ pub(crate) fn main(options: &Options) {
     }
     let all: Vec<&Row> = families.values().flatten().collect();
     println!("| **all** {}", line(&all));
-    print!("{}", not_counted(&skipped));
+    print!("{}", skipped_table(&skipped));
 }
 
 fn line(rows: &[&Row]) -> String {
@@ -59,7 +59,7 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let subject = Subject::of_source(source, &options.planning)?;
     let label = format!("{} {}", subject.family, subject.name);
     let begin = Instant::now();
-    let goes_on = || begin.elapsed() < options.widening;
+    let goes_on = || begin.elapsed() < options.time_per_box;
     let search = Search {
         most_checks: usize::MAX,
         goes_on: &goes_on,
@@ -78,7 +78,7 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let mut is_order_missed = false;
     if let Some(turned) = subject.turned_round() {
         let begin = Instant::now();
-        let goes_on = || begin.elapsed() < options.widening;
+        let goes_on = || begin.elapsed() < options.time_per_box;
         let search = Search {
             most_checks: 20,
             goes_on: &goes_on,

@@ -15,9 +15,9 @@ pub(crate) struct Options {
     /// Maximum number of runs of one plan.
     pub(crate) runs: u64,
     /// Time limit for the runs of one plan.
-    pub(crate) each: Duration,
+    pub(crate) time_per_plan: Duration,
     /// Time limit for widening a box.
-    pub(crate) widening: Duration,
+    pub(crate) time_per_box: Duration,
     /// Number of threads.
     pub(crate) jobs: usize,
 }
@@ -33,8 +33,8 @@ impl Options {
             },
             only: Vec::new(),
             runs: 3_000,
-            each: Duration::from_secs(10),
-            widening: Duration::from_secs(20),
+            time_per_plan: Duration::from_secs(10),
+            time_per_box: Duration::from_secs(20),
             jobs: 2,
         };
         let mut arguments = arguments.iter();
@@ -56,8 +56,8 @@ impl Options {
                 }
                 "--only" => options.only.push(value.clone()),
                 "--runs" => options.runs = number()?,
-                "--each" => options.each = Duration::from_secs(number()?),
-                "--widening" => options.widening = Duration::from_secs(number()?),
+                "--each" => options.time_per_plan = Duration::from_secs(number()?),
+                "--widening" => options.time_per_box = Duration::from_secs(number()?),
                 "--jobs" => options.jobs = usize::try_from(number()?.max(1)).unwrap_or(1),
                 _ => return Err(format!("unknown option {option}")),
             }

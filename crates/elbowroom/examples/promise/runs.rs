@@ -11,12 +11,12 @@ use super::tally::{Tally, run};
 use super::trial::{Ready, Search};
 
 use super::worlds::{Kind, Worlds};
-use super::{counted, not_counted};
+use super::{results_by_family, skipped_table};
 
 #[allow(clippy::disallowed_methods, reason = "runs are timed")]
 pub(crate) fn main(options: &Options) {
     let begin = Instant::now();
-    let (families, skipped) = counted(options, &|source| tally(source, options));
+    let (families, skipped) = results_by_family(options, &|source| tally(source, options));
     let kinds = Kind::ALL.map(Kind::name).join(" | ");
     let columns = "--:|".repeat(Kind::ALL.len());
     println!("| family | plans | {kinds} | failures |\n|---|--:|{columns}--:|");
@@ -25,7 +25,7 @@ pub(crate) fn main(options: &Options) {
     }
     let all: Vec<&Tally> = families.values().flatten().collect();
     println!("| **all** {}", line(&all));
-    print!("{}", not_counted(&skipped));
+    print!("{}", skipped_table(&skipped));
     let seconds = begin.elapsed().as_secs();
     let runs: u64 = all.iter().map(|tally| tally.runs()).sum();
     println!("\n{runs} runs, {seconds} s.");
@@ -60,7 +60,7 @@ fn line(tallies: &[&Tally]) -> String {
 fn tally(source: &Source, options: &Options) -> Result<(String, Tally), String> {
     let subject = Subject::of_source(source, &options.planning)?;
     let begin = Instant::now();
-    let goes_on = || begin.elapsed() < options.widening;
+    let goes_on = || begin.elapsed() < options.time_per_box;
     let search = Search {
         most_checks: usize::MAX,
         goes_on: &goes_on,
@@ -70,7 +70,7 @@ fn tally(source: &Source, options: &Options) -> Result<(String, Tally), String> 
     let mut tally = Tally::default();
     let begin = Instant::now();
     for number in 0..options.runs {
-        if begin.elapsed() > options.each {
+        if begin.elapsed() > options.time_per_plan {
             break;
         }
         run(&ready, &worlds, number, &mut tally);

@@ -5,8 +5,8 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use elbowroom::execution::{
-    Cause, Command, Decision, Ending, Entry, Event, Passage, Promise, Recorder, Ticket, World,
-    WorldError,
+    ActionHandle, Cause, Command, Decision, Ending, Entry, Event, GuaranteeLevel, Recorder,
+    TimeAdvance, World, WorldError,
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -37,7 +37,7 @@ impl<W: World> World for Lagging<W> {
         self.inner.command(now, command)
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let mut passage = self.inner.wait(until)?;
         let is_late = self.looks == 0;
         self.looks = self.looks.wrapping_sub(1);
@@ -58,11 +58,11 @@ pub(crate) struct Course<'a> {
     plan: &'a ParametrizedPlan,
     stray: Stray,
     orders: VecDeque<InstanceId>,
-    tickets: BTreeMap<Ticket, InstanceId>,
+    tickets: BTreeMap<ActionHandle, InstanceId>,
     looks: u64,
     happened: Vec<Option<Rational>>,
     /// Promises, in their order.
-    promises: Vec<Promise>,
+    promises: Vec<GuaranteeLevel>,
     /// Number of promises when the deviation was noticed.
     noticed: Option<usize>,
     /// Time and cause of abandoning the plan; later events are ignored.
@@ -92,14 +92,14 @@ impl<'a> Course<'a> {
     /// Returns `true` if the last promise is at least as strong as `weakest` and the deviation
     /// cannot violate it: the promise was made before the deviating action had started, or after
     /// the deviation was noticed.
-    pub(crate) fn is_promised(&self, weakest: Promise) -> bool {
+    pub(crate) fn is_promised(&self, weakest: GuaranteeLevel) -> bool {
         let is_before = match self.stray {
             Stray::Duration(id) => self.happened[self.plan.plan.start(id).index()].is_none(),
             Stray::Look(_) => true,
         };
         let first = self.noticed.or(is_before.then_some(0));
         let since = first.and_then(|first| self.promises.get(first..));
-        let last = since.and_then(<[Promise]>::last);
+        let last = since.and_then(<[GuaranteeLevel]>::last);
         last.is_some_and(|last| *last <= weakest)
     }
 
@@ -171,7 +171,7 @@ impl Recorder for Course<'_> {
                     let steps = orders.iter().map(|order| order.step.instance());
                     self.orders.extend(steps);
                 }
-                self.promises.extend(decided.reason.promise);
+                self.promises.extend(decided.reason.guarantee);
                 if matches!(decided.decision, Decision::Replan) {
                     self.given_up = Some(((*now).clone(), decided.reason.cause));
                 }
@@ -198,7 +198,7 @@ impl Recorder for Course<'_> {
 impl Course<'_> {
     fn observe(&mut self, time: &Rational, event: &Event) {
         let plan = &self.plan.plan;
-        let of = |ticket: &Ticket| self.tickets.get(ticket).copied();
+        let of = |ticket: &ActionHandle| self.tickets.get(ticket).copied();
         let node = match event {
             Event::Started { ticket, .. } => of(ticket).map(|id| plan.start(id)),
             Event::Ended {

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::flow;
 use elbowroom::model::{Step, Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, read_problem};
+use elbowroom::pipeline;
 use elbowroom::plan::deorder::Deordered;
 use elbowroom::plan::format;
 use elbowroom::plan::{NodeId, Valuation, network_node};
@@ -77,8 +77,8 @@ impl Subject {
         if plan.steps.is_empty() {
             return Err("an empty plan".to_owned());
         }
-        let freed = flow::free(&task, &plan).map_err(|error| match error {
-            flow::FlowError::Invalid(_) => "the judge rejects the plan".to_owned(),
+        let freed = pipeline::free(&task, &plan).map_err(|error| match error {
+            pipeline::PipelineError::Invalid(_) => "the judge rejects the plan".to_owned(),
             _ => "the plan cannot be freed".to_owned(),
         })?;
         Ok(Self {
@@ -105,7 +105,7 @@ impl Subject {
         if read.makespan() != self.plan.makespan() {
             return None;
         }
-        Some(match flow::free(&task, &read) {
+        Some(match pipeline::free(&task, &read) {
             Ok(freed) => Ok(Self {
                 family: self.family.clone(),
                 name: self.name.clone(),

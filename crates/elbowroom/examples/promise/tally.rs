@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom::execution::Promise;
+use elbowroom::execution::GuaranteeLevel;
 use elbowroom::execution::run::TimeoutRule;
 
 use super::strain::Stray;
@@ -101,7 +101,7 @@ fn run_unreckoned(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
     if turn.is_multiple_of(2) {
         let (mut world, look) = worlds.late_look(number);
         let stray = Stray::Look(look);
-        let promise = Promise::PartOfEnvelope;
+        let promise = GuaranteeLevel::PartOfEnvelope;
         let (outcome, is_given_up) = ready.run_strained(executor, &mut world, stray, promise);
         tally.strained(Kind::LateLook, &label, &outcome, is_given_up);
     } else if executor == "guarded" {
@@ -115,9 +115,9 @@ fn run_unreckoned(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
         tally.add(Kind::Late, &label, &outcome);
     } else {
         let (rest, promise) = match turn / 2 % 3 {
-            0 => (Kind::Uniform, Promise::Envelope),
-            1 => (Kind::Corner, Promise::Envelope),
-            _ => (Kind::Late, Promise::PartOfEnvelope),
+            0 => (Kind::Uniform, GuaranteeLevel::Envelope),
+            1 => (Kind::Corner, GuaranteeLevel::Envelope),
+            _ => (Kind::Late, GuaranteeLevel::PartOfEnvelope),
         };
         let Some((mut world, id)) = worlds.outside(rest, number) else {
             return false;

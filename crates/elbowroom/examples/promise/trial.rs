@@ -4,15 +4,16 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
-use elbowroom::execute::{Analyst, Execution};
+use elbowroom::execute::{Execution, PlanPreparer};
 use elbowroom::execution::run::{PlanningTime, Report, RunSettings, TimeoutRule, Verdict};
 use elbowroom::execution::{
-    Forms, Need, NoPlanner, NoRecord, PrepareError, Prepared, Preparer, Promise, Recorder, World,
+    DispatchableCache, GuaranteeLevel, NoPlanner, NoRecord, PlanForm, PreparationResult,
+    PrepareError, Preparer, Recorder, World,
 };
-use elbowroom::flow;
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
+use elbowroom::pipeline;
 use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 
@@ -24,11 +25,11 @@ use super::subject::Subject;
 pub(crate) struct Ready<'a> {
     pub(crate) subject: &'a Subject,
     /// For `stn` and `fixed`.
-    pub(crate) network: Prepared,
+    pub(crate) network: PreparationResult,
     /// With all durations as parameters, and the box.
-    pub(crate) open: Prepared,
+    pub(crate) open: PreparationResult,
     /// For `esterel`, `adaptable` and `lookahead`.
-    orderings: Result<Prepared, PrepareError>,
+    orderings: Result<PreparationResult, PrepareError>,
 }
 
 /// Outcome of a run.
@@ -65,36 +66,36 @@ impl<'a> Ready<'a> {
         let task = &subject.task;
         let nominal = subject.freed.nominal.clone();
         let instances = subject.freed.instances.clone();
-        let open = flow::open(task, subject.freed.clone(), &[])
+        let open = pipeline::open(task, subject.freed.clone(), &[])
             .map_err(|_| "durations cannot be left open".to_owned())?;
-        let closed = flow::closed(task, subject.freed.clone());
+        let closed = pipeline::without_parameters(task, subject.freed.clone());
         let open = Arc::new(open);
         let boxed = boxed(task, &open, Guarantee::Dynamic, search)?;
-        let mut analyst = Analyst::new(flow::Settings::default());
+        let mut analyst = PlanPreparer::new(pipeline::Settings::default());
         Ok(Self {
             subject,
-            network: Prepared {
+            network: PreparationResult {
                 plan: closed,
                 instances: instances.clone(),
                 nominal: nominal.clone(),
                 envelope: None,
-                forms: Forms::default(),
+                forms: DispatchableCache::default(),
                 order: None,
             },
-            open: Prepared {
+            open: PreparationResult {
                 plan: Arc::unwrap_or_clone(open),
                 instances,
                 nominal,
                 envelope: Some(boxed.envelope),
-                forms: Forms::default(),
+                forms: DispatchableCache::default(),
                 order: None,
             },
-            orderings: analyst.prepare(task, &subject.plan, Need::PartialOrder),
+            orderings: analyst.prepare(task, &subject.plan, PlanForm::PartialOrder),
         })
     }
 
     /// Returns the same plan with another box.
-    pub(crate) fn with_open(&self, open: Prepared) -> Self {
+    pub(crate) fn with_open(&self, open: PreparationResult) -> Self {
         Self {
             subject: self.subject,
             network: self.network.clone(),
@@ -111,7 +112,7 @@ impl<'a> Ready<'a> {
 
     /// Runs an executor in a world without deviations.
     pub(crate) fn run_as_planned(&self, executor: &str) -> Outcome {
-        let model = WorldModel::as_planned();
+        let model = WorldModel::without_deviations();
         let mut world = SimWorld::new(Arc::clone(&self.subject.task), &model, 0);
         self.run(executor, &mut world)
     }
@@ -149,7 +150,7 @@ impl<'a> Ready<'a> {
         executor: &str,
         world: &mut dyn World,
         stray: Stray,
-        weakest: Promise,
+        weakest: GuaranteeLevel,
     ) -> (Outcome, bool) {
         let mut course = Course::new(&self.open.plan, stray);
         let report = self.recorded(executor, world, &TimeoutRule::Off, &mut course);
@@ -184,8 +185,8 @@ impl<'a> Ready<'a> {
             .beginning_with(self.subject.plan.clone())
             .by(executor.parse().expect("an executor that there is"))
             .with_settings(settings)
-            .prepared_by(Remembered(self))
-            .planned_by(NoPlanner)
+            .with_preparer(Remembered(self))
+            .with_planner(NoPlanner)
             .recorded_by(recorder)
             .run_in(world)
     }
@@ -229,12 +230,12 @@ impl Preparer for Remembered<'_> {
         &mut self,
         _task: &Arc<Task>,
         _plan: &TimeTriggeredPlan,
-        need: Need,
-    ) -> Result<Prepared, PrepareError> {
+        need: PlanForm,
+    ) -> Result<PreparationResult, PrepareError> {
         match need {
-            Need::Orderings | Need::PartialOrder => self.0.orderings.clone(),
-            Need::Network => Ok(self.0.network.clone()),
-            Need::OpenNetwork | Need::Envelope => Ok(self.0.open.clone()),
+            PlanForm::Orderings | PlanForm::PartialOrder => self.0.orderings.clone(),
+            PlanForm::Network => Ok(self.0.network.clone()),
+            PlanForm::OpenNetwork | PlanForm::Envelope => Ok(self.0.open.clone()),
         }
     }
 }

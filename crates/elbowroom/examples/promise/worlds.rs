@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom::execute::Spoiling;
-use elbowroom::execution::Prepared;
+use elbowroom::execute::AdversarialWorld;
+use elbowroom::execution::PreparationResult;
 use elbowroom::execution::run::TimeoutRule;
 use elbowroom::model::Task;
 use elbowroom::num::{End, Interval, Rational};
 use elbowroom::plan::uncertain::PlanNetwork;
 use elbowroom::plan::{DecoupledEnvelope, InstanceId, ParameterId, ParameterKind};
-use elbowroom::sim::{Durations, Paced, SimWorld, WorldModel};
+use elbowroom::sim::{ControlledWorld, FixedDurations, SimWorld, WorldModel};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -66,7 +66,7 @@ pub(crate) struct LateStart {
 pub(crate) struct Worlds<'a> {
     task: Arc<Task>,
     model: WorldModel,
-    prepared: &'a Prepared,
+    prepared: &'a PreparationResult,
     envelope: &'a DecoupledEnvelope,
     /// Instances of each action, in the order of their planned starts, with the parameters of their
     /// durations.
@@ -77,7 +77,7 @@ pub(crate) struct Worlds<'a> {
 impl<'a> Worlds<'a> {
     pub(crate) fn new(
         task: &Arc<Task>,
-        prepared: &'a Prepared,
+        prepared: &'a PreparationResult,
         envelope: &'a DecoupledEnvelope,
     ) -> Self {
         let plan = &prepared.plan.plan;
@@ -97,7 +97,7 @@ impl<'a> Worlds<'a> {
         }
         Self {
             task: Arc::clone(task),
-            model: WorldModel::as_planned(),
+            model: WorldModel::without_deviations(),
             network: prepared.plan.uncertain_network(envelope).ok(),
             prepared,
             envelope,
@@ -115,9 +115,9 @@ impl<'a> Worlds<'a> {
         kind: Kind,
         seed: u64,
         timeout: &TimeoutRule,
-    ) -> Paced<'_, Durations> {
+    ) -> ControlledWorld<'_, FixedDurations> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        Paced::new(self.sim(), self.durations(kind, &mut rng, timeout))
+        ControlledWorld::new(self.sim(), self.durations(kind, &mut rng, timeout))
     }
 
     /// Draws a late start of an action that occurs once in the plan.
@@ -140,10 +140,14 @@ impl<'a> Worlds<'a> {
     }
 
     /// Returns a world with that late start; durations are drawn with this seed.
-    pub(crate) fn late<'b>(&self, late: &'b LateStart, seed: u64) -> Paced<'b, Durations> {
+    pub(crate) fn late<'b>(
+        &self,
+        late: &'b LateStart,
+        seed: u64,
+    ) -> ControlledWorld<'b, FixedDurations> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let world = SimWorld::new(Arc::clone(&self.task), &late.model, 0);
-        Paced::new(
+        ControlledWorld::new(
             world,
             self.durations(Kind::Late, &mut rng, &TimeoutRule::Off),
         )
@@ -155,7 +159,7 @@ impl<'a> Worlds<'a> {
         &self,
         kind: Kind,
         seed: u64,
-    ) -> Option<(Paced<'_, Durations>, InstanceId)> {
+    ) -> Option<(ControlledWorld<'_, FixedDurations>, InstanceId)> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let all = self.instances.values().flatten();
         let open = all.filter_map(|(id, parameter)| Some((*id, (*parameter)?)));
@@ -180,26 +184,29 @@ impl<'a> Worlds<'a> {
         }
         let stray = strays.swap_remove(rng.random_range(0..strays.len()));
         let durations = self.durations_but(kind, &mut rng, &TimeoutRule::Off, Some(&stray));
-        Some((Paced::new(self.sim(), durations), stray.0))
+        Some((ControlledWorld::new(self.sim(), durations), stray.0))
     }
 
     /// Returns the world with one late observation, and the number of that observation. Durations
     /// are drawn with this seed.
-    pub(crate) fn late_look(&self, seed: u64) -> (Lagging<Paced<'_, Durations>>, u64) {
+    pub(crate) fn late_look(
+        &self,
+        seed: u64,
+    ) -> (Lagging<ControlledWorld<'_, FixedDurations>>, u64) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let plan = &self.prepared.plan.plan;
         let looks = rng.random_range(0..=2 * plan.nodes.len() as u64);
         let times = plan.nodes().map(|(node, _)| &self.prepared.nominal[node]);
         let whole = times.max().cloned().unwrap_or_default();
         let lag = whole * Rational::new(rng.random_range(1..=200), 1000);
-        let inner = Paced::new(
+        let inner = ControlledWorld::new(
             self.sim(),
             self.durations(Kind::Late, &mut rng, &TimeoutRule::Off),
         );
         (Lagging { inner, looks, lag }, looks)
     }
 
-    fn durations(&self, kind: Kind, rng: &mut ChaCha8Rng, timeout: &TimeoutRule) -> Durations {
+    fn durations(&self, kind: Kind, rng: &mut ChaCha8Rng, timeout: &TimeoutRule) -> FixedDurations {
         self.durations_but(kind, rng, timeout, None)
     }
 
@@ -210,7 +217,7 @@ impl<'a> Worlds<'a> {
         rng: &mut ChaCha8Rng,
         timeout: &TimeoutRule,
         stray: Option<&(InstanceId, Rational)>,
-    ) -> Durations {
+    ) -> FixedDurations {
         let stray = |id: InstanceId| stray.filter(|(own, _)| *own == id);
         let mut durations = BTreeMap::new();
         for (name, instances) in &self.instances {
@@ -231,7 +238,7 @@ impl<'a> Worlds<'a> {
             });
             durations.insert(name.clone(), values.collect());
         }
-        Durations::new(durations)
+        FixedDurations::new(durations)
     }
 
     fn nominal(&self, id: InstanceId) -> Rational {
@@ -241,11 +248,14 @@ impl<'a> Worlds<'a> {
     }
 
     /// Returns a world with durations chosen by the spoiler within the box.
-    pub(crate) fn spoiled(&self, timeout: &TimeoutRule) -> Option<Paced<'_, Spoiling>> {
+    pub(crate) fn spoiled(
+        &self,
+        timeout: &TimeoutRule,
+    ) -> Option<ControlledWorld<'_, AdversarialWorld>> {
         let network = self.network.as_ref()?;
         let plan = &self.prepared.plan.plan;
-        let spoiling = Spoiling::new(plan, network, &self.prepared.nominal, timeout);
-        Some(Paced::new(self.sim(), spoiling))
+        let spoiling = AdversarialWorld::new(plan, network, &self.prepared.nominal, timeout);
+        Some(ControlledWorld::new(self.sim(), spoiling))
     }
 }
 

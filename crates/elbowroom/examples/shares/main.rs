@@ -35,8 +35,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::answers::region::{RegionFinding, RegionSettings, region};
-use elbowroom::answers::{EnvelopeRequest, Unwatched};
-use elbowroom::chances;
+use elbowroom::answers::{EnvelopeRequest, NoObserver};
+use elbowroom::duration_distributions;
 use elbowroom::envelope::{
     BestRun, BestSettings, Guarantee, Objective, Oracle, Settings, best, irr, volume_foot,
 };
@@ -174,7 +174,7 @@ fn shares_of_volume(instance: &Instance) -> Option<(Vec<(String, f64)>, bool)> {
         seed: 0,
     };
     let request = EnvelopeRequest::new(&task, plan);
-    let outcome = region(&request, &settings, &mut Unwatched).ok()?;
+    let outcome = region(&request, &settings, &mut NoObserver).ok()?;
     let RegionFinding::Region {
         boxes,
         measure: Some(measure),
@@ -251,14 +251,14 @@ fn compared(instance: &Instance, orders: usize, steps: usize) -> Option<Vec<Shar
 /// Returns the largest box with the dynamic guarantee, if it is proved to be the largest and has
 /// any slack.
 fn largest(task: &Arc<Task>, text: &str, objective: Objective, steps: usize) -> Option<BestRun> {
-    let run = sought(task, text, Guarantee::Dynamic, objective, steps)?;
+    let run = best_in_steps(task, text, Guarantee::Dynamic, objective, steps)?;
     let is_logarithm = matches!(objective, Objective::Volume | Objective::Probability);
     let has_room = is_logarithm || run.value.is_positive();
     (run.is_proved && has_room).then_some(run)
 }
 
 /// Returns the largest box found in `steps` steps, starting with IRR's.
-fn sought(
+fn best_in_steps(
     task: &Arc<Task>,
     text: &str,
     guarantee: Guarantee,
@@ -267,15 +267,17 @@ fn sought(
 ) -> Option<BestRun> {
     let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
     let mut oracle = Oracle::new(task, &plan, guarantee).ok()?;
-    let start = irr(&mut oracle, &fine(), &mut |_| ControlFlow::Continue(()));
+    let start = irr(&mut oracle, &irr_settings(), &mut |_| {
+        ControlFlow::Continue(())
+    });
     let start = start.ok()?.envelope.ok()?;
     let chances = match objective {
-        Objective::Probability => chances(&plan, &around(task)?).ok()?,
+        Objective::Probability => duration_distributions(&plan, &default_world(task)?).ok()?,
         _ => Vec::new(),
     };
     let settings = BestSettings {
         objective,
-        chances,
+        distributions: chances,
         ..BestSettings::default()
     };
     let mut left = steps;
@@ -291,14 +293,14 @@ fn sought(
 }
 
 /// Returns the world in which each duration is normally distributed around its nominal value.
-pub(crate) fn around(task: &Task) -> Option<WorldModel> {
+pub(crate) fn default_world(task: &Task) -> Option<WorldModel> {
     let text = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"*\"\n\
                 normal = { mean = 1, deviation = 0.15 }\nrelative = true\n";
     WorldModel::read(Source::new("world", text), task.problem()).ok()
 }
 
 /// Returns settings with IRR's steps: a hundredth of each nominal value.
-fn fine() -> Settings {
+fn irr_settings() -> Settings {
     Settings {
         relative: Some(Rational::new(1, 100)),
         ..Settings::default()
@@ -309,7 +311,10 @@ fn fine() -> Settings {
 fn shares(task: &Arc<Task>, text: &str, names: &[String], largest: &Largest) -> Option<Shares> {
     let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
     let mut oracle = Oracle::new(task, &plan, Guarantee::Dynamic).ok()?;
-    let run = irr(&mut oracle, &fine(), &mut |_| ControlFlow::Continue(())).ok()?;
+    let run = irr(&mut oracle, &irr_settings(), &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .ok()?;
     let found = run.envelope.ok()?;
     let nominal = DecoupledEnvelope::point(&plan.nominal());
     let Largest {
@@ -319,7 +324,7 @@ fn shares(task: &Arc<Task>, text: &str, names: &[String], largest: &Largest) -> 
         likeliest,
     } = largest;
     let mut likely = 0.0;
-    let own_chances = chances(&plan, &around(task)?).ok()?;
+    let own_chances = duration_distributions(&plan, &default_world(task)?).ok()?;
     let both = plan.parameters.iter().zip(found.intervals());
     for ((parameter, interval), chance) in both.zip(&own_chances) {
         let Some(chance) = chance else { continue };
@@ -332,7 +337,7 @@ fn shares(task: &Arc<Task>, text: &str, names: &[String], largest: &Largest) -> 
             .upper
             .value()
             .map_or(far, |end| end - &parameter.nominal);
-        let [mass, _] = chance.mass(&parameter.nominal, &[below, above]);
+        let [mass, _] = chance.probability_bounds(&parameter.nominal, &[below, above]);
         likely += mass.to_f64().ln();
     }
     let mut sum = Rational::ZERO;
@@ -349,8 +354,8 @@ fn shares(task: &Arc<Task>, text: &str, names: &[String], largest: &Largest) -> 
                 side: end.side,
             };
             let far = end.reach(&found).zip(end.reach(&nominal));
-            let moved = far.map_or_else(|| own.most.clone(), |(far, near)| far - near);
-            let moved = moved.min(own.most.clone());
+            let moved = far.map_or_else(|| own.max_distance.clone(), |(far, near)| far - near);
+            let moved = moved.min(own.max_distance.clone());
             let weight = &plan.parameter(end.parameter).weight;
             sum += weight * &moved;
             let slack = moved.checked_div(scale)?;

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::answers::envelope::{Search, envelope};
-use elbowroom::answers::{EnvelopeRequest, Halt, Watcher};
+use elbowroom::answers::{EnvelopeRequest, Observer, StopRequest};
 use elbowroom::envelope::{Guarantee, Objective};
 use elbowroom::model::Task;
 use elbowroom::plan::format;
 use elbowroom::verify::{AnswerError, verify_answer};
 
 use crate::instances::Instance;
-use crate::{around, read, sought};
+use crate::{best_in_steps, default_world, read};
 
 /// Prints a row for each family, guarantee and objective.
 #[allow(
@@ -38,12 +38,12 @@ pub(crate) fn times(families: &[(String, Vec<Instance>)], steps: usize) {
                         continue;
                     };
                     let begun = Instant::now();
-                    let Some(run) = sought(&task, &text, guarantee, objective, steps) else {
+                    let Some(run) = best_in_steps(&task, &text, guarantee, objective, steps) else {
                         continue;
                     };
                     boxes.push(begun.elapsed().as_secs_f64());
                     proved += usize::from(run.is_proved);
-                    checks.extend(checked(&task, &text, guarantee, objective, steps));
+                    checks.extend(time_checks(&task, &text, guarantee, objective, steps));
                 }
                 for own in [&mut boxes, &mut checks] {
                     own.sort_by(f64::total_cmp);
@@ -75,7 +75,7 @@ pub(crate) fn times(families: &[(String, Vec<Instance>)], steps: usize) {
     clippy::disallowed_methods,
     reason = "how long it takes is what is asked"
 )]
-fn checked(
+fn time_checks(
     task: &Arc<Task>,
     text: &str,
     guarantee: Guarantee,
@@ -86,8 +86,8 @@ fn checked(
     let mut request = EnvelopeRequest::new(task, plan);
     request.guarantee = guarantee;
     request.search = Search::best(objective);
-    request.world = around(task).map(Arc::new);
-    let outcome = envelope(&request, &mut Patience(steps)).ok()?;
+    request.world = default_world(task).map(Arc::new);
+    let outcome = envelope(&request, &mut StepLimit(steps)).ok()?;
     let answer = serde_json::to_string(&outcome.answer).expect("a document");
     let begun = Instant::now();
     let verdict = verify_answer(&answer);
@@ -100,13 +100,13 @@ fn checked(
 }
 
 /// Watcher that ends a search after this number of steps.
-struct Patience(usize);
+struct StepLimit(usize);
 
-impl Watcher for Patience {
-    fn flow(&mut self) -> ControlFlow<Halt> {
+impl Observer for StepLimit {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         self.0 = self.0.saturating_sub(1);
         if self.0 == 0 {
-            return ControlFlow::Break(Halt::TimeLimit);
+            return ControlFlow::Break(StopRequest::TimeLimit);
         }
         ControlFlow::Continue(())
     }

@@ -33,9 +33,9 @@ pub struct CheckRequest<'a> {
 #[serde(untagged)]
 pub enum CheckAnswer {
     /// The answer about a plan.
-    Plan(PlanChecked),
+    Plan(ValidationReport),
     /// The answer about a problem.
-    Problem(ProblemRead),
+    Problem(ProblemSummary),
 }
 
 /// Format of a document.
@@ -49,7 +49,7 @@ pub enum CheckFormat {
 
 /// The validator's report on a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PlanChecked {
+pub struct ValidationReport {
     /// Format of the document.
     pub format: CheckFormat,
     /// Version of the document.
@@ -144,13 +144,13 @@ pub struct MarginAnswer {
 
 /// A summary of a problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ProblemRead {
+pub struct ProblemSummary {
     /// Format of the document.
     pub format: CheckFormat,
     /// Version of the document.
     pub version: Version,
     /// The result.
-    pub answer: Readable,
+    pub answer: ProblemFinding,
     /// The domain's name.
     pub domain: String,
     /// The problem's name.
@@ -160,7 +160,7 @@ pub struct ProblemRead {
 /// The result for a problem without a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Readable {
+pub enum ProblemFinding {
     /// The problem is readable.
     #[default]
     Readable,
@@ -174,22 +174,22 @@ pub fn check(request: &CheckRequest<'_>) -> Result<CheckAnswer, RequestError> {
     let task = request.task;
     let (domain, problem) = (task.problem().domain.clone(), task.problem().name.clone());
     let Some(plan) = request.plan else {
-        return Ok(CheckAnswer::Problem(ProblemRead {
+        return Ok(CheckAnswer::Problem(ProblemSummary {
             format: CheckFormat::Check,
             version: Version,
-            answer: Readable::Readable,
+            answer: ProblemFinding::Readable,
             domain,
             problem,
         }));
     };
     let finding = match validate::validate(task, plan, &request.settings) {
-        Verdict::Valid(report) => valid(task, plan, &report),
+        Verdict::Valid(report) => valid_finding(task, plan, &report),
         Verdict::Invalid(violation) => CheckFinding::Invalid {
             violation: (&violation).into(),
         },
         Verdict::Undecided(why) => return Err(RequestError::Undecided(why.to_string())),
     };
-    Ok(CheckAnswer::Plan(PlanChecked {
+    Ok(CheckAnswer::Plan(ValidationReport {
         format: CheckFormat::Check,
         version: Version,
         plan: request.name.clone(),
@@ -199,8 +199,8 @@ pub fn check(request: &CheckRequest<'_>) -> Result<CheckAnswer, RequestError> {
     }))
 }
 
-fn valid(task: &Task, plan: &TimeTriggeredPlan, report: &Report) -> CheckFinding {
-    let changed = changed(task, plan);
+fn valid_finding(task: &Task, plan: &TimeTriggeredPlan, report: &Report) -> CheckFinding {
+    let changed = changed_fluents(task, plan);
     let values = report.state.values.iter();
     CheckFinding::Valid {
         makespan: report.makespan.clone(),
@@ -213,7 +213,7 @@ fn valid(task: &Task, plan: &TimeTriggeredPlan, report: &Report) -> CheckFinding
             })
             .collect(),
         margins: report.margins.iter().map(margin).collect(),
-        goals: goals::reached(task, plan),
+        goals: goals::goal_times(task, plan),
         preferences: preferences(task, &report.preferences),
     }
 }
@@ -224,8 +224,8 @@ fn preferences(task: &Task, found: &Preferences) -> Vec<PreferenceAnswer> {
         let id = PreferenceId::from(position);
         let violated = found.violated.iter().filter(|one| one.preference == id);
         let violated = violated.map(|one| match &one.action {
-            Some(action) => format!("{action} at {}: {}", nearest(&one.time), one.why),
-            None => format!("at {}: {}", nearest(&one.time), one.why),
+            Some(action) => format!("{action} at {}: {}", format_time(&one.time), one.why),
+            None => format!("at {}: {}", format_time(&one.time), one.why),
         });
         let undecided = found.undecided.iter().filter(|(other, _)| *other == id);
         let undecided = undecided.map(|(_, why)| format!("cannot tell: {why}"));
@@ -241,7 +241,7 @@ fn preferences(task: &Task, found: &Preferences) -> Vec<PreferenceAnswer> {
 }
 
 /// Formats a time.
-fn nearest(time: &Rational) -> String {
+fn format_time(time: &Rational) -> String {
     time.to_decimal(3)
 }
 
@@ -257,7 +257,7 @@ fn margin(margin: &Margin) -> MarginAnswer {
 }
 
 /// Returns the fluents that the plan's actions change.
-fn changed(task: &Task, plan: &TimeTriggeredPlan) -> BTreeSet<FluentId> {
+fn changed_fluents(task: &Task, plan: &TimeTriggeredPlan) -> BTreeSet<FluentId> {
     let steps = plan.steps.iter();
     steps
         .flat_map(|step| {

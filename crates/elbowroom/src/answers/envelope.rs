@@ -1,19 +1,19 @@
 //! Envelopes: how far each quantity of a plan may deviate.
 
 mod answer;
-mod balance;
+mod answer_builder;
 mod best;
+mod binding_constraints;
+mod box_search;
 mod certificate;
 mod conditions;
-mod foresight;
-mod grow;
 mod inequalities;
-mod limits;
 mod search;
+mod shadow_prices;
 pub mod timeline;
 mod timeouts;
-mod told;
-mod worth;
+mod uniform_slack;
+mod value_of_information;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -28,25 +28,26 @@ use elbowroom_plan::parametrize::VarySpec;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 use elbowroom_sim::WorldModel;
 
-use super::{Halt, RequestError, Watcher};
+use super::{Observer, RequestError, StopRequest};
 use crate::explain::{Explainer, Explanation};
-use crate::flow::{self, FlowError};
+use crate::pipeline::{self, PipelineError};
 use crate::{AnyPlan, parse_box};
 
 pub use answer::{
-    Chosen, Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings,
-    Failing, Happening, LimitGroup, Makespans, Quantity, QuantityKind, Range, Room, Stop, Widened,
+    ActionTimes, ChosenDuration, Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat,
+    EnvelopeSettings, LimitGroup, LimitedRange, Makespans, NominalFailure, Quantity, QuantityKind,
+    Range, Stop, WideningStep,
 };
-pub use balance::{Balance, Deviation};
+pub(crate) use answer_builder::quantities;
 pub use best::{Best, Probability};
+pub(crate) use box_search::grow;
 pub use conditions::Conditions;
-pub use foresight::Foresight;
-pub(crate) use grow::grow;
 pub use inequalities::{Inequalities, NetworkRow, RequirementRow};
+pub use shadow_prices::{Relax, ShadowPrices};
 pub use timeline::Timeline;
-pub(crate) use timeouts::{PlannedBeyond, unknown_action};
-pub(crate) use told::quantities;
-pub use worth::{Relax, Worth};
+pub(crate) use timeouts::{PlannedTimeout, unknown_action};
+pub use uniform_slack::{Deviation, UniformSlack};
+pub use value_of_information::ValueOfInformation;
 
 /// Requests the envelope of a plan, or checks whether a box lies inside it.
 #[derive(Clone, Debug)]
@@ -180,7 +181,7 @@ impl Search {
             || self.precision != usual.precision
             || self.growth != usual.growth
             || self.sharpen;
-        if is_for_irr || task.left_to_the_judge().is_some() {
+        if is_for_irr || task.unsupported_by_analysis().is_some() {
             Method::Irr
         } else {
             Method::Best
@@ -209,7 +210,7 @@ pub struct EnvelopeOutcome {
     /// The box inside the envelope; `None` if there is none, or if the request had another aim.
     pub envelope: Option<DecoupledEnvelope>,
     /// The reason why the plan fails as planned, or in the given box.
-    pub why_not: Option<Explanation>,
+    pub explanation: Option<Explanation>,
 }
 
 impl EnvelopeRequest {
@@ -237,7 +238,7 @@ impl EnvelopeRequest {
 
     /// Replaces the open quantities and the guarantee by those of `settings`.
     #[must_use]
-    pub fn with_settings(mut self, settings: &flow::Settings) -> Self {
+    pub fn with_settings(mut self, settings: &pipeline::Settings) -> Self {
         self.vary.clone_from(&settings.vary);
         self.guarantee = settings.guarantee;
         self.timeout.clone_from(&settings.timeout);
@@ -256,26 +257,26 @@ impl EnvelopeRequest {
 /// When the request names things that the plan does not have, or the plan is beyond exact analysis.
 pub fn envelope(
     request: &EnvelopeRequest,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<EnvelopeOutcome, RequestError> {
     if let Some(mistake) = unknown_action(&request.timeout, request.task.problem()) {
         return Err(RequestError::Timeout(mistake));
     }
     let opened = if request.method() == Method::Best {
-        opened(request)
+        parametrized_plan(request)
     } else {
-        opened_with_nature(request)
+        parametrized_plan_with_autonomous(request)
     };
     let (plan, enforced) = match opened {
         Ok((plan, enforced)) => (Arc::new(plan), enforced),
-        Err(FlowError::Invalid(violation)) => {
+        Err(PipelineError::Invalid(violation)) => {
             let violation = (&*violation).into();
-            let failing = Failing::Invalid { violation };
+            let failing = NominalFailure::Invalid { violation };
             return Ok(EnvelopeOutcome {
                 answer: EnvelopeAnswer::new(request, EnvelopeFinding::Fails(failing)),
                 plan: None,
                 envelope: None,
-                why_not: None,
+                explanation: None,
             });
         }
         Err(error) => return Err(error.into()),
@@ -287,13 +288,13 @@ pub fn envelope(
         explainer: Explainer::new(&request.task, &plan),
     };
     let oracle = Oracle::new(&request.task, &plan, request.guarantee);
-    let oracle = oracle.map_err(FlowError::Refused)?;
+    let oracle = oracle.map_err(PipelineError::Refused)?;
     let nominal = plan.nominal();
     if plan.plan.network(&nominal).consistency().is_err() {
-        return Ok(subject.fails(subject.explainer.no_schedule(&nominal)));
+        return Ok(subject.failure_outcome(subject.explainer.no_schedule(&nominal)));
     }
-    if let Some(counterexample) = subject.planned_beyond() {
-        let failing = Failing::AsPlanned {
+    if let Some(counterexample) = subject.planned_timeout() {
+        let failing = NominalFailure::AsPlanned {
             parameters: subject.quantities(),
             counterexample,
         };
@@ -312,10 +313,10 @@ pub fn envelope(
 
 /// Builds the answer of an interrupted search from its last progress report: plan, box and number
 /// of checks. Unlike [`envelope`], it does not compute the limits of the ends, which takes time.
-pub fn so_far(
+pub fn partial_result(
     request: &EnvelopeRequest,
     found: Option<(&Arc<ParametrizedPlan>, &DecoupledEnvelope, usize)>,
-    halt: Halt,
+    halt: StopRequest,
     seconds: f64,
 ) -> EnvelopeOutcome {
     let stop = halt.into();
@@ -324,7 +325,7 @@ pub fn so_far(
             answer: EnvelopeAnswer::new(request, EnvelopeFinding::None { stop }),
             plan: None,
             envelope: None,
-            why_not: None,
+            explanation: None,
         };
     };
     let subject = Subject {
@@ -335,7 +336,7 @@ pub fn so_far(
     };
     let unknown = vec![[None, None]; plan.parameters.len()];
     let mut outcome = subject.outcome(EnvelopeFinding::Envelope {
-        parameters: subject.rooms(envelope, unknown),
+        parameters: subject.limited_ranges(envelope, unknown),
         chosen: subject.chosen(),
         stop,
         checks,
@@ -359,25 +360,29 @@ pub fn so_far(
 /// # Errors
 /// When the validator rejects the plan, the request names things that the plan does not have, or
 /// the problem has processes or events.
-pub(crate) fn opened(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, usize), FlowError> {
-    match request.task.left_to_the_judge() {
+pub(crate) fn parametrized_plan(
+    request: &EnvelopeRequest,
+) -> Result<(ParametrizedPlan, usize), PipelineError> {
+    match request.task.unsupported_by_analysis() {
         Some(feature) => Err(DeorderError::Unsupported { feature }.into()),
-        None => opened_with_nature(request),
+        None => parametrized_plan_with_autonomous(request),
     }
 }
 
 /// Like [`opened`], but also for problems with processes and events.
-fn opened_with_nature(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, usize), FlowError> {
+fn parametrized_plan_with_autonomous(
+    request: &EnvelopeRequest,
+) -> Result<(ParametrizedPlan, usize), PipelineError> {
     let task = &request.task;
     let plan = match &request.plan {
-        AnyPlan::Stn(plan) => flow::open_more(task, plan.clone(), &request.vary)?,
-        AnyPlan::TimeTriggered(plan) => flow::free_and_open(task, plan, &request.vary)?,
+        AnyPlan::Stn(plan) => pipeline::open_more_quantities(task, plan.clone(), &request.vary)?,
+        AnyPlan::TimeTriggered(plan) => pipeline::deorder_and_open(task, plan, &request.vary)?,
     };
     if !request.enforce {
         return Ok((plan, 0));
     }
     // A plan without a schedule gets no bounds; the search reports the reason later.
-    Ok(elbowroom_envelope::enforced(task, &plan).unwrap_or((plan, 0)))
+    Ok(elbowroom_envelope::with_obligations(task, &plan).unwrap_or((plan, 0)))
 }
 
 /// Checks whether a box lies inside the envelope.
@@ -387,10 +392,12 @@ fn contains(
     text: &str,
 ) -> Result<EnvelopeOutcome, RequestError> {
     let envelope = parse_box(text, subject.plan)?;
-    let objection = oracle.objection(&envelope).map_err(FlowError::Refused)?;
+    let objection = oracle
+        .objection(&envelope)
+        .map_err(PipelineError::Refused)?;
     let parameters = subject.ranges(&envelope);
     let Some(objection) = objection else {
-        let finding = match subject.beyond_timeout(&envelope) {
+        let finding = match subject.possible_timeout(&envelope) {
             None => EnvelopeFinding::Inside { parameters },
             Some(counterexample) => EnvelopeFinding::Outside {
                 parameters,
@@ -400,12 +407,12 @@ fn contains(
         return Ok(subject.outcome(finding));
     };
     let why_not = subject.explainer.objection(&oracle, &envelope, &objection);
-    subject.refuse_harmless("this box", &why_not)?;
+    subject.reject_unproved_objection("this box", &why_not)?;
     let mut outcome = subject.outcome(EnvelopeFinding::Outside {
         parameters,
         counterexample: subject.counterexample(&why_not),
     });
-    outcome.why_not = Some(why_not);
+    outcome.explanation = Some(why_not);
     Ok(outcome)
 }
 
@@ -425,18 +432,22 @@ impl Subject<'_> {
             answer: EnvelopeAnswer::new(self.request, finding),
             plan: Some(Arc::clone(self.plan)),
             envelope: None,
-            why_not: None,
+            explanation: None,
         }
     }
 
     /// Rejects an objection that is no proof of failure: processes and events would take another
     /// course than in the plan, which may be harmless.
-    fn refuse_harmless(&self, place: &str, why_not: &Explanation) -> Result<(), FlowError> {
+    fn reject_unproved_objection(
+        &self,
+        place: &str,
+        why_not: &Explanation,
+    ) -> Result<(), PipelineError> {
         if !why_not.may_be_harmless(&self.request.task) {
             return Ok(());
         }
         let reason = &why_not.reason;
-        Err(FlowError::Refused(Refusal::Nature {
+        Err(PipelineError::Refused(Refusal::Nature {
             place: place.to_owned(),
             obstacle: format!(
                 "the course of processes and events may change, and what the plan does then is \
@@ -446,13 +457,13 @@ impl Subject<'_> {
     }
 
     /// Returns the outcome for a plan that fails as planned.
-    fn fails(&self, why_not: Explanation) -> EnvelopeOutcome {
-        let failing = Failing::AsPlanned {
+    fn failure_outcome(&self, why_not: Explanation) -> EnvelopeOutcome {
+        let failing = NominalFailure::AsPlanned {
             parameters: self.quantities(),
             counterexample: self.counterexample(&why_not),
         };
         let mut outcome = self.outcome(EnvelopeFinding::Fails(failing));
-        outcome.why_not = Some(why_not);
+        outcome.explanation = Some(why_not);
         outcome
     }
 }

@@ -2,9 +2,9 @@
 //! plan's envelope.
 
 mod changes;
-mod courses;
-mod inside;
-mod other_problem;
+mod conformal_box;
+mod fact_history;
+mod known_sections;
 mod prediction;
 mod timeouts;
 
@@ -13,20 +13,20 @@ use elbowroom_learning::learn::{self, Durations, Group, Learnt};
 use elbowroom_learning::records::{self, Outcome, Record};
 use elbowroom_learning::{table, world};
 use elbowroom_report::trace::{Stored, TraceError};
-use elbowroom_sim::{Distribution, Failure, WorldModel};
+use elbowroom_sim::{Distribution, FailureTime, WorldModel};
 use elbowroom_text::{Diagnostics, Source};
 use serde::{Deserialize, Serialize};
 
-use super::{RequestError, Version, Watcher};
+use super::{Observer, RequestError, Version};
 
-use changes::Expected;
+use changes::ExpectedChanges;
 use prediction::Predictions;
 
-pub use changes::{ChangesLearnt, RateLearnt};
-pub use courses::Course;
+pub use changes::{LearntChanges, LearntRate};
+pub use conformal_box::{ConformalBox, ConformalInterval, ConformalRequest, Verdict};
 pub use elbowroom_learning::learn::Settings;
-pub use inside::{ConformalBox, ConformalInterval, InsideRequest, Verdict};
-pub use other_problem::known_sections;
+pub use fact_history::FactHistory;
+pub use known_sections::known_sections;
 pub use prediction::{PredictionAnswer, predictions_for};
 
 /// Requests a model of the world from logs.
@@ -37,7 +37,7 @@ pub struct LearnRequest {
     /// Settings of the learner.
     pub settings: Settings,
     /// A plan, to predict whether the next run stays inside its envelope.
-    pub inside: Option<InsideRequest>,
+    pub conformal_box: Option<ConformalRequest>,
     /// The expected world file, if changes by themselves are to be compared with it.
     pub expected: Option<Source>,
 }
@@ -50,7 +50,7 @@ pub struct Log {
     /// The attempts to execute actions, in order.
     pub records: Vec<Record>,
     /// Changes of facts; `None` if the log does not contain them, such as a table.
-    pub course: Option<Course>,
+    pub fact_history: Option<FactHistory>,
     /// The believed world of the run; `None` if it had none, or if the log does not contain it.
     pub world: Option<WorldModel>,
 }
@@ -84,18 +84,20 @@ impl Log {
             return Ok(Self {
                 name,
                 records: table::read(source)?,
-                course: None,
+                fact_history: None,
                 world: None,
             });
         }
         match Stored::read(source.text()) {
             Ok(trace) => {
-                let course = Course::of(&trace);
+                let course = FactHistory::of(&trace);
                 Ok(Self {
                     name,
                     records: records::of_trace(&trace),
-                    world: course.as_ref().and_then(|course| course.believed(&trace)),
-                    course,
+                    world: course
+                        .as_ref()
+                        .and_then(|course| course.believed_world(&trace)),
+                    fact_history: course,
                 })
             }
             Err(error) => Err(LogError::Trace { name, error }),
@@ -115,11 +117,11 @@ pub struct LearnAnswer {
     /// Number of attempts.
     pub attempts: usize,
     /// Statistics of the attempts, by the actions' names.
-    pub actions: Vec<ActionLearnt>,
+    pub actions: Vec<LearntAction>,
     /// Rates of facts that change by themselves, for each predicate with an observed or expected
     /// change.
     #[serde(default)]
-    pub changes: Vec<ChangesLearnt>,
+    pub changes: Vec<LearntChanges>,
     /// The learnt world file.
     pub world: String,
     /// The [time-outs](elbowroom_execution::run::TimeoutRule) that follow from the durations: twice
@@ -143,18 +145,18 @@ pub enum LearnFormat {
 
 /// Statistics of the attempts to execute actions of one name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ActionLearnt {
+pub struct LearntAction {
     /// The name: `drive`.
     pub action: String,
     /// Number of attempts.
     pub attempts: usize,
     /// Description of the durations.
-    pub durations: DurationsLearnt,
+    pub durations: LearntDurations,
     /// Delay from the command to the start of the action; `None` if there is none, or if no log
     /// contains it.
     pub delay: Option<FitAnswer>,
     /// Statistics of failures.
-    pub failures: FailuresLearnt,
+    pub failures: LearntFailures,
     /// Change of the durations from log to log; `None` if each ground action is described
     /// separately.
     pub drift: Option<DriftAnswer>,
@@ -168,7 +170,7 @@ pub struct ActionLearnt {
 /// Description of the durations of actions of one name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "described", rename_all = "kebab-case")]
-pub enum DurationsLearnt {
+pub enum LearntDurations {
     /// No description: no action was observed to its end, or the actions have no durations.
     Unknown,
     /// In seconds, all ground actions together.
@@ -229,7 +231,7 @@ pub struct FitAnswer {
 
 /// Statistics of failures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FailuresLearnt {
+pub struct LearntFailures {
     /// Number of failed attempts.
     pub failed: u64,
     /// Number of attempts that were neither cancelled nor still running.
@@ -262,7 +264,7 @@ pub struct DriftAnswer {
 /// the problem of a log, or when no log contains facts to compare it with.
 pub fn learn(
     request: &LearnRequest,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<LearnAnswer, RequestError> {
     let records: Vec<Record> = request
         .logs
@@ -270,24 +272,27 @@ pub fn learn(
         .flat_map(|log| log.records.iter().cloned())
         .collect();
     let mut learnt = learn::learn(&records, &request.settings);
-    let courses = request.logs.iter().filter_map(|log| log.course.as_ref());
-    for (name, is_undone) in courses.flat_map(Course::undone) {
+    let courses = request
+        .logs
+        .iter()
+        .filter_map(|log| log.fact_history.as_ref());
+    for (name, is_undone) in courses.flat_map(FactHistory::undone_effects) {
         if let Some(of_name) = learnt.iter_mut().find(|it| it.name == name) {
             of_name.undone.add(is_undone);
         }
     }
     let expected = match &request.expected {
-        Some(world) => Some(Expected::new(&request.logs, world)?),
+        Some(world) => Some(ExpectedChanges::new(&request.logs, world)?),
         None => None,
     };
     let predictions = predictions(request);
     let changes = changes::of(&request.logs);
-    let told = |changes| ChangesLearnt::of(changes, expected.as_ref());
-    let mut told: Vec<ChangesLearnt> = changes.iter().map(told).collect();
-    told.extend(expected.iter().flat_map(|it| it.unseen(&changes)));
+    let told = |changes| LearntChanges::of(changes, expected.as_ref());
+    let mut told: Vec<LearntChanges> = changes.iter().map(told).collect();
+    told.extend(expected.iter().flat_map(|it| it.unobserved(&changes)));
     told.sort_by(|a, b| (&a.predicate, a.becomes).cmp(&(&b.predicate, b.becomes)));
-    let inside = match &request.inside {
-        Some(inside) => Some(inside::answer(inside, &learnt, watcher)?),
+    let inside = match &request.conformal_box {
+        Some(inside) => Some(conformal_box::answer(inside, &learnt, watcher)?),
         None => None,
     };
     Ok(LearnAnswer {
@@ -297,7 +302,7 @@ pub fn learn(
         attempts: records.len(),
         actions: learnt
             .iter()
-            .map(|it| ActionLearnt::of(it, predictions.of(&it.name)))
+            .map(|it| LearntAction::of(it, predictions.of(&it.name)))
             .collect(),
         changes: told,
         world: world::write(&learnt, &changes, request.settings.resolution),
@@ -310,7 +315,7 @@ pub fn learn(
 fn predictions(request: &LearnRequest) -> Predictions {
     let mut predictions = Predictions::default();
     for log in &request.logs {
-        let expected = request.expected.as_ref().zip(log.course.as_ref());
+        let expected = request.expected.as_ref().zip(log.fact_history.as_ref());
         let expected = expected.and_then(|(world, course)| course.read(world));
         if let Some(world) = expected.as_ref().or(log.world.as_ref()) {
             predictions.add(&log.records, world);
@@ -321,7 +326,7 @@ fn predictions(request: &LearnRequest) -> Predictions {
 
 /// Returns the mean planned and the mean actual duration of an action: of all attempts that
 /// succeeded and had a planned duration. `None` if there are none.
-pub fn expectation_and_reality(records: &[Record], name: &str) -> Option<(f64, f64)> {
+pub fn mean_planned_and_actual(records: &[Record], name: &str) -> Option<(f64, f64)> {
     let pairs: Vec<(f64, f64)> = records
         .iter()
         .filter(|record| record.name() == name && record.outcome == Outcome::Succeeded)
@@ -336,23 +341,23 @@ pub fn expectation_and_reality(records: &[Record], name: &str) -> Option<(f64, f
     (!pairs.is_empty()).then(|| (sum(|pair| pair.0), sum(|pair| pair.1)))
 }
 
-impl ActionLearnt {
+impl LearntAction {
     fn of(learnt: &Learnt, prediction: Option<PredictionAnswer>) -> Self {
         let failures = learnt.failures;
         Self {
             action: learnt.name.clone(),
             attempts: learnt.attempts,
-            durations: DurationsLearnt::of(&learnt.durations),
+            durations: LearntDurations::of(&learnt.durations),
             delay: learnt.delay.as_ref().map(FitAnswer::of),
-            failures: FailuresLearnt {
+            failures: LearntFailures {
                 failed: failures.successes,
                 ended: failures.count,
                 interval: failures.wilson(),
                 when: (failures.successes > 0).then(|| {
-                    let when = match learnt.when {
-                        Failure::AtStart => "start",
-                        Failure::Midway => "midway",
-                        Failure::AtEnd => "end",
+                    let when = match learnt.failure_time {
+                        FailureTime::AtStart => "start",
+                        FailureTime::Midway => "midway",
+                        FailureTime::AtEnd => "end",
                     };
                     when.to_owned()
                 }),
@@ -360,10 +365,10 @@ impl ActionLearnt {
                     .then_some((learnt.undone.successes, learnt.undone.count)),
             },
             drift: match learnt.durations {
-                Durations::Together(_) | Durations::Relative(_) => {
+                Durations::Pooled(_) | Durations::Relative(_) => {
                     Some(DriftAnswer::of(&learnt.drift))
                 }
-                Durations::Apart(_) | Durations::Unknown => None,
+                Durations::PerAction(_) | Durations::Unknown => None,
             },
             failure_drift: DriftAnswer::of(&learnt.failure_drift),
             prediction,
@@ -380,17 +385,17 @@ impl DriftAnswer {
     }
 }
 
-impl DurationsLearnt {
+impl LearntDurations {
     fn of(durations: &Durations) -> Self {
         match durations {
             Durations::Unknown => Self::Unknown,
-            Durations::Together(group) => Self::Together {
+            Durations::Pooled(group) => Self::Together {
                 group: GroupAnswer::of(group),
             },
             Durations::Relative(group) => Self::Relative {
                 group: GroupAnswer::of(group),
             },
-            Durations::Apart(groups) => Self::Apart {
+            Durations::PerAction(groups) => Self::Apart {
                 groups: groups
                     .iter()
                     .map(|(action, group)| NamedGroup {

@@ -1,7 +1,7 @@
 //! The success probability of a plan, its losses, and possible gains.
 
 mod executed;
-mod gains;
+mod improvements;
 mod lattice;
 mod order;
 
@@ -15,18 +15,18 @@ use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_plan::NodeId;
 use elbowroom_plan::partial_order::partial_order;
 use elbowroom_probability::{
-    Circumstances, Likelihoods, Model, OrderSearch, SearchSettings, SearchStop, Semantics,
+    Likelihoods, Model, OrderSearch, SearchSettings, SearchState, SearchStop, Semantics,
     TotalOrderPlan,
 };
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
-use super::{RequestError, Version, ViolationAnswer, Watcher};
+use super::{Observer, RequestError, Version, ViolationAnswer};
 use crate::execute::Embedded;
-use crate::execute::as_timed;
+use crate::execute::with_fixed_durations;
 
 pub use executed::{EndAnswer, ExecutedAnswer};
-pub use gains::{BestOrderAnswer, GainsAnswer, ValueAnswer};
+pub use improvements::{BestOrderAnswer, ImprovementsAnswer, ValueAnswer};
 pub use lattice::{EdgeAnswer, LatticeAnswer, LatticeFinding, SetAnswer};
 pub use order::{
     ActionAnswer, FactAnswer, HappeningAnswer, LayerAnswer, LossAnswer, LossReason, OrderAnswer,
@@ -168,7 +168,7 @@ pub struct Odds {
     /// The analysed order.
     pub order: OrderAnswer,
     /// The gain of another order, of retrying, and of another plan.
-    pub gains: GainsAnswer,
+    pub gains: ImprovementsAnswer,
     /// The results of executing the plan in samples of the world, if there is one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub executed: Vec<ExecutedAnswer>,
@@ -182,7 +182,7 @@ pub(super) struct Subject<'a> {
     request: &'a OddsRequest<'a>,
     plan: &'a TimeTriggeredPlan,
     search: OrderSearch,
-    initial: Circumstances,
+    initial: SearchState,
     /// The happenings in the order of the plan's times.
     as_planned: Vec<NodeId>,
 }
@@ -194,7 +194,7 @@ pub(super) struct Subject<'a> {
 /// cannot decide whether the plan is valid, or the planner does not support the problem.
 pub fn odds(
     request: &OddsRequest<'_>,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<OddsAnswer, RequestError> {
     let problem = request.task.problem();
     Ok(OddsAnswer {
@@ -209,9 +209,9 @@ pub fn odds(
 
 fn finding(
     request: &OddsRequest<'_>,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<OddsFinding, RequestError> {
-    if let Some(feature) = request.task.only_judged() {
+    if let Some(feature) = request.task.validator_only_feature() {
         let message = format!("odds do not respect {feature} yet, which the problem has");
         return Err(RequestError::Unsupported(message));
     }
@@ -226,12 +226,12 @@ fn finding(
             Verdict::Undecided(why) => return Err(RequestError::Undecided(why.to_string())),
         }
     } else {
-        match planned(request) {
+        match plan_of_planner(request) {
             PlanAnswer::Plan(plan) => made = plan,
             PlanAnswer::Unsolvable => return Ok(OddsFinding::NoPlan),
             PlanAnswer::Failed { why } => return Err(RequestError::Unsupported(why)),
             other => {
-                let reason = other.why_not().unwrap_or_default().to_owned();
+                let reason = other.failure_reason().unwrap_or_default().to_owned();
                 return Ok(OddsFinding::None { reason });
             }
         }
@@ -242,10 +242,10 @@ fn finding(
         let (best, stop) = subject.best_order(watcher)?;
         match (best, stop) {
             (Some(order), stop) => OrderAnswer::of(&subject, &order, Some(stop))?,
-            (None, SearchStop::Complete) if works_in_order(request, plan)? => {
+            (None, SearchStop::Complete) if is_executable_in_order(request, plan)? => {
                 return Ok(OddsFinding::NoOrder);
             }
-            (None, SearchStop::Complete) => return Ok(fails_in_order()),
+            (None, SearchStop::Complete) => return Ok(no_order_finding()),
             (None, SearchStop::Interrupted) => {
                 let reason = "no order was found within the limit of the search".to_owned();
                 return Ok(OddsFinding::None { reason });
@@ -255,14 +255,18 @@ fn finding(
         let order = subject
             .search
             .order_of(&subject.initial, &subject.as_planned);
-        OrderAnswer::of(&subject, &order.map_err(|error| coupled(&error))?, None)?
+        OrderAnswer::of(
+            &subject,
+            &order.map_err(|error| coupling_error(&error))?,
+            None,
+        )?
     };
-    if order.probability <= 0.0 && !works_in_order(request, plan)? {
-        return Ok(fails_in_order());
+    if order.probability <= 0.0 && !is_executable_in_order(request, plan)? {
+        return Ok(no_order_finding());
     }
-    let gains = GainsAnswer::of(&mut subject, &order, watcher)?;
+    let gains = ImprovementsAnswer::of(&mut subject, &order, watcher)?;
     let executed = match request.world {
-        Some(world) => executed::all(&subject, world, watcher),
+        Some(world) => executed::execute_with_all(&subject, world, watcher),
         None => Vec::new(),
     };
     let lattice = request.settings.with_lattice;
@@ -276,7 +280,7 @@ fn finding(
 }
 
 /// Returns the answer for a valid plan whose happenings do not work as an order.
-fn fails_in_order() -> OddsFinding {
+fn no_order_finding() -> OddsFinding {
     let reason = "not supported: the happenings of this plan do not reach the goal as an order, although the plan is valid";
     OddsFinding::None {
         reason: reason.to_owned(),
@@ -284,20 +288,20 @@ fn fails_in_order() -> OddsFinding {
 }
 
 /// Returns `true` if the happenings of a valid plan, taken as an order, succeed when everything is certain.
-fn works_in_order(
+fn is_executable_in_order(
     request: &OddsRequest<'_>,
     plan: &TimeTriggeredPlan,
 ) -> Result<bool, RequestError> {
     let mut subject = Subject::new(request, plan, &Likelihoods::certain())?;
-    subject.initial = Circumstances::initial(request.task);
+    subject.initial = SearchState::initial(request.task);
     let order = subject
         .search
         .order_of(&subject.initial, &subject.as_planned);
-    Ok(order.map_err(|error| coupled(&error))?.probability > 0.0)
+    Ok(order.map_err(|error| coupling_error(&error))?.probability > 0.0)
 }
 
 /// Returns a plan of the embedded planner.
-fn planned(request: &OddsRequest<'_>) -> PlanAnswer {
+fn plan_of_planner(request: &OddsRequest<'_>) -> PlanAnswer {
     planner(&request.settings)
         .plan(request.task, &Situation::initial(request.task))
         .answer
@@ -310,7 +314,7 @@ fn planner(settings: &OddsSettings) -> Embedded<'static> {
     planner
 }
 
-fn coupled(error: &elbowroom_probability::TooCoupled) -> RequestError {
+fn coupling_error(error: &elbowroom_probability::TooCoupled) -> RequestError {
     RequestError::Unsupported(error.to_string())
 }
 
@@ -320,7 +324,7 @@ impl<'a> Subject<'a> {
         plan: &'a TimeTriggeredPlan,
         likelihoods: &Likelihoods,
     ) -> Result<Self, RequestError> {
-        let ordered = partial_order(request.task, &as_timed(plan));
+        let ordered = partial_order(request.task, &with_fixed_durations(plan));
         let by_step = ordered.instance_of_step.iter().zip(&plan.steps);
         let mut steps: Vec<(_, &Step)> = by_step.map(|(&id, step)| (id, step)).collect();
         steps.sort_by_key(|(id, _)| *id);
@@ -330,19 +334,19 @@ impl<'a> Subject<'a> {
         let model = Model::new(task, ordered, likelihoods, semantics);
         let model = model.map_err(|missing| RequestError::Unsupported(missing.to_string()))?;
         let search = OrderSearch::new(model, SearchSettings::default());
-        let as_planned = search.as_timed(&steps);
+        let as_planned = search.timed_sequence(&steps);
         Ok(Self {
             request,
             plan,
             search: search.beginning_with(as_planned.clone()),
-            initial: Circumstances::believed(request.task, likelihoods),
+            initial: SearchState::initial_with_beliefs(request.task, likelihoods),
             as_planned,
         })
     }
 
     fn best_order(
         &mut self,
-        watcher: &mut dyn Watcher,
+        watcher: &mut dyn Observer,
     ) -> Result<(Option<TotalOrderPlan>, SearchStop), RequestError> {
         let most = self.request.settings.most_sequences;
         let found = self.search.best_order(&self.initial, &mut |progress| {
@@ -351,7 +355,7 @@ impl<'a> Subject<'a> {
             }
             ControlFlow::Continue(())
         });
-        let found = found.map_err(|error| coupled(&error))?;
+        let found = found.map_err(|error| coupling_error(&error))?;
         Ok((found.order, found.stop))
     }
 }

@@ -2,19 +2,19 @@
 
 mod external;
 mod improving;
+mod no_plan_claim;
 mod objective;
-mod refuted;
 
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
-use elbowroom_planner::{Answer, Counts, Found, Progress, Settings, Stopped};
+use elbowroom_planner::{Answer, Counts, FoundPlan, Progress, Settings, Stopped};
 use elbowroom_verify::no_plan::NoPlan;
 use serde::{Deserialize, Serialize};
 
-use super::{Event, Exact, Halt, PlanProgress, RequestError, Version, Watcher, exact};
+use super::{Event, Exact, Observer, PlanProgress, RequestError, StopRequest, Version, exact};
 use crate::execute::exhausted;
 use crate::plan_text;
 
@@ -22,7 +22,7 @@ pub use crate::no_plan::no_plan_certificate_from;
 pub use external::{PlannerFailure, plan_with};
 pub use improving::{BetterPlan, ImprovingPlans, ImprovingPlansRequest, NextPlan};
 pub use objective::{
-    BestPlanRequest, PlanAim, PlanChoice, PlanObjective, PlanWorth, UnknownPlanObjective, best_plan,
+    BestPlanRequest, PlanAim, PlanChoice, PlanObjective, PlanValue, UnknownPlanObjective, best_plan,
 };
 
 /// Requests a plan.
@@ -208,7 +208,7 @@ pub use crate::execute::EMBEDDED;
 /// When the problem has features that the embedded planner does not support.
 pub fn plan(
     request: &mut PlanRequest<'_>,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<PlanOutcome, RequestError> {
     let begun = watcher.elapsed();
     let situation = Situation::initial(request.task);
@@ -221,12 +221,12 @@ pub fn plan(
     if let Some(bytes) = request.most_memory {
         settings.max_memory = usize::try_from(bytes).unwrap_or(usize::MAX);
     }
-    let mut course = Course {
+    let mut course = SearchMonitor {
         watcher,
-        begun,
+        started: begun,
         plans: 0,
         first: None,
-        halt: None,
+        stop_request: None,
     };
     let answer = elbowroom_planner::plan(request.task, &situation, &settings, &mut |progress| {
         course.step(progress)
@@ -238,7 +238,7 @@ pub fn plan(
             counts,
         } => (Ok(found), course.stop(stopped), counts),
         Answer::Unsolvable { proof, counts } => {
-            let (finding, stop) = course.refuted(request.task, &proof, counts);
+            let (finding, stop) = course.refuted_finding(request.task, &proof, counts);
             (Err(finding), stop, counts)
         }
         Answer::NoneFound {
@@ -247,7 +247,7 @@ pub fn plan(
             counts,
         } => {
             let stop = course.stop(stopped);
-            let reason = none_found(stop, (counts, without_self_overlap), settings.max_memory);
+            let reason = no_plan_reason(stop, (counts, without_self_overlap), settings.max_memory);
             (Err(PlanFinding::none(request.task, reason)), stop, counts)
         }
         Answer::Unsupported(unsupported) => {
@@ -255,7 +255,7 @@ pub fn plan(
         }
     };
     let (plan, finding) = match found {
-        Ok(Found {
+        Ok(FoundPlan {
             plan,
             makespan,
             metric,
@@ -271,12 +271,12 @@ pub fn plan(
 }
 
 /// Returns the answer of a planner that was stopped before the problem was read.
-pub fn unread(planner: &str, halt: Halt, elapsed: Duration) -> PlanOutcome {
+pub fn stopped_before_reading(planner: &str, halt: StopRequest, elapsed: Duration) -> PlanOutcome {
     let stop = PlanStop::from(halt);
     let ended = match halt {
-        Halt::TimeLimit => "stopped at the time limit",
-        Halt::MemoryLimit => "stopped at the memory limit",
-        Halt::Cancelled => "stopped",
+        StopRequest::TimeLimit => "stopped at the time limit",
+        StopRequest::MemoryLimit => "stopped at the memory limit",
+        StopRequest::Cancelled => "stopped",
     };
     let reason = format!(
         "no plan found: {ended}, before domain and problem were read; this is no proof that there \
@@ -305,7 +305,7 @@ pub fn unread(planner: &str, halt: Halt, elapsed: Duration) -> PlanOutcome {
     }
 }
 
-impl Course<'_> {
+impl SearchMonitor<'_> {
     /// Builds the answer, with the choice if the plan was chosen among several.
     fn answer(
         &mut self,
@@ -368,30 +368,30 @@ impl From<Counts> for PlanStatistics {
     }
 }
 
-impl From<Halt> for PlanStop {
-    fn from(halt: Halt) -> Self {
+impl From<StopRequest> for PlanStop {
+    fn from(halt: StopRequest) -> Self {
         match halt {
-            Halt::TimeLimit => Self::TimeLimit,
-            Halt::MemoryLimit => Self::MemoryLimit,
-            Halt::Cancelled => Self::Cancelled,
+            StopRequest::TimeLimit => Self::TimeLimit,
+            StopRequest::MemoryLimit => Self::MemoryLimit,
+            StopRequest::Cancelled => Self::Cancelled,
         }
     }
 }
 
 /// Counts the plans found, and notifies the watcher.
-struct Course<'a> {
-    watcher: &'a mut dyn Watcher,
-    begun: Duration,
+struct SearchMonitor<'a> {
+    watcher: &'a mut dyn Observer,
+    started: Duration,
     plans: usize,
     /// The time at which the first plan was found.
     first: Option<Duration>,
     /// The watcher's reason to stop.
-    halt: Option<Halt>,
+    stop_request: Option<StopRequest>,
 }
 
-impl Course<'_> {
+impl SearchMonitor<'_> {
     fn elapsed(&mut self) -> Duration {
-        self.watcher.elapsed().saturating_sub(self.begun)
+        self.watcher.elapsed().saturating_sub(self.started)
     }
 
     fn step(&mut self, progress: &Progress) -> ControlFlow<()> {
@@ -401,23 +401,23 @@ impl Course<'_> {
             self.first.get_or_insert(elapsed);
         }
         let found = progress.plan.as_ref();
-        self.tell(&PlanProgress {
+        self.report(&PlanProgress {
             plan: found.map(|found| &found.plan),
             makespan: found.map(|found| &found.makespan),
             metric: found.and_then(|found| found.metric.as_ref()),
-            worth: None,
+            value: None,
             plans: self.plans,
             states: Some(progress.counts.evaluated),
             memory: None,
         })
     }
 
-    fn tell(&mut self, progress: &PlanProgress<'_>) -> ControlFlow<()> {
+    fn report(&mut self, progress: &PlanProgress<'_>) -> ControlFlow<()> {
         self.watcher.notice(&Event::Plan(progress.clone()));
         match self.watcher.flow() {
             ControlFlow::Continue(()) => ControlFlow::Continue(()),
             ControlFlow::Break(halt) => {
-                self.halt = Some(halt);
+                self.stop_request = Some(halt);
                 ControlFlow::Break(())
             }
         }
@@ -425,7 +425,9 @@ impl Course<'_> {
 
     fn stop(&self, stopped: Stopped) -> PlanStop {
         match stopped {
-            Stopped::Interrupted => self.halt.map_or(PlanStop::Cancelled, PlanStop::from),
+            Stopped::Interrupted => self
+                .stop_request
+                .map_or(PlanStop::Cancelled, PlanStop::from),
             Stopped::OutOfMemory => PlanStop::MemoryLimit,
             Stopped::FirstPlan => PlanStop::FirstPlan,
             Stopped::Exhausted => PlanStop::Exhausted,
@@ -434,7 +436,7 @@ impl Course<'_> {
 }
 
 /// Returns the reason why no plan was found. `memory` is the memory limit, in bytes.
-fn none_found(
+fn no_plan_reason(
     stop: PlanStop,
     (counts, without_self_overlap): (Counts, bool),
     memory: usize,

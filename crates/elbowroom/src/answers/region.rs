@@ -15,17 +15,17 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 use super::envelope::{self, Inequalities, Quantity, Timeline, quantities};
-use super::{EnvelopeRequest, Exact, RequestError, Version, ViolationAnswer, Watcher, exact};
+use super::{EnvelopeRequest, Exact, Observer, RequestError, Version, ViolationAnswer, exact};
 use crate::explain::Explainer;
-use crate::flow::FlowError;
 use crate::linear_form::LinearForm;
+use crate::pipeline::PipelineError;
 
 pub use boxes::{BoxAnswer, IntervalAnswer};
 pub use measure::{Measure, Share};
 pub use picture::{Others, PictureError, Plane, picture};
 
 /// Largest number of positions that are distinguished for a moment inside an action.
-const MOST_PLACES: usize = 256;
+const MOST_POSITIONS: usize = 256;
 
 /// The answer as a document (`docs/formats/region-json.md`), with the plan and the region.
 #[derive(Clone, Debug)]
@@ -156,25 +156,25 @@ pub struct RegionSettings {
 pub fn region(
     request: &EnvelopeRequest,
     settings: &RegionSettings,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<RegionOutcome, RequestError> {
     let task = &request.task;
     let outcome = |finding, plan, region| outcome(request, finding, plan, region);
-    let plan = match envelope::opened(request) {
+    let plan = match envelope::parametrized_plan(request) {
         Ok((plan, _)) => plan,
-        Err(FlowError::Invalid(violation)) => {
+        Err(PipelineError::Invalid(violation)) => {
             let violation = (&*violation).into();
             return Ok(outcome(RegionFinding::Invalid { violation }, None, None));
         }
         Err(error) => return Err(error.into()),
     };
     let ranges = DecoupledEnvelope::ranges(&plan);
-    let form = match LinearForm::new(task, &plan, &ranges, &plan.nominal(), MOST_PLACES) {
+    let form = match LinearForm::new(task, &plan, &ranges, &plan.nominal(), MOST_POSITIONS) {
         Ok(form) => form,
         Err(Refusal::NoNominalSchedule) => {
             return Ok(outcome(RegionFinding::Unscheduled, Some(plan), None));
         }
-        Err(refusal) => return Err(FlowError::Refused(refusal).into()),
+        Err(refusal) => return Err(PipelineError::Refused(refusal).into()),
     };
     let network = form.network.iter().map(|bound| bound.inequality.clone());
     let network: Vec<_> = network.collect();
@@ -184,7 +184,7 @@ pub fn region(
     let explainer = Explainer::new(task, &plan);
     let finding = match &found {
         Ok(found) => {
-            let row = |row: &RegionRow| answered(&explainer, &form, row);
+            let row = |row: &RegionRow| row_answer(&explainer, &form, row);
             let pieces = found.pieces.iter().map(|piece| PieceAnswer {
                 rows: piece.rows.iter().map(row).collect(),
             });
@@ -194,7 +194,7 @@ pub fn region(
                 Vec::new()
             };
             let measure = if settings.with_volume {
-                let most = &request.search.best.most;
+                let most = &request.search.best.max_deviation;
                 let flow = &mut || watcher.flow().map_break(|_| ());
                 measure::measure(&plan, found, &mut boxes, most, settings.seed, flow)
             } else {
@@ -229,8 +229,8 @@ pub fn region(
 }
 
 /// Builds the answer of an interrupted computation, which has no partial result.
-pub fn so_far(request: &EnvelopeRequest) -> RegionOutcome {
-    let reason = ExactError::Ended.to_string();
+pub fn partial_result(request: &EnvelopeRequest) -> RegionOutcome {
+    let reason = ExactError::Stopped.to_string();
     outcome(request, RegionFinding::None { reason }, None, None)
 }
 
@@ -257,7 +257,7 @@ fn outcome(
     }
 }
 
-fn answered(explainer: &Explainer<'_>, form: &LinearForm, row: &RegionRow) -> RowAnswer {
+fn row_answer(explainer: &Explainer<'_>, form: &LinearForm, row: &RegionRow) -> RowAnswer {
     let (task, plan) = (explainer.task, explainer.plan);
     let name = |id| plan.parameter(id).name.clone();
     let mut because: Vec<String> = Vec::new();
@@ -274,11 +274,11 @@ fn answered(explainer: &Explainer<'_>, form: &LinearForm, row: &RegionRow) -> Ro
         }
     }
     if because.is_empty() {
-        because.extend(fitting(explainer, row, &bounds));
+        because.extend(describe_duration_row(explainer, row, &bounds));
     }
     let factors = row.factors.iter();
     RowAnswer {
-        text: text(plan, row),
+        text: format_row(plan, row),
         factors: factors
             .map(|(id, factor)| (name(*id), Exact(factor.clone())))
             .collect(),
@@ -289,7 +289,11 @@ fn answered(explainer: &Explainer<'_>, form: &LinearForm, row: &RegionRow) -> Ro
 }
 
 /// Describes a row about durations: which actions have to fit into which others.
-fn fitting(explainer: &Explainer<'_>, row: &RegionRow, bounds: &[(usize, Side)]) -> Option<String> {
+fn describe_duration_row(
+    explainer: &Explainer<'_>,
+    row: &RegionRow,
+    bounds: &[(usize, Side)],
+) -> Option<String> {
     let (mut takes, mut gives) = (Vec::new(), Vec::new());
     for (id, factor) in &row.factors {
         let ParameterKind::Duration(instance) = explainer.plan.parameter(*id).kind else {
@@ -302,11 +306,11 @@ fn fitting(explainer: &Explainer<'_>, row: &RegionRow, bounds: &[(usize, Side)])
             takes.push(action);
         }
     }
-    explainer.sum_words(takes, gives, bounds)
+    explainer.describe_sum(takes, gives, bounds)
 }
 
 /// Formats a row with positive factors on both sides: `dur_0 + dur_3 <= 4893/100`.
-fn text(plan: &ParametrizedPlan, row: &RegionRow) -> String {
+fn format_row(plan: &ParametrizedPlan, row: &RegionRow) -> String {
     let (mut left, mut right) = (String::new(), String::new());
     for (id, factor) in &row.factors {
         let side = if factor.is_negative() {

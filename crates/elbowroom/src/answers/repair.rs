@@ -1,14 +1,14 @@
 //! Repairs: the cheapest changes that make a plan work.
 
+mod descriptions;
 mod subject;
-mod words;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{
-    Guarantee, Oracle, Repair, RepairLimits, RepairRun, enforced, repair as cheapest,
+    Guarantee, Oracle, Repair, RepairLimits, RepairRun, repair as cheapest, with_obligations,
 };
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -17,14 +17,14 @@ use elbowroom_plan::{Constraint, DecoupledEnvelope, ParametrizedPlan, Schedule, 
 use serde::{Deserialize, Serialize};
 
 use super::plan::PlanStep;
-use super::{Exact, Halt, RequestError, Version, Watcher, exact};
-use crate::flow::{self, FlowError};
-use crate::{AnyPlan, room};
+use super::{Exact, Observer, RequestError, StopRequest, Version, exact};
+use crate::pipeline::{self, PipelineError};
+use crate::{AnyPlan, pinning};
 use subject::Subject;
 
 /// Work limit of a search through other orders, in linear programs times the square of the number
 /// of time points.
-const OTHER_ORDERS: usize = 200_000;
+const OTHER_ORDERS_WORK: usize = 200_000;
 
 /// Requests the cheapest change that makes a plan work.
 #[derive(Clone, Debug)]
@@ -193,12 +193,12 @@ pub struct Change {
 /// When the request names things that the plan does not have, or the plan is beyond exact analysis.
 pub fn repair(
     request: &RepairRequest,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<RepairOutcome, RequestError> {
     if let AnyPlan::TimeTriggered(plan) = &request.plan
-        && flow::judge(&request.task, plan).is_valid()
+        && pipeline::validate_plan(&request.task, plan).is_valid()
     {
-        return Ok(as_it_stands(request, plan));
+        return Ok(unchanged_outcome(request, plan));
     }
     let subject = Subject::new(request)?;
     let mut halt = None;
@@ -234,16 +234,16 @@ pub fn repair(
 }
 
 /// Builds the answer of an interrupted search, which has no partial result.
-pub fn so_far(request: &RepairRequest, halt: Halt) -> RepairOutcome {
+pub fn partial_result(request: &RepairRequest, halt: StopRequest) -> RepairOutcome {
     outcome(request, stopped(Some(halt), Rational::ZERO), None)
 }
 
-fn stopped(halt: Option<Halt>, bound: Rational) -> RepairFinding {
+fn stopped(halt: Option<StopRequest>, bound: Rational) -> RepairFinding {
     RepairFinding::None {
         reason: match halt {
-            Some(Halt::TimeLimit) => "the time limit was reached".to_owned(),
-            Some(Halt::MemoryLimit) => "the memory limit was reached".to_owned(),
-            Some(Halt::Cancelled) => "it was cancelled".to_owned(),
+            Some(StopRequest::TimeLimit) => "the time limit was reached".to_owned(),
+            Some(StopRequest::MemoryLimit) => "the memory limit was reached".to_owned(),
+            Some(StopRequest::Cancelled) => "it was cancelled".to_owned(),
             None => "there are too many cases to decide".to_owned(),
         },
         bound,
@@ -251,15 +251,15 @@ fn stopped(halt: Option<Halt>, bound: Rational) -> RepairFinding {
 }
 
 /// Builds the answer for a valid plan, which keeps its times.
-fn as_it_stands(request: &RepairRequest, plan: &TimeTriggeredPlan) -> RepairOutcome {
-    let promise = promised(request, &request.task, plan);
+fn unchanged_outcome(request: &RepairRequest, plan: &TimeTriggeredPlan) -> RepairOutcome {
+    let promise = check_guarantee(request, &request.task, plan);
     let finding = RepairFinding::Repaired {
         changes: Vec::new(),
         cost: Rational::ZERO,
         bound: Rational::ZERO,
         because: Vec::new(),
         keeps: Vec::new(),
-        not_guaranteed: promise.why_not,
+        not_guaranteed: promise.missing_reason,
         steps: steps(plan),
         cases: 0,
         orders: Orders::All,
@@ -291,27 +291,31 @@ fn outcome(
 
 /// Additional bounds of a repaired plan, and the reason for a missing guarantee.
 #[derive(Default)]
-struct Promise {
-    keeps: Vec<String>,
-    why_not: Option<String>,
+struct RepairGuarantee {
+    added_bounds: Vec<String>,
+    missing_reason: Option<String>,
 }
 
 /// Deorders the plan, and checks its guarantee at the nominal values.
-fn promised(request: &RepairRequest, task: &Task, plan: &TimeTriggeredPlan) -> Promise {
+fn check_guarantee(
+    request: &RepairRequest,
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+) -> RepairGuarantee {
     let task = Arc::new(task.clone());
-    let opened = flow::free(&task, plan).and_then(|freed| flow::open(&task, freed, &[]));
+    let opened = pipeline::free(&task, plan).and_then(|freed| pipeline::open(&task, freed, &[]));
     let why_not = match opened {
-        Ok(opened) => objected(&task, &Arc::new(opened), request.guarantee),
+        Ok(opened) => nominal_objection(&task, &Arc::new(opened), request.guarantee),
         Err(error) => Some(error.to_string()),
     };
-    Promise {
-        why_not,
-        ..Promise::default()
+    RepairGuarantee {
+        missing_reason: why_not,
+        ..RepairGuarantee::default()
     }
 }
 
 /// Returns the objection to the plan's nominal values, if there is one.
-fn objected(
+fn nominal_objection(
     task: &Arc<Task>,
     plan: &Arc<ParametrizedPlan>,
     guarantee: Guarantee,
@@ -334,10 +338,10 @@ impl Subject {
         times: Option<&Schedule>,
         limits: &RepairLimits,
         flow: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<RepairRun, FlowError> {
+    ) -> Result<RepairRun, PipelineError> {
         let mut judged = |values: &Valuation, schedule: &Schedule| {
             let (task, plan) = self.repaired(values, schedule);
-            flow::judge(&task, &plan).is_valid()
+            pipeline::validate_plan(&task, &plan).is_valid()
         };
         let run = cheapest(
             &self.task,
@@ -348,7 +352,7 @@ impl Subject {
             &mut judged,
             flow,
         );
-        run.map_err(FlowError::Refused)
+        run.map_err(PipelineError::Refused)
     }
 
     /// Returns the limits of a search through other orders for a repair cheaper than `below`. More
@@ -356,8 +360,8 @@ impl Subject {
     fn limits_of_other_orders(&self, below: Option<Rational>) -> RepairLimits {
         let points = self.plan.plan.nodes.len().max(1);
         RepairLimits {
-            cases: (OTHER_ORDERS / (points * points)).clamp(10, 1_000),
-            below,
+            cases: (OTHER_ORDERS_WORK / (points * points)).clamp(10, 1_000),
+            cost_limit: below,
         }
     }
 
@@ -366,25 +370,25 @@ impl Subject {
         request: &RepairRequest,
         run: RepairRun,
         (orders, reordered): (Orders, bool),
-        halt: Option<Halt>,
+        halt: Option<StopRequest>,
     ) -> RepairOutcome {
         let mut repaired = None;
         let finding = match run {
             RepairRun::Repaired { repair, cases } => {
                 let (task, plan) = self.repaired(&repair.values, &repair.schedule);
                 let promise = match &self.times {
-                    Some(_) => promised(request, &task, &plan),
-                    None => self.kept(request, &repair.values, &repair.schedule),
+                    Some(_) => check_guarantee(request, &task, &plan),
+                    None => self.check_network_guarantee(request, &repair.values, &repair.schedule),
                 };
-                let because = self.because(&repair);
+                let because = self.cost_reasons(&repair);
                 let Repair { cost, bound, .. } = repair;
                 let finding = RepairFinding::Repaired {
                     changes: self.changes(&repair.values),
                     because,
                     cost,
                     bound,
-                    keeps: promise.keeps,
-                    not_guaranteed: promise.why_not,
+                    keeps: promise.added_bounds,
+                    not_guaranteed: promise.missing_reason,
                     steps: steps(&plan),
                     cases,
                     orders,
@@ -399,7 +403,7 @@ impl Subject {
             },
             RepairRun::Unexplained { values, schedule } => {
                 let (task, plan) = self.repaired(&values, &schedule);
-                let why = match flow::judge(&task, &plan) {
+                let why = match pipeline::validate_plan(&task, &plan) {
                     elbowroom_model::Verdict::Invalid(violation) => violation.to_string(),
                     _ => "the judge does not accept the plan".to_owned(),
                 };
@@ -415,37 +419,43 @@ impl Subject {
 
     /// Checks the guarantee of an STN plan with these values, and finds the additional bounds that
     /// it needs.
-    fn kept(&self, request: &RepairRequest, values: &Valuation, schedule: &Schedule) -> Promise {
+    fn check_network_guarantee(
+        &self,
+        request: &RepairRequest,
+        values: &Valuation,
+        schedule: &Schedule,
+    ) -> RepairGuarantee {
         let mut plan = self.plan.clone();
         let own = plan.parameters.iter_mut().zip(values).enumerate();
         for (index, (parameter, value)) in own {
             parameter.nominal = value.clone();
-            if index >= self.given {
+            if index >= self.own_parameters {
                 // Parameters that were opened for the repair are fixed again.
                 parameter.range = Interval::point(value.clone());
             }
         }
         let task = Arc::new(self.task.clone());
-        let objected =
-            |plan: &ParametrizedPlan| objected(&task, &Arc::new(plan.clone()), request.guarantee);
-        let Some(why_not) = objected(&plan) else {
-            return Promise::default();
+        let objected = |plan: &ParametrizedPlan| {
+            nominal_objection(&task, &Arc::new(plan.clone()), request.guarantee)
         };
-        let bounded = enforced(&task, &plan).map(|(plan, _)| plan);
-        let pinned = || Ok::<_, Refusal>(room::sound(&task, &plan, schedule));
+        let Some(why_not) = objected(&plan) else {
+            return RepairGuarantee::default();
+        };
+        let bounded = with_obligations(&task, &plan).map(|(plan, _)| plan);
+        let pinned = || Ok::<_, Refusal>(pinning::pin(&task, &plan, schedule));
         let bounded = bounded.into_iter().chain(pinned());
         let mut works = bounded.filter(|bounded| objected(bounded).is_none());
         let Some(bounded) = works.next() else {
-            return Promise {
-                why_not: Some(why_not),
-                ..Promise::default()
+            return RepairGuarantee {
+                missing_reason: Some(why_not),
+                ..RepairGuarantee::default()
             };
         };
         let is_new = |own: &&Constraint| !plan.plan.constraints.contains(own);
         let new = bounded.plan.constraints.iter().filter(is_new);
-        Promise {
-            keeps: new.filter_map(|own| self.bound(own)).collect(),
-            why_not: None,
+        RepairGuarantee {
+            added_bounds: new.filter_map(|own| self.bound(own)).collect(),
+            missing_reason: None,
         }
     }
 }

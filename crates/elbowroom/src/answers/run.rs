@@ -3,14 +3,14 @@
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::run::{Report, Stand, Verdict};
-use elbowroom_execution::{Entry, NoRecord, Planner, Preparer, Progression, Recorder, World};
+use elbowroom_execution::run::{Report, RunSnapshot, Verdict};
+use elbowroom_execution::{BeliefState, Entry, NoRecord, Planner, Preparer, Recorder, World};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
-use elbowroom_report::trace::line::ReportLine;
+use elbowroom_report::trace::schema::ReportLine;
 use serde::{Deserialize, Serialize};
 
-use super::{Event, Version, Watcher};
+use super::{Event, Observer, Version};
 use crate::execute::{Listener, RunSpec, SpecError, Validated};
 
 /// Requests a run.
@@ -22,13 +22,13 @@ pub struct RunRequest<'a> {
     /// The initial plan; without one, the planner makes one.
     pub plan: Option<TimeTriggeredPlan>,
     /// State of an executive's run, to resume it instead.
-    pub stand: Option<Stand>,
+    pub snapshot: Option<RunSnapshot>,
     /// Number of times that the run was over, without a plan, and was continued.
-    pub reopened: usize,
+    pub restarts: usize,
     /// Replacement for the planner of the specification: a replay, or a planner with another clock
     /// than the watcher's.
     pub planner: Option<Box<dyn Planner + 'a>>,
-    /// Replacement for the synchronous [`Analyst`](crate::execute::Analyst), which prepares plans.
+    /// Replacement for the synchronous [`PlanPreparer`](crate::execute::Analyst), which prepares plans.
     pub preparer: Option<Box<dyn Preparer + 'a>>,
     /// The recorder.
     pub recorder: Box<dyn Recorder + 'a>,
@@ -93,8 +93,8 @@ impl<'a> RunRequest<'a> {
             spec,
             task,
             plan: None,
-            stand: None,
-            reopened: 0,
+            snapshot: None,
+            restarts: 0,
             planner: None,
             preparer: None,
             recorder: Box::new(NoRecord),
@@ -111,37 +111,40 @@ impl<'a> RunRequest<'a> {
 
     /// Resumes an executive's run from this state.
     #[must_use]
-    pub fn standing(self, stand: impl Into<Option<Stand>>) -> Self {
+    pub fn resume_from(self, stand: impl Into<Option<RunSnapshot>>) -> Self {
         let stand = stand.into();
-        Self { stand, ..self }
+        Self {
+            snapshot: stand,
+            ..self
+        }
     }
 
     /// Sets the number of times that the run was continued after its end.
     #[must_use]
-    pub fn reopened(self, times: usize) -> Self {
+    pub fn with_restarts(self, times: usize) -> Self {
         Self {
-            reopened: times,
+            restarts: times,
             ..self
         }
     }
 
     /// Replaces the planner that the specification names.
     #[must_use]
-    pub fn planned_by(self, planner: impl Planner + 'a) -> Self {
+    pub fn with_planner(self, planner: impl Planner + 'a) -> Self {
         let planner: Option<Box<dyn Planner + 'a>> = Some(Box::new(planner));
         Self { planner, ..self }
     }
 
     /// Replaces the preparer of plans.
     #[must_use]
-    pub fn prepared_by(self, preparer: impl Preparer + 'a) -> Self {
+    pub fn with_preparer(self, preparer: impl Preparer + 'a) -> Self {
         let preparer: Option<Box<dyn Preparer + 'a>> = Some(Box::new(preparer));
         Self { preparer, ..self }
     }
 
     /// Reports the belief state, as [`Execution::told_to`](crate::execute::Execution::told_to).
     #[must_use]
-    pub fn told_to(self, listener: impl FnMut(&Progression) + Send + 'a) -> Self {
+    pub fn on_belief(self, listener: impl FnMut(&BeliefState) + Send + 'a) -> Self {
         let listener: Option<Listener<'a>> = Some(Box::new(listener));
         Self { listener, ..self }
     }
@@ -166,17 +169,17 @@ impl<'a> RunRequest<'a> {
 pub fn run(
     request: RunRequest<'_>,
     world: &mut dyn World,
-    watcher: &mut (dyn Watcher + Send),
+    watcher: &mut (dyn Observer + Send),
 ) -> Result<RunOutcome, SpecError> {
     let spec = request.spec;
     let mut execution = spec.execution(request.task)?;
-    let no_table = execution.no_table().map(str::to_owned);
+    let no_table = execution.missing_table_reason().map(str::to_owned);
     if let Some(preparer) = request.preparer {
-        execution = execution.prepared_by(preparer);
+        execution = execution.with_preparer(preparer);
     }
     let model = spec.beliefs(request.task.problem());
     let model = model.map_err(SpecError::World)?;
-    let shared = Watched(Mutex::new(watcher));
+    let shared = SharedObserver(Mutex::new(watcher));
     let clock = || {
         let millis = shared.get().elapsed().as_millis();
         Rational::new(i64::try_from(millis).unwrap_or(i64::MAX), 1000)
@@ -188,35 +191,39 @@ pub fn run(
     };
     let remark = Arc::new(Mutex::new(None));
     let (inner, validation) =
-        Validated::new(request.recorder, request.task, request.stand.as_ref());
-    let inner = inner.told_to(|invalid| shared.get().notice(&Event::Invalid(invalid)));
-    let recorder = Heard {
+        Validated::new(request.recorder, request.task, request.snapshot.as_ref());
+    let inner = inner.on_finding(|invalid| shared.get().notice(&Event::Invalid(invalid)));
+    let recorder = NotifyingRecorder {
         inner: Box::new(inner),
-        watched: &shared,
+        observer: &shared,
         plans: 0,
         remark: Arc::clone(&remark),
     };
     let mut listener = request.listener;
     let report = execution
-        .told_to(move |belief| {
+        .on_belief(move |belief| {
             if let Some(listener) = &mut listener {
                 listener(belief);
             }
         })
         .beginning_with(request.plan)
-        .standing(request.stand)
-        .reopened(request.reopened)
-        .planned_by(planner)
+        .resume_from(request.snapshot)
+        .with_restarts(request.restarts)
+        .with_planner(planner)
         .recorded_by(recorder)
-        .ending_when(|| matches!(shared.get().flow(), ControlFlow::Break(_)))
-        .explaining()
+        .with_stop_check(|| matches!(shared.get().flow(), ControlFlow::Break(_)))
+        .with_explanations()
         .run_in(world);
     let first_plan = remark.lock().unwrap_or_else(PoisonError::into_inner).take();
     Ok(RunOutcome {
         answer: RunAnswer {
             first_plan,
             no_table,
-            invalid: validation.found().iter().map(ToString::to_string).collect(),
+            invalid: validation
+                .findings()
+                .iter()
+                .map(ToString::to_string)
+                .collect(),
             ..RunAnswer::of(&report)
         },
         report,
@@ -230,7 +237,7 @@ pub fn run(
 /// world file cannot be read.
 pub fn simulate(
     request: RunRequest<'_>,
-    watcher: &mut (dyn Watcher + Send),
+    watcher: &mut (dyn Observer + Send),
 ) -> Result<RunOutcome, SpecError> {
     let spec = request.spec;
     let model = spec.simulation(request.task.problem());
@@ -264,27 +271,27 @@ impl RunOutcome {
 }
 
 /// A watcher with shared access.
-struct Watched<'w>(Mutex<&'w mut (dyn Watcher + Send)>);
+struct SharedObserver<'w>(Mutex<&'w mut (dyn Observer + Send)>);
 
-impl<'w> Watched<'w> {
-    fn get(&self) -> MutexGuard<'_, &'w mut (dyn Watcher + Send)> {
+impl<'w> SharedObserver<'w> {
+    fn get(&self) -> MutexGuard<'_, &'w mut (dyn Observer + Send)> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Recorder that also notifies the watcher.
-struct Heard<'a, 'w> {
+struct NotifyingRecorder<'a, 'w> {
     inner: Box<dyn Recorder + 'a>,
-    watched: &'a Watched<'w>,
+    observer: &'a SharedObserver<'w>,
     plans: usize,
     /// The planner's remark on the first plan.
     remark: Arc<Mutex<Option<String>>>,
 }
 
-impl Recorder for Heard<'_, '_> {
+impl Recorder for NotifyingRecorder<'_, '_> {
     fn record(&mut self, entry: &Entry<'_>) {
         self.inner.record(entry);
-        self.plans += usize::from(matches!(entry, Entry::Mission(_)));
+        self.plans += usize::from(matches!(entry, Entry::PlanAdopted(_)));
         if let Entry::Planned {
             remark: Some(remark),
             ..
@@ -294,7 +301,7 @@ impl Recorder for Heard<'_, '_> {
             first.get_or_insert_with(|| (*remark).to_owned());
         }
         let plans = self.plans;
-        self.watched
+        self.observer
             .get()
             .notice(&Event::Run(RunProgress { entry, plans }));
     }
@@ -303,7 +310,7 @@ impl Recorder for Heard<'_, '_> {
         self.inner.commit();
     }
 
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         self.inner.begin_anew(stand)
     }
 }

@@ -9,8 +9,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{RequestError, Version, ViolationAnswer, exact};
 use crate::AnyPlan;
-use crate::flow::{self, FlowError};
-use crate::graph;
+use crate::dot;
+use crate::pipeline::{self, PipelineError};
 
 /// Requests a plan with only the orderings and bounds that it needs.
 #[derive(Clone, Debug)]
@@ -125,14 +125,14 @@ pub enum BoundAnswer {
 /// When the plan cannot be deordered. An invalid plan is an answer, not an error.
 pub fn stn(request: &StnRequest<'_>) -> Result<StnOutcome, RequestError> {
     let task = request.task;
-    if let Some(feature) = task.left_to_the_judge() {
-        return Err(FlowError::from(DeorderError::Unsupported { feature }).into());
+    if let Some(feature) = task.unsupported_by_analysis() {
+        return Err(PipelineError::from(DeorderError::Unsupported { feature }).into());
     }
     let plan = match &request.plan {
         AnyPlan::Stn(plan) => plan.clone(),
-        AnyPlan::TimeTriggered(plan) => match flow::free(task, plan) {
-            Ok(freed) => flow::closed(task, freed),
-            Err(FlowError::Invalid(violation)) => {
+        AnyPlan::TimeTriggered(plan) => match pipeline::free(task, plan) {
+            Ok(freed) => pipeline::without_parameters(task, freed),
+            Err(PipelineError::Invalid(violation)) => {
                 let violation = (&*violation).into();
                 return Ok(StnOutcome {
                     answer: answer(StnFinding::Invalid { violation }),
@@ -170,7 +170,7 @@ fn network(task: &Task, plan: &ParametrizedPlan) -> StnFinding {
 fn node(task: &Task, plan: &ParametrizedPlan, id: NodeId, what: Node) -> NodeAnswer {
     NodeAnswer {
         name: plan.plan.node_label(id),
-        what: plan.plan.node_words(task, id),
+        what: plan.plan.describe_node(task, id),
         time: match what {
             Node::Timed(index) => Some(task.timed()[index].time.clone()),
             _ => None,
@@ -189,7 +189,7 @@ fn constraint(plan: &ParametrizedPlan, constraint: &Constraint) -> ConstraintAns
         to: plan.plan.node_label(constraint.to),
         lower: bound(&constraint.lower),
         upper: bound(&constraint.upper),
-        reason: graph::reason(&constraint.reason).to_owned(),
+        reason: dot::reason(&constraint.reason).to_owned(),
     }
 }
 

@@ -32,27 +32,27 @@ use elbowroom_planner::{Counts, embedded};
 use elbowroom_sim::WorldModel;
 use elbowroom_stn::{ConsistentNetwork, NodeId};
 
-use super::first_plan::renumbered;
+use super::plan_selection::renumbered;
 use scarcity::scarcities;
 pub use variant::Pace;
-use variant::{Variant, duration_fixed_by_domain, written};
+use variant::{Variant, duration_fixed_by_domain, to_millionths};
 
 /// Refinements that are disabled in searches for plans to choose from.
-const REFINEMENT: [embedded::Technique; 2] = [
+const DISABLED_REFINEMENTS: [embedded::Technique; 2] = [
     embedded::Technique::Rescheduling,
     embedded::Technique::Repair,
 ];
 
 /// Maximum number of states for a plan of a variant, as a multiple of the number for the first
 /// plan.
-const PATIENCE: u64 = 8;
+const VARIANT_STATES_FACTOR: u64 = 8;
 
 /// Minimum number of states for a plan of a variant.
 const LEAST_STATES: u64 = 1_000;
 
 /// A search in a variant with small amounts gets the remaining states divided by this number. If
 /// there is no plan, such a search often has to exhaust the state space.
-const SCARCE_SHARE: u64 = 2;
+const SCARCE_STATES_DIVISOR: u64 = 2;
 
 /// Limits on the search for candidate plans.
 #[derive(Clone, Debug)]
@@ -69,7 +69,7 @@ pub struct Limits {
     /// [`elbowroom_num::work`].
     pub work: u64,
     /// The plan for the unchanged problem may take this multiple of `work`.
-    pub patience: u64,
+    pub first_plan_factor: u64,
 }
 
 /// A plan, with the variant that it was made for.
@@ -89,10 +89,10 @@ pub struct Candidates<'a> {
     settings: embedded::Settings,
     limits: Limits,
     queue: VecDeque<Variant>,
-    asked: BTreeSet<Variant>,
+    requested: BTreeSet<Variant>,
     /// Plans found, but not returned yet.
     ready: VecDeque<Candidate>,
-    known: BTreeSet<Vec<String>>,
+    known_orders: BTreeSet<Vec<String>>,
     /// All plans found.
     plans: Vec<TimeTriggeredPlan>,
     states: u64,
@@ -112,7 +112,7 @@ impl<'a> Candidates<'a> {
     ) -> Self {
         let paces: &[Pace] = match world {
             // No durations or events are random.
-            Some(world) if is_punctual(world) => &[],
+            Some(world) if is_deterministic(world) => &[],
             Some(_) => &[
                 Pace::Quantile(80),
                 Pace::Quantile(50),
@@ -153,10 +153,10 @@ impl<'a> Candidates<'a> {
             settings,
             budget: work::Budget::new(limits.work),
             limits,
-            asked: queue.iter().cloned().collect(),
+            requested: queue.iter().cloned().collect(),
             queue,
             ready: VecDeque::new(),
-            known: BTreeSet::new(),
+            known_orders: BTreeSet::new(),
             plans: Vec::new(),
             states: 0,
             first_states: None,
@@ -194,7 +194,7 @@ impl<'a> Candidates<'a> {
             if let Some(candidate) = self.ready.pop_front() {
                 return Some(candidate);
             }
-            if self.asked.len() - self.queue.len() >= self.limits.searches.max(1) {
+            if self.requested.len() - self.queue.len() >= self.limits.searches.max(1) {
                 return None;
             }
             let is_first = self.answer.is_none();
@@ -217,11 +217,13 @@ impl<'a> Candidates<'a> {
         } else {
             let first = self.first_states.unwrap_or_default();
             let left = (self.limits.other_states + first).saturating_sub(self.states);
-            let most = LEAST_STATES.max(PATIENCE.saturating_mul(first)).min(left);
+            let most = LEAST_STATES
+                .max(VARIANT_STATES_FACTOR.saturating_mul(first))
+                .min(left);
             if variant.scarcity.is_some() {
                 // The first plan found may compensate small amounts in a wasteful way; a better one
                 // does so in time.
-                (left / SCARCE_SHARE, left / SCARCE_SHARE)
+                (left / SCARCE_STATES_DIVISOR, left / SCARCE_STATES_DIVISOR)
             } else {
                 (most, most.min(self.limits.improve_states))
             }
@@ -235,16 +237,16 @@ impl<'a> Candidates<'a> {
         if most == 0 {
             return;
         }
-        let work = self.budget.left();
+        let work = self.budget.remaining();
         let most_work = if own {
-            work.saturating_mul(self.limits.patience)
+            work.saturating_mul(self.limits.first_plan_factor)
         } else {
             work
         };
         // The aim is different plans, not the best one, so the states are used for search instead
         // of refinement.
         let mut tuning = self.settings.tuning.clone();
-        tuning.without.extend(REFINEMENT);
+        tuning.without.extend(DISABLED_REFINEMENTS);
         let settings = embedded::Settings {
             without: variant.without.clone(),
             first_plan_only: false,
@@ -258,7 +260,7 @@ impl<'a> Candidates<'a> {
         };
         let other;
         let rewritten;
-        let (task, there) = if variant.is_as_written() {
+        let (task, there) = if variant.needs_no_conversion() {
             (self.task, self.situation)
         } else {
             let Some(problem) = variant.problem(self.task, self.situation, self.world) else {
@@ -309,18 +311,18 @@ impl<'a> Candidates<'a> {
         // The best plan first: it is the planner's answer.
         plans.reverse();
         for (place, plan) in plans.into_iter().enumerate() {
-            let Some(plan) = self.of_task(variant, &plan) else {
+            let Some(plan) = self.to_task_plan(variant, &plan) else {
                 continue;
             };
             if place == 0 {
-                self.go_without(variant, &plan);
+                self.queue_variants_without(variant, &plan);
             }
-            if self.known.insert(order(&plan)) {
+            if self.known_orders.insert(order_key(&plan)) {
                 self.plans.push(plan.clone());
                 let made_for = match (own, place) {
                     (true, 0) => String::new(),
                     (true, _) => "on the way to the shortest".to_owned(),
-                    (false, _) => variant.words(self.world),
+                    (false, _) => variant.describe(self.world),
                 };
                 self.ready.push_back(Candidate { plan, made_for });
             }
@@ -339,8 +341,12 @@ impl<'a> Candidates<'a> {
 
     /// Converts a plan of a variant to the task: with the domain's durations, and as early as
     /// possible. `None` if the validator rejects it.
-    fn of_task(&self, variant: &Variant, plan: &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> {
-        if variant.is_as_written() {
+    fn to_task_plan(
+        &self,
+        variant: &Variant,
+        plan: &TimeTriggeredPlan,
+    ) -> Option<TimeTriggeredPlan> {
+        if variant.needs_no_conversion() {
             return Some(plan.clone());
         }
         let mut steps = Vec::with_capacity(plan.steps.len());
@@ -365,7 +371,7 @@ impl<'a> Candidates<'a> {
 
     /// Queues variants without one more action of the plan, beginning with those that fail most
     /// often.
-    fn go_without(&mut self, variant: &Variant, plan: &TimeTriggeredPlan) {
+    fn queue_variants_without(&mut self, variant: &Variant, plan: &TimeTriggeredPlan) {
         let mut names: Vec<&str> = Vec::with_capacity(plan.steps.len());
         for step in &plan.steps {
             if !names.contains(&step.action.name.as_str()) {
@@ -373,13 +379,13 @@ impl<'a> Candidates<'a> {
             }
         }
         let odds = |name: &&str| {
-            let failing = self.world.and_then(|world| world.failing(name));
-            Reverse(failing.map_or(0, |failing| written(failing.probability)))
+            let failing = self.world.and_then(|world| world.failure_rule(name));
+            Reverse(failing.map_or(0, |failing| to_millionths(failing.probability)))
         };
         names.sort_by_key(odds);
         for name in names {
             let next = variant.without(name);
-            if self.asked.insert(next.clone()) {
+            if self.requested.insert(next.clone()) {
                 self.queue.push_back(next);
             }
         }
@@ -387,12 +393,12 @@ impl<'a> Candidates<'a> {
 }
 
 /// Returns `true` if durations are as planned, and no events occur.
-fn is_punctual(world: &WorldModel) -> bool {
+fn is_deterministic(world: &WorldModel) -> bool {
     world.durations.is_empty() && world.delays.is_empty() && world.exogenous.is_empty()
 }
 
 /// Returns the key of a plan: its actions by start time.
-fn order(plan: &TimeTriggeredPlan) -> Vec<String> {
+fn order_key(plan: &TimeTriggeredPlan) -> Vec<String> {
     let mut steps: Vec<_> = plan.steps.iter().collect();
     steps.sort_by(|a, b| (&a.start, &a.action.name).cmp(&(&b.start, &b.action.name)));
     steps
@@ -407,8 +413,8 @@ pub(crate) fn tightened(
     situation: &Situation,
     plan: &TimeTriggeredPlan,
 ) -> Option<TimeTriggeredPlan> {
-    let rest = situation.rest_of_task(task);
-    let freed = deorder(&rest, &situation.rest_of_plan(plan)).ok()?;
+    let rest = situation.remaining_task(task);
+    let freed = deorder(&rest, &situation.remaining_plan(plan)).ok()?;
     let network = freed.plan.network(&elbowroom_plan::Valuation::default());
     let network = ConsistentNetwork::try_from(network).ok()?;
     let schedule = network.earliest_schedule(NodeId(0));

@@ -2,19 +2,21 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, UnknownExecutor};
-use elbowroom_execution::run::{Ports, Report, Run, RunSettings, Stand};
+use elbowroom_execution::executors::{
+    ExecutorServices, ExecutorSpec, PolicyTableCache, UnknownExecutor,
+};
+use elbowroom_execution::run::{Ports, Report, Run, RunSettings, RunSnapshot};
 use elbowroom_execution::{
-    Executor, NoRecord, Odds, Outlook, Planner, PortWorkers, Preparer, Progression, Recorder,
-    Rehearsal, Workers, World,
+    ActionValues, BeliefState, Executor, NoRecord, PlanComparator, Planner, PortWorkers, Preparer,
+    Recorder, RolloutEvaluator, Workers, World,
 };
 use elbowroom_model::problem::Condition;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Diagnostics, Source};
 use elbowroom_probability::Likelihoods;
 
-use super::{Analyst, Embedded, SharedRehearse, WholeRegion};
-use crate::flow;
+use super::{Embedded, ExactRegion, PlanPreparer, SharedRolloutPolicy};
+use crate::pipeline;
 
 /// Reads a goal in PDDL for a running execution of this task: the condition alone, without `:goal`.
 ///
@@ -23,11 +25,11 @@ use crate::flow;
 pub fn read_goal(task: &Task, text: &str) -> Result<Condition, String> {
     match elbowroom_pddl::read_goal(&Source::new("the goal", text), task.problem()) {
         Ok((goal, _warnings)) => Ok(goal),
-        Err(mistakes) => Err(first_mistake(&mistakes)),
+        Err(mistakes) => Err(first_error(&mistakes)),
     }
 }
 
-fn first_mistake(mistakes: &Diagnostics) -> String {
+fn first_error(mistakes: &Diagnostics) -> String {
     let mut errors = mistakes.errors();
     errors.next().map_or_else(
         || "it is no condition".to_owned(),
@@ -109,34 +111,34 @@ pub fn execute(
 pub struct Execution<'a> {
     task: Arc<Task>,
     plan: Option<TimeTriggeredPlan>,
-    stand: Option<Stand>,
-    reopened: usize,
-    executor: Decider<'a>,
+    snapshot: Option<RunSnapshot>,
+    restarts: usize,
+    executor: ExecutorChoice<'a>,
     settings: RunSettings,
-    flow: flow::Settings,
+    flow: pipeline::Settings,
     likelihoods: Arc<Likelihoods>,
-    foresight: Foresight,
-    odds: Option<Box<dyn Odds>>,
-    outlook: Option<Arc<dyn Outlook>>,
-    no_table: Option<String>,
-    rehearsal: Option<SharedRehearse>,
+    foresight: PolicyTableCache,
+    plan_comparator: Option<Box<dyn PlanComparator>>,
+    action_values: Option<Arc<dyn ActionValues>>,
+    missing_table_reason: Option<String>,
+    rollouts: Option<SharedRolloutPolicy>,
     planner: Option<Box<dyn Planner + 'a>>,
     preparer: Option<Box<dyn Preparer + 'a>>,
     recorder: Box<dyn Recorder + 'a>,
-    is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
+    stop_check: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
-    is_lasting: bool,
-    is_attended: bool,
+    is_persistent: bool,
+    is_interactive: bool,
     listener: Option<Listener<'a>>,
 }
 
 /// Callback for the belief state of a run ([`Run::told_to`]).
-pub type Listener<'a> = Box<dyn FnMut(&Progression) + Send + 'a>;
+pub type Listener<'a> = Box<dyn FnMut(&BeliefState) + Send + 'a>;
 
 /// The executor of a run: a registered one, or the caller's own.
-enum Decider<'a> {
+enum ExecutorChoice<'a> {
     Registered(ExecutorSpec),
-    Another(Box<dyn Executor + 'a>),
+    Custom(Box<dyn Executor + 'a>),
 }
 
 impl<'a> Execution<'a> {
@@ -145,24 +147,24 @@ impl<'a> Execution<'a> {
         Self {
             task: Arc::clone(task),
             plan: None,
-            stand: None,
-            reopened: 0,
-            executor: Decider::Registered(ExecutorSpec::default()),
+            snapshot: None,
+            restarts: 0,
+            executor: ExecutorChoice::Registered(ExecutorSpec::default()),
             settings: RunSettings::default(),
-            flow: flow::Settings::default(),
+            flow: pipeline::Settings::default(),
             likelihoods: Arc::new(Likelihoods::certain()),
-            foresight: Foresight::default(),
-            odds: None,
-            outlook: None,
-            no_table: None,
-            rehearsal: None,
+            foresight: PolicyTableCache::default(),
+            plan_comparator: None,
+            action_values: None,
+            missing_table_reason: None,
+            rollouts: None,
             planner: None,
             preparer: None,
             recorder: Box::new(NoRecord),
-            is_to_end: Box::new(|| false),
+            stop_check: Box::new(|| false),
             is_explaining: false,
-            is_lasting: false,
-            is_attended: false,
+            is_persistent: false,
+            is_interactive: false,
             listener: None,
         }
     }
@@ -174,28 +176,31 @@ impl<'a> Execution<'a> {
     }
 
     /// Resumes an executive's run from this state: see [`Run::standing`].
-    pub fn standing(self, stand: impl Into<Option<Stand>>) -> Self {
+    pub fn resume_from(self, stand: impl Into<Option<RunSnapshot>>) -> Self {
         let stand = stand.into();
-        Self { stand, ..self }
+        Self {
+            snapshot: stand,
+            ..self
+        }
     }
 
     /// Sets the number of times that the run was continued after its end: see [`Run::reopened`].
-    pub fn reopened(self, times: usize) -> Self {
+    pub fn with_restarts(self, times: usize) -> Self {
         Self {
-            reopened: times,
+            restarts: times,
             ..self
         }
     }
 
     /// Sets the executor.
     pub fn by(self, executor: ExecutorSpec) -> Self {
-        let executor = Decider::Registered(executor);
+        let executor = ExecutorChoice::Registered(executor);
         Self { executor, ..self }
     }
 
     /// Sets an executor of the caller.
-    pub fn decided_by(self, executor: impl Executor + 'a) -> Self {
-        let executor = Decider::Another(Box::new(executor));
+    pub fn with_executor(self, executor: impl Executor + 'a) -> Self {
+        let executor = ExecutorChoice::Custom(Box::new(executor));
         Self { executor, ..self }
     }
 
@@ -205,7 +210,7 @@ impl<'a> Execution<'a> {
     }
 
     /// Sets the open quantities, the guarantee and the search of envelopes.
-    pub fn with_envelopes(self, flow: flow::Settings) -> Self {
+    pub fn with_envelopes(self, flow: pipeline::Settings) -> Self {
         Self { flow, ..self }
     }
 
@@ -218,45 +223,57 @@ impl<'a> Execution<'a> {
     }
 
     /// Reuses results of `lookahead` for the same problem and likelihoods from other runs.
-    pub fn with_foresight(self, foresight: Foresight) -> Self {
+    pub fn with_foresight(self, foresight: PolicyTableCache) -> Self {
         Self { foresight, ..self }
     }
 
     /// Sets the odds, for executors that search for likelier plans ([`ExecutorSpec::asks_odds`]).
-    pub fn with_odds(self, odds: Option<Box<dyn Odds>>) -> Self {
-        Self { odds, ..self }
+    pub fn with_plan_comparator(self, odds: Option<Box<dyn PlanComparator>>) -> Self {
+        Self {
+            plan_comparator: odds,
+            ..self
+        }
     }
 
     /// Sets the outlook, for executors that evaluate each move ([`ExecutorSpec::asks_outlook`]).
-    pub fn with_outlook(self, outlook: Option<Arc<dyn Outlook>>) -> Self {
-        Self { outlook, ..self }
+    pub fn with_action_values(self, outlook: Option<Arc<dyn ActionValues>>) -> Self {
+        Self {
+            action_values: outlook,
+            ..self
+        }
     }
 
     /// Records the reason for a missing outlook of an executor that evaluates each move.
-    pub(crate) fn without_table(self, no_table: Option<String>) -> Self {
-        Self { no_table, ..self }
+    pub(crate) fn with_missing_table_reason(self, no_table: Option<String>) -> Self {
+        Self {
+            missing_table_reason: no_table,
+            ..self
+        }
     }
 
     /// Returns why there is no table of moves for an executor that evaluates each move; `None` if
     /// there is one or none was attempted.
-    pub fn no_table(&self) -> Option<&str> {
-        self.no_table.as_deref()
+    pub fn missing_table_reason(&self) -> Option<&str> {
+        self.missing_table_reason.as_deref()
     }
 
     /// Sets the rollouts, for executors that evaluate each move without an outlook.
-    pub fn with_rehearsal(self, rehearsal: Option<SharedRehearse>) -> Self {
-        Self { rehearsal, ..self }
+    pub fn with_rollouts(self, rehearsal: Option<SharedRolloutPolicy>) -> Self {
+        Self {
+            rollouts: rehearsal,
+            ..self
+        }
     }
 
     /// Sets the planner. The default is the embedded one with its usual limits
     /// ([`Embedded::default`]).
-    pub fn planned_by(self, planner: impl Planner + 'a) -> Self {
+    pub fn with_planner(self, planner: impl Planner + 'a) -> Self {
         let planner: Option<Box<dyn Planner + 'a>> = Some(Box::new(planner));
         Self { planner, ..self }
     }
 
-    /// Sets the preparer of plans. The default is an [`Analyst`].
-    pub fn prepared_by(self, preparer: impl Preparer + 'a) -> Self {
+    /// Sets the preparer of plans. The default is an [`PlanPreparer`].
+    pub fn with_preparer(self, preparer: impl Preparer + 'a) -> Self {
         let preparer: Option<Box<dyn Preparer + 'a>> = Some(Box::new(preparer));
         Self { preparer, ..self }
     }
@@ -267,14 +284,17 @@ impl<'a> Execution<'a> {
         Self { recorder, ..self }
     }
 
-    /// See [`Run::ending_when`].
-    pub fn ending_when(self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
+    /// See [`Run::with_stop_check`].
+    pub fn with_stop_check(self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
         let is_to_end = Box::new(is_to_end);
-        Self { is_to_end, ..self }
+        Self {
+            stop_check: is_to_end,
+            ..self
+        }
     }
 
-    /// See [`Run::explaining`].
-    pub fn explaining(self) -> Self {
+    /// See [`Run::with_explanations`].
+    pub fn with_explanations(self) -> Self {
         Self {
             is_explaining: true,
             ..self
@@ -283,20 +303,23 @@ impl<'a> Execution<'a> {
 
     /// Makes the run persistent: it continues after reaching the goal, and accepts further goals in
     /// PDDL. See [`Run::lasting`].
-    pub fn lasting(self, is_lasting: bool) -> Self {
-        Self { is_lasting, ..self }
+    pub fn persistent(self, is_lasting: bool) -> Self {
+        Self {
+            is_persistent: is_lasting,
+            ..self
+        }
     }
 
     /// Makes the run accept pauses and the abandonment of its goal: see [`Run::attended`].
-    pub fn attended(self, is_attended: bool) -> Self {
+    pub fn interactive(self, is_attended: bool) -> Self {
         Self {
-            is_attended,
+            is_interactive: is_attended,
             ..self
         }
     }
 
     /// See [`Run::told_to`].
-    pub fn told_to(self, listener: impl FnMut(&Progression) + Send + 'a) -> Self {
+    pub fn on_belief(self, listener: impl FnMut(&BeliefState) + Send + 'a) -> Self {
         let listener: Option<Listener<'a>> = Some(Box::new(listener));
         Self { listener, ..self }
     }
@@ -305,50 +328,50 @@ impl<'a> Execution<'a> {
     /// plans.
     #[must_use = "a run does nothing until `next` is called"]
     pub fn run(self) -> (Run<'a>, Box<dyn Workers + 'a>) {
-        let rehearsal = self.rehearsal.clone();
+        let rehearsal = self.rollouts.clone();
         let executor = match self.executor {
-            Decider::Another(executor) => executor,
-            Decider::Registered(executor) => executor.build(Means {
-                region: Box::new(WholeRegion),
+            ExecutorChoice::Custom(executor) => executor,
+            ExecutorChoice::Registered(executor) => executor.build(ExecutorServices {
+                region: Box::new(ExactRegion),
                 likelihoods: self.likelihoods,
-                odds: self.odds,
-                foresight: self.foresight,
-                orders: None,
-                outlook: self.outlook,
-                rehearsal: rehearsal.map(|it| Box::new(it) as Box<dyn Rehearsal>),
+                comparator: self.plan_comparator,
+                policy_cache: self.foresight,
+                order_cache: None,
+                action_values: self.action_values,
+                rollout: rehearsal.map(|it| Box::new(it) as Box<dyn RolloutEvaluator>),
             }),
         };
         let planner = self
             .planner
             .unwrap_or_else(|| Box::new(Embedded::default()));
-        let planner = match &self.rehearsal {
-            Some(rehearse) => rehearse.before(planner),
+        let planner = match &self.rollouts {
+            Some(rehearse) => rehearse.wrap_planner(planner),
             None => planner,
         };
         let preparer = self
             .preparer
-            .unwrap_or_else(|| Box::new(Analyst::new(self.flow)));
+            .unwrap_or_else(|| Box::new(PlanPreparer::new(self.flow)));
         let workers = PortWorkers::new(planner, preparer);
         let ports = Ports {
             executor,
             recorder: self.recorder,
         };
         let mut run = Run::new(self.task, self.plan, self.settings, ports)
-            .ending_when(self.is_to_end)
-            .reopened(self.reopened);
-        if self.is_lasting {
+            .with_stop_check(self.stop_check)
+            .with_restarts(self.restarts);
+        if self.is_persistent {
             run = run.lasting(read_goal);
-        } else if self.is_attended {
-            run = run.attended();
+        } else if self.is_interactive {
+            run = run.interactive();
         }
-        if let Some(stand) = self.stand {
+        if let Some(stand) = self.snapshot {
             run = run.standing(stand);
         }
         if let Some(listener) = self.listener {
-            run = run.told_to(listener);
+            run = run.on_belief(listener);
         }
         if self.is_explaining {
-            run = run.explaining();
+            run = run.with_explanations();
         }
         (run, Box::new(workers))
     }
@@ -356,6 +379,6 @@ impl<'a> Execution<'a> {
     /// Executes the whole run in this world.
     pub fn run_in(self, world: &mut dyn World) -> Report {
         let (run, mut workers) = self.run();
-        run.go(world, &mut *workers)
+        run.run_to_end(world, &mut *workers)
     }
 }

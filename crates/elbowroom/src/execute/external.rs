@@ -9,7 +9,7 @@ use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
 
-use crate::flow;
+use crate::pipeline;
 
 /// A supervised planner process. Each of its plans is validated; if only its times are rounded,
 /// they are computed again.
@@ -27,25 +27,25 @@ pub struct External<'a> {
     /// Its limits.
     pub settings: Settings,
     /// `true` to use the first plan; `false` to use the last one before the time limit.
-    pub takes_first: bool,
+    pub stops_at_first_plan: bool,
     /// Called about fifty times a second; returns `false` to stop the planner.
-    pub goes_on: &'a (dyn Fn() -> bool + Sync),
+    pub may_continue: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Planner for External<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        let first = self.ask(task, situation);
-        if !matches!(first.outcome, Outcome::Crashed { .. }) || !(self.goes_on)() {
+        let first = self.run_planner(task, situation);
+        if !matches!(first.outcome, Outcome::Crashed { .. }) || !(self.may_continue)() {
             return self.answer(first, Duration::ZERO);
         }
-        let second = self.ask(task, situation);
+        let second = self.run_planner(task, situation);
         self.answer(second, first.statistics.elapsed)
     }
 }
 
 impl External<'_> {
     /// Runs the planner.
-    fn ask(&self, task: &Task, situation: &Situation) -> Report {
+    fn run_planner(&self, task: &Task, situation: &Situation) -> Report {
         external::plan(
             &self.planner,
             &mut Request {
@@ -55,10 +55,10 @@ impl External<'_> {
                 problem: &self.problem,
             },
             &self.settings,
-            &mut flow::repaired,
+            &mut pipeline::reschedule,
             &mut |event| {
-                let is_enough = self.takes_first && matches!(event, Event::Plan { .. });
-                if is_enough || !(self.goes_on)() {
+                let is_enough = self.stops_at_first_plan && matches!(event, Event::Plan { .. });
+                if is_enough || !(self.may_continue)() {
                     ControlFlow::Break(())
                 } else {
                     ControlFlow::Continue(())

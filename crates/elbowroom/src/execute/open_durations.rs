@@ -10,7 +10,7 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
-use crate::flow;
+use crate::pipeline;
 
 /// Returns the actions to be started whose durations the domain leaves open. The executor chooses their durations.
 fn open_durations(plan: &StnPlan) -> BTreeSet<InstanceId> {
@@ -22,7 +22,7 @@ fn open_durations(plan: &StnPlan) -> BTreeSet<InstanceId> {
         let body = action.durative()?;
         // The conditions and effects hold for the planned duration only.
         let reads_planned = action.with_planned_duration(&Rational::ONE).is_some();
-        let is_open = constraint.lower != constraint.upper && !body.is_under_way && !reads_planned;
+        let is_open = constraint.lower != constraint.upper && !body.is_running && !reads_planned;
         is_open.then_some(id)
     });
     open.collect()
@@ -60,7 +60,7 @@ pub(super) fn choose(
     let Some(schedule) = schedule_at(plan, nominal, &chosen) else {
         return;
     };
-    if !flow::judge(task, &given.scheduled(&schedule)).is_valid() {
+    if !pipeline::validate_plan(task, &given.scheduled(&schedule)).is_valid() {
         return;
     }
     for (parameter, value) in plan.parameters.iter_mut().zip(&chosen) {
@@ -96,7 +96,7 @@ fn schedule_at(
 ) -> Option<Schedule> {
     let origin = network_node(NodeId::ZERO);
     let mut network = plan.plan.network(values);
-    for (&id, planned) in &plan.told {
+    for (&id, planned) in &plan.commanded_durations {
         let [start, end] = [plan.plan.start(id), plan.plan.end(id)].map(network_node);
         network.add(Constraint::at_least(start, end, planned.clone()));
         network.add(Constraint::at_most(start, end, planned.clone()));
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn durations_keep_away_from_both_ends() {
+    fn chosen_duration_has_slack_on_both_sides() {
         // Enough slack on both sides.
         assert_eq!(chosen((10, 1), (7, 1), Some((13, 1))), Rational::from(10));
         assert_eq!(chosen((10, 1), (2, 1), None), Rational::from(10));

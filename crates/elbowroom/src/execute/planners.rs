@@ -11,9 +11,9 @@ use elbowroom_planner::embedded::{self, Counts, Proof, Stopped};
 use crate::no_plan::{Effort, no_plan_certificate_within, with_any_ends};
 
 /// A planner without a clock: a function from situations to answers.
-pub struct Clockless<F>(pub F);
+pub struct FnPlanner<F>(pub F);
 
-impl<F: FnMut(&Task, &Situation) -> PlanAnswer + Send> Planner for Clockless<F> {
+impl<F: FnMut(&Task, &Situation) -> PlanAnswer + Send> Planner for FnPlanner<F> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         PlannerAnswer::from((self.0)(task, situation))
     }
@@ -31,20 +31,20 @@ pub struct Embedded<'a> {
     /// Work limit for one plan, in units of [`elbowroom_num::work`]; [`u64::MAX`] for no limit.
     pub work: u64,
     /// The search for the first plan may take this multiple of `work`.
-    pub patience: u64,
+    pub first_plan_factor: u64,
     /// Work limit for a certificate that no plan exists ([`Effort`]). Without a certificate, the
     /// answer is that no plan was found. If 0, no certificate is made.
     pub certificate_work: u64,
     /// The clock for the planning time, in seconds since some fixed time.
     pub clock: Option<&'a (dyn Fn() -> Rational + Sync)>,
     /// Called regularly; returns `false` to stop the search.
-    pub goes_on: Option<&'a (dyn Fn() -> bool + Sync)>,
+    pub may_continue: Option<&'a (dyn Fn() -> bool + Sync)>,
 }
 
 impl Planner for Embedded<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let begun = self.clock.map(|clock| clock());
-        let (answer, _) = self.counted(task, situation);
+        let (answer, _) = self.plan_with_state_count(task, situation);
         let (answer, shortfall) = self.with_shortfall(task, situation, answer);
         let seconds = self.clock.map(|clock| clock() - begun.unwrap_or_default());
         PlannerAnswer {
@@ -64,31 +64,35 @@ impl Default for Embedded<'_> {
             most_states: 20_000,
             improve_states: 2_000,
             work: u64::MAX,
-            patience: PATIENCE,
+            first_plan_factor: FIRST_PLAN_FACTOR,
             certificate_work: CERTIFICATE_WORK,
             clock: None,
-            goes_on: None,
+            may_continue: None,
         }
     }
 }
 
 impl Embedded<'_> {
     /// Returns the answer, and the number of evaluated states.
-    pub(crate) fn counted(&self, task: &Task, situation: &Situation) -> (PlanAnswer, u64) {
+    pub(crate) fn plan_with_state_count(
+        &self,
+        task: &Task,
+        situation: &Situation,
+    ) -> (PlanAnswer, u64) {
         let mut states = 0;
         let answer = self.answer(task, situation, &mut states);
         (answer, states)
     }
 
     fn answer(&self, task: &Task, situation: &Situation, states: &mut u64) -> PlanAnswer {
-        let most_work = self.work.saturating_mul(self.patience);
+        let most_work = self.work.saturating_mul(self.first_plan_factor);
         let answer = embedded::plan(task, situation, &self.settings, &mut |progress| {
             let (limit, work) = match progress.best {
                 Some(_) => (self.improve_states.min(self.most_states), self.work),
                 None => (self.most_states, most_work),
             };
             *states = progress.counts.evaluated;
-            let is_wanted = self.goes_on.is_none_or(|goes_on| goes_on());
+            let is_wanted = self.may_continue.is_none_or(|goes_on| goes_on());
             let is_over = progress.counts.evaluated >= limit || progress.counts.work >= work;
             if is_over || !is_wanted {
                 ControlFlow::Break(())
@@ -99,7 +103,7 @@ impl Embedded<'_> {
         match answer {
             embedded::Answer::Plan { found, .. } => PlanAnswer::Plan(found.plan),
             answer => {
-                let goes_on = || self.goes_on.is_none_or(|goes_on| goes_on());
+                let goes_on = || self.may_continue.is_none_or(|goes_on| goes_on());
                 let limits = (self.most_states, self.certificate_work);
                 without_plan(&answer, (task, situation), limits, &goes_on)
             }
@@ -118,7 +122,7 @@ pub(crate) fn without_plan(
     let why = match answer {
         embedded::Answer::Unsolvable { proof, .. } => {
             let goes_on = &mut || goes_on();
-            return refuted((task, situation), proof, certificate_work, goes_on);
+            return refuted_answer((task, situation), proof, certificate_work, goes_on);
         }
         // This answer does not depend on the existence of plans.
         embedded::Answer::Unsupported(unsupported) => {
@@ -130,7 +134,7 @@ pub(crate) fn without_plan(
             stopped,
             without_self_overlap,
             counts,
-        } => none_found(*stopped, (*counts, *without_self_overlap), most_states),
+        } => no_plan_reason(*stopped, (*counts, *without_self_overlap), most_states),
         embedded::Answer::Plan { .. } => "no plan was found".to_owned(),
     };
     PlanAnswer::NotFound { why }
@@ -149,12 +153,12 @@ pub fn planning_work(seconds: &Rational) -> u64 {
 }
 
 /// See [`Embedded::patience`].
-pub(crate) const PATIENCE: u64 = 4;
+pub(crate) const FIRST_PLAN_FACTOR: u64 = 4;
 
 /// Returns the reason why the embedded planner has no plan after a search of at most `most_states` states.
 ///
 /// The second member of `counts` is `true` if plans were excluded with self-overlap.
-fn none_found(stopped: Stopped, counts: (Counts, bool), most_states: u64) -> String {
+fn no_plan_reason(stopped: Stopped, counts: (Counts, bool), most_states: u64) -> String {
     match stopped {
         Stopped::Exhausted => exhausted(counts.0, counts.1),
         Stopped::OutOfMemory => format!(
@@ -192,7 +196,7 @@ pub(crate) const CERTIFICATE_WORK: u64 = 10_000_000;
 
 /// Returns the answer to the embedded planner's claim that no plan exists from a situation. No plan exists if
 /// a certificate proves it for all ends of the running actions; otherwise, none was found.
-fn refuted(
+fn refuted_answer(
     (task, situation): (&Task, &Situation),
     proof: &Proof,
     work: u64,

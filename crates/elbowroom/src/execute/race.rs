@@ -6,7 +6,7 @@ use std::cmp::Reverse;
 const ROUNDS: [u64; 4] = [50, 100, 200, 400];
 
 /// Lag beyond which a plan is dropped, in standard deviations of the difference.
-const BEHIND: u64 = 2;
+const SIGNIFICANT_LAG: u64 = 2;
 
 /// Results of a plan in the samples from 0 on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl Tally {
         let least = self.samples().min(other.samples()) / margin;
         // Tests whether the gap to the required lead is significant.
         let missing = (least + theirs).saturating_sub(own);
-        missing.pow(2) <= BEHIND.pow(2) * (own + theirs + 1)
+        missing.pow(2) <= SIGNIFICANT_LAG.pow(2) * (own + theirs + 1)
     }
 }
 
@@ -42,7 +42,7 @@ impl Tally {
 /// McNemar's test of the samples with a single success.
 pub(crate) fn is_behind(results: &[bool], others: &[bool]) -> bool {
     let (own, theirs) = differences(results, others);
-    theirs > own && (theirs - own).pow(2) > BEHIND.pow(2) * (theirs + own)
+    theirs > own && (theirs - own).pow(2) > SIGNIFICANT_LAG.pow(2) * (theirs + own)
 }
 
 /// Returns the numbers of samples with success of only the first, and of only the second.
@@ -59,7 +59,7 @@ pub(super) struct Rules<'a> {
     pub(super) rounds: &'a [u64],
     /// `true` to drop half of the remaining plans after each round (sequential halving; Karnin,
     /// Koren & Somekh, ICML 2013), except the first plan.
-    pub(super) halves: bool,
+    pub(super) is_halving: bool,
     /// The lead over the first plan that a plan needs to be preferred: one sample in `margin`.
     /// Plans that are significantly short of this lead are dropped.
     pub(super) margin: Option<u64>,
@@ -69,7 +69,7 @@ impl Default for Rules<'static> {
     fn default() -> Self {
         Self {
             rounds: &ROUNDS,
-            halves: false,
+            is_halving: false,
             margin: None,
         }
     }
@@ -108,10 +108,10 @@ pub(super) fn race(
                 tallies[place].results.push(success);
             }
         }
-        leader = first_of_most(&tallies, &racing);
+        leader = index_of_best(&tallies, &racing);
         let best = tallies[leader].clone();
         racing.retain(|place| !tallies[*place].is_behind(&best));
-        if rules.halves {
+        if rules.is_halving {
             better_half(&tallies, &mut racing);
         }
         if let Some(margin) = rules.margin {
@@ -127,7 +127,7 @@ pub(super) fn race(
     (tallies, leader)
 }
 
-fn first_of_most(tallies: &[Tally], racing: &[usize]) -> usize {
+fn index_of_best(tallies: &[Tally], racing: &[usize]) -> usize {
     let mut best = racing.first().copied().unwrap_or(0);
     for &place in racing {
         if tallies[place].successes() > tallies[best].successes() {
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn the_likeliest_wins_and_who_is_far_behind_is_tried_in_one_round_only() {
+    fn likeliest_plan_wins_and_weak_plan_is_dropped_after_first_round() {
         let (tallies, leader) = race(3, &Rules::default(), &mut trials(&[60, 90, 20]));
         assert_eq!(leader, 1);
         assert_eq!(tallies[2].samples(), ROUNDS[0]);
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn of_plans_alike_the_first_is_taken_after_all_rounds() {
+    fn first_of_equal_plans_wins_after_all_rounds() {
         let (tallies, leader) = race(3, &Rules::default(), &mut trials(&[70, 70, 70]));
         assert_eq!(leader, 0);
         assert_eq!(tallies[0], tallies[2]);
@@ -165,14 +165,14 @@ mod tests {
     }
 
     #[test]
-    fn one_that_always_succeeds_ends_the_race() {
+    fn plan_without_failures_ends_the_race() {
         let (tallies, leader) = race(2, &Rules::default(), &mut trials(&[90, 100]));
         assert_eq!(leader, 1);
         assert!(tallies[1].samples() < ROUNDS[3]);
     }
 
     #[test]
-    fn an_interrupted_race_has_the_leader_of_its_last_round() {
+    fn interrupted_race_returns_leader_of_last_round() {
         let mut left = 60;
         let (_, leader) = race(2, &Rules::default(), &mut |place, _| {
             left -= 1;
@@ -182,9 +182,9 @@ mod tests {
     }
 
     #[test]
-    fn half_of_them_are_out_after_each_round_but_never_the_first() {
+    fn halving_drops_half_of_the_plans_except_the_first() {
         let rules = Rules {
-            halves: true,
+            is_halving: true,
             ..Rules::default()
         };
         let (tallies, leader) = race(8, &rules, &mut trials(&[70; 8]));
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn who_cannot_be_far_enough_ahead_of_the_first_is_tried_no_further() {
+    fn plan_that_cannot_gain_the_margin_is_dropped() {
         let rules = Rules {
             rounds: &[400, 800, 1600],
             margin: Some(200),

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_execution::executors::{ExecutorSpec, Foresight};
+use elbowroom_execution::executors::{ExecutorSpec, PolicyTableCache};
 use elbowroom_execution::run::{PlanningTime, RunSettings, Verdict};
 use elbowroom_execution::{NoPlanner, PlanAnswer, Planner, PlannerAnswer, Preparer};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
@@ -12,15 +12,15 @@ use elbowroom_planner::embedded;
 use elbowroom_probability::Likelihoods;
 use elbowroom_sim::WorldModel;
 
-use super::first_plan::renumbered;
-use super::{Analyst, Embedded, Execution, RememberingPlanner, RememberingPreparer};
-use crate::flow;
+use super::plan_selection::renumbered;
+use super::{CachingPlanner, CachingPreparer, Embedded, Execution, PlanPreparer};
+use crate::pipeline;
 
 /// First seed of the samples, far from seeds that users choose.
 const SEED: u64 = 0x7472_7900_0000_0000;
 
 /// Size of the caches of planner and preparer.
-const MEMORY: usize = 2_000;
+const CACHE_SIZE: usize = 2_000;
 
 /// Settings of rollouts.
 #[derive(Clone)]
@@ -32,7 +32,7 @@ pub struct Rollouts {
     /// Settings of the runs.
     pub settings: RunSettings,
     /// The open quantities, and the search for envelopes.
-    pub flow: flow::Settings,
+    pub flow: pipeline::Settings,
     /// The executor's likelihoods.
     pub likelihoods: Arc<Likelihoods>,
     /// Settings of replanning; without them, no new plans are made.
@@ -78,15 +78,15 @@ impl Replanning {
 }
 
 /// Executes plans of one problem in samples.
-pub struct Tryout<'a> {
+pub struct RolloutSession<'a> {
     rollouts: Rollouts,
     task: Arc<Task>,
     planner: Box<dyn Planner + 'a>,
-    preparer: RememberingPreparer<Analyst>,
-    foresight: Foresight,
+    preparer: CachingPreparer<PlanPreparer>,
+    foresight: PolicyTableCache,
 }
 
-impl<'a> Tryout<'a> {
+impl<'a> RolloutSession<'a> {
     /// Creates it for a problem. `work` limits the work of all samples together, in units of
     /// [`elbowroom_num::work`].
     pub fn new(
@@ -95,7 +95,7 @@ impl<'a> Tryout<'a> {
         work: u64,
         goes_on: &'a (dyn Fn() -> bool + Sync),
     ) -> Self {
-        if rollouts.executor.asks_odds()
+        if rollouts.executor.needs_comparator()
             && let Ok(live) = "live".parse()
         {
             rollouts.executor = live;
@@ -104,32 +104,32 @@ impl<'a> Tryout<'a> {
         if rollouts.settings.planning_time == PlanningTime::Measured {
             rollouts.settings.planning_time = PlanningTime::Seconds(Rational::ZERO);
         }
-        rollouts.settings.watches_room = false;
+        rollouts.settings.monitors_slack = false;
         rollouts.settings.plans_aside = false;
         rollouts.settings.readies_aside = false;
         let planner: Box<dyn Planner + 'a> = match &rollouts.replanning {
             None => Box::new(NoPlanner),
             Some(replanning) => {
-                let metered = Metered {
+                let metered = BudgetedPlanner {
                     embedded: Embedded {
                         settings: replanning.settings.clone(),
                         most_states: replanning.most_states,
                         improve_states: replanning.improve_states,
                         work,
-                        patience: 1,
+                        first_plan_factor: 1,
                         // Samples need no proof that no plan exists.
                         certificate_work: 0,
                         clock: None,
-                        goes_on: Some(goes_on),
+                        may_continue: Some(goes_on),
                     },
-                    left: replanning.all_states,
+                    remaining_states: replanning.all_states,
                     budget: work::Budget::new(work),
                 };
-                Box::new(RememberingPlanner::new(metered, MEMORY))
+                Box::new(CachingPlanner::new(metered, CACHE_SIZE))
             }
         };
         let budget = work::Budget::new(work);
-        let analyst = Analyst::new(rollouts.flow.clone()).until(move || {
+        let analyst = PlanPreparer::new(rollouts.flow.clone()).with_limit(move || {
             if budget.is_spent() {
                 ControlFlow::Break(())
             } else {
@@ -138,8 +138,8 @@ impl<'a> Tryout<'a> {
         });
         Self {
             planner,
-            preparer: RememberingPreparer::new(analyst, MEMORY),
-            foresight: Foresight::default(),
+            preparer: CachingPreparer::new(analyst, CACHE_SIZE),
+            foresight: PolicyTableCache::default(),
             task: Arc::new(task.with_own_table()),
             rollouts,
         }
@@ -187,12 +187,12 @@ impl<'a> Tryout<'a> {
             .with_settings(rollouts.settings.clone())
             .with_likelihoods(Arc::clone(&rollouts.likelihoods))
             .with_foresight(self.foresight.clone())
-            .planned_by(Scripted {
+            .with_planner(ScriptedPlanner {
                 first: later,
                 planner: &mut *self.planner,
                 made,
             })
-            .prepared_by(preparer);
+            .with_preparer(preparer);
         let seed = SEED.wrapping_add(sample);
         let report = execution.run_in(&mut *rollouts.world.world(&task, seed));
         Some(report.verdict)
@@ -200,14 +200,14 @@ impl<'a> Tryout<'a> {
 }
 
 /// Planner with a prepared first plan.
-struct Scripted<'p> {
+struct ScriptedPlanner<'p> {
     first: Option<TimeTriggeredPlan>,
     planner: &'p mut dyn Planner,
     /// All later plans.
     made: &'p mut Vec<TimeTriggeredPlan>,
 }
 
-impl Planner for Scripted<'_> {
+impl Planner for ScriptedPlanner<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         if let Some(plan) = self.first.take() {
             return PlannerAnswer::from(PlanAnswer::Plan(plan));
@@ -222,47 +222,47 @@ impl Planner for Scripted<'_> {
 }
 
 /// The embedded planner, with a limit on the effort for all its plans together.
-pub(super) struct Metered<'a> {
+pub(super) struct BudgetedPlanner<'a> {
     embedded: Embedded<'a>,
-    left: u64,
+    remaining_states: u64,
     budget: work::Budget,
 }
 
-impl Metered<'_> {
+impl BudgetedPlanner<'_> {
     /// Returns a planner with a cache, or [`NoPlanner`] without settings of replanning.
-    pub(super) fn boxed(replanning: Option<&Replanning>) -> Box<dyn Planner> {
+    pub(super) fn new_planner(replanning: Option<&Replanning>) -> Box<dyn Planner> {
         let Some(replanning) = replanning else {
             return Box::new(NoPlanner);
         };
-        let metered = Metered {
+        let metered = BudgetedPlanner {
             embedded: Embedded {
                 settings: replanning.settings.clone(),
                 most_states: replanning.most_states,
                 improve_states: replanning.improve_states,
                 work: replanning.work,
-                patience: 1,
+                first_plan_factor: 1,
                 certificate_work: 0,
                 clock: None,
-                goes_on: None,
+                may_continue: None,
             },
-            left: replanning.all_states,
+            remaining_states: replanning.all_states,
             budget: work::Budget::new(replanning.work),
         };
-        Box::new(RememberingPlanner::new(metered, MEMORY))
+        Box::new(CachingPlanner::new(metered, CACHE_SIZE))
     }
 }
 
-impl Planner for Metered<'_> {
+impl Planner for BudgetedPlanner<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        self.embedded.work = self.budget.left();
-        if self.left == 0 || self.budget.is_spent() {
+        self.embedded.work = self.budget.remaining();
+        if self.remaining_states == 0 || self.budget.is_spent() {
             return PlannerAnswer::from(PlanAnswer::NotFound {
                 why: "the limit on what trying plans out may take is reached".to_owned(),
             });
         }
-        let (answer, states) = self.embedded.counted(task, situation);
+        let (answer, states) = self.embedded.plan_with_state_count(task, situation);
         // A plan without search also takes some time.
-        self.left = self.left.saturating_sub(states.max(1));
+        self.remaining_states = self.remaining_states.saturating_sub(states.max(1));
         PlannerAnswer::from(answer)
     }
 }

@@ -15,10 +15,10 @@ use super::planners::Embedded;
 use crate::no_plan::{Effort, conflict, earliest_times, with_any_ends};
 
 /// Share of the limits of a plan that a search without deadlines may take.
-const SHARE: u64 = 4;
+const LIMIT_DIVISOR: u64 = 4;
 
 /// Deadline, in seconds after the situation, of searches without deadlines.
-const NO_DEADLINE: i64 = 1_000_000_000;
+const FAR_DEADLINE: i64 = 1_000_000_000;
 
 impl Embedded<'_> {
     /// Completes an answer without a plan: the reasons, and the proof that a deadline is missed.
@@ -30,32 +30,39 @@ impl Embedded<'_> {
     ) -> (PlanAnswer, Shortfall) {
         let mut shortfall = Shortfall::default();
         let has_none = matches!(answer, PlanAnswer::Unsolvable | PlanAnswer::NotFound { .. });
-        if !has_none || self.certificate_work == 0 || !self.is_wanted() {
+        if !has_none || self.certificate_work == 0 || !self.may_continue() {
             return (answer, shortfall);
         }
-        shortfall.late = self.late(task, situation);
-        if shortfall.late.iter().any(|late| late.least.is_some()) {
+        shortfall.missed_deadlines = self.missed_deadlines(task, situation);
+        if shortfall
+            .missed_deadlines
+            .iter()
+            .any(|late| late.proven_lower_bound.is_some())
+        {
             return (PlanAnswer::Unsolvable, shortfall);
         }
         if answer == PlanAnswer::Unsolvable {
-            let (from, work) = (with_any_ends(situation), self.certificate_work / SHARE);
-            shortfall.conflict = conflict(task, &from, work, &mut || self.is_wanted());
+            let (from, work) = (
+                with_any_ends(situation),
+                self.certificate_work / LIMIT_DIVISOR,
+            );
+            shortfall.conflict = conflict(task, &from, work, &mut || self.may_continue());
         }
         (answer, shortfall)
     }
 
-    fn is_wanted(&self) -> bool {
-        self.goes_on.is_none_or(|goes_on| goes_on())
+    fn may_continue(&self) -> bool {
+        self.may_continue.is_none_or(|goes_on| goes_on())
     }
 
     /// Returns the deadlines that are missed.
-    fn late(&self, task: &Task, situation: &Situation) -> Vec<Lateness> {
+    fn missed_deadlines(&self, task: &Task, situation: &Situation) -> Vec<Lateness> {
         let deadlines: Vec<(&Rational, &Condition)> = task.deadlines().collect();
         if deadlines.is_empty() {
             return Vec::new();
         }
         let conditions: Vec<&Condition> = deadlines.iter().map(|it| it.1).collect();
-        let goes_on = &mut || self.is_wanted();
+        let goes_on = &mut || self.may_continue();
         let mut effort = Effort::of(self.certificate_work, goes_on);
         let any_ends = with_any_ends(situation);
         let least = earliest_times(task, &any_ends, &conditions, &mut effort);
@@ -69,32 +76,33 @@ impl Embedded<'_> {
                 let reached = found.as_ref();
                 let reached = reached.and_then(|plan| reached_at(task, situation, plan, condition));
                 Lateness {
-                    place,
-                    reached: reached.filter(is_late),
-                    least: least.next().flatten().filter(is_late),
+                    deadline_index: place,
+                    achieved_at: reached.filter(is_late),
+                    proven_lower_bound: least.next().flatten().filter(is_late),
                 }
             });
-        late.filter(|it| it.reached.is_some() || it.least.is_some())
+        late.filter(|it| it.achieved_at.is_some() || it.proven_lower_bound.is_some())
             .collect()
     }
 
     /// Returns the plan with the least makespan that a short search finds without deadlines.
     fn without_deadlines(&self, task: &Task, situation: &Situation) -> Option<TimeTriggeredPlan> {
-        let far = &situation.time + Rational::from(NO_DEADLINE);
+        let far = &situation.time + Rational::from(FAR_DEADLINE);
         let conditions = task.deadlines().map(|(_, condition)| condition.clone());
         let relaxed = task.with_ground_deadlines(conditions.map(|it| (far.clone(), it)));
         let settings = embedded::Settings {
             objective: Objective::Makespan,
             ..self.settings.clone()
         };
-        let (most_states, most_work) = (self.most_states / SHARE, self.work / SHARE);
+        let (most_states, most_work) =
+            (self.most_states / LIMIT_DIVISOR, self.work / LIMIT_DIVISOR);
         let answer = embedded::plan(&relaxed, situation, &settings, &mut |progress| {
             let counts = &progress.counts;
             let limit = match progress.best {
                 Some(_) => self.improve_states.min(most_states),
                 None => most_states,
             };
-            if counts.evaluated >= limit || counts.work >= most_work || !self.is_wanted() {
+            if counts.evaluated >= limit || counts.work >= most_work || !self.may_continue() {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())

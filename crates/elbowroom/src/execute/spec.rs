@@ -1,7 +1,7 @@
 //! Specification of a run as data: [`RunSpec`].
 
+mod assembly;
 mod text_form;
-mod wiring;
 
 use std::sync::Arc;
 
@@ -18,14 +18,14 @@ use serde::{Deserialize, Serialize};
 
 use super::{Embedded, FirstPlan, PLANNING_BUDGET};
 use crate::answers::envelope::Search;
-use crate::flow;
+use crate::pipeline;
 pub(crate) use text_form::{as_text, listed};
 use text_form::{positive, required};
 
-pub use wiring::{FirstPlanError, SpecError, SpoilerError};
+pub use assembly::{AdversaryError, FirstPlanError, SpecError};
 
 /// Name for a run without a planner.
-pub const NOBODY: &str = "none";
+pub const NO_PLANNER: &str = "none";
 
 /// Name of the embedded planner in specifications and answers.
 pub const EMBEDDED: &str = "embedded";
@@ -67,8 +67,8 @@ pub struct RunSpec {
     pub is_world_embedded: bool,
     /// A world that ends each action at the worst time; left out if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub spoiler: Option<Spoiler>,
-    /// The planner: [`EMBEDDED`], [`NOBODY`], or the name or command line of another one.
+    pub spoiler: Option<AdversarySettings>,
+    /// The planner: [`EMBEDDED`], [`NO_PLANNER`], or the name or command line of another one.
     pub planner: String,
     /// Time limit of another planner for better plans than its first, in seconds; left out if the
     /// first plan is used.
@@ -87,7 +87,7 @@ pub struct RunSpec {
         rename = "lasting",
         skip_serializing_if = "std::ops::Not::not"
     )]
-    pub is_lasting: bool,
+    pub is_persistent: bool,
     /// `true` if the run accepts pauses and the abandonment of its goal (`elbowroom run --token`).
     /// Left out if `false`.
     #[serde(
@@ -95,7 +95,7 @@ pub struct RunSpec {
         rename = "attended",
         skip_serializing_if = "std::ops::Not::not"
     )]
-    pub is_attended: bool,
+    pub is_interactive: bool,
     /// The executor.
     #[serde(with = "as_text")]
     pub executor: ExecutorSpec,
@@ -182,7 +182,7 @@ pub struct NamedText {
 /// A world that ends each action at the worst time.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Spoiler {
+pub struct AdversarySettings {
     /// The box of durations: `dur_0=[8,14]`; without one, the plan's envelope.
     #[serde(rename = "box", deserialize_with = "required")]
     pub inside: Option<String>,
@@ -212,7 +212,7 @@ impl RunSpec {
     pub fn new(domain: NamedText, problem: NamedText) -> Self {
         let settings = RunSettings::default();
         let planner = Embedded::default();
-        let flow = flow::Settings::default();
+        let flow = pipeline::Settings::default();
         Self {
             domain,
             problem,
@@ -225,8 +225,8 @@ impl RunSpec {
             planner_time: None,
             likelihoods: None,
             has_plan: false,
-            is_lasting: false,
-            is_attended: false,
+            is_persistent: false,
+            is_interactive: false,
             executor: ExecutorSpec::default(),
             seed: 0,
             first_plan: FirstPlan::default(),
@@ -245,7 +245,7 @@ impl RunSpec {
             readies_aside: false,
             realtime: None,
             timeout: settings.timeout,
-            max_replans: settings.most_replans,
+            max_replans: settings.max_replans,
             time_limit: settings.time_limit,
             epsilon: Task::default_epsilon(),
         }
@@ -256,35 +256,35 @@ impl RunSpec {
         RunSettings {
             running: self.running,
             planning_time: self.planning_time.clone(),
-            most_replans: self.max_replans,
+            max_replans: self.max_replans,
             timeout: self.timeout.clone(),
             time_limit: self.time_limit.clone(),
             // A simulation without a clock has no user to warn.
             plans_aside: self.plans_aside,
             readies_aside: self.readies_aside,
-            watches_room: self.world_process.is_some() || self.realtime.is_some(),
+            monitors_slack: self.world_process.is_some() || self.realtime.is_some(),
         }
     }
 
     /// Returns `true` if plans can be made in the background: there is a clock that measures
     /// planning times, and the planner keeps no state between plans.
-    pub fn can_plan_aside(&self) -> bool {
+    pub fn can_plan_in_background(&self) -> bool {
         let has_clock = self.world_process.is_some() || self.realtime.is_some();
-        let keeps = self.executor.asks_odds() || self.executor.asks_outlook();
+        let keeps = self.executor.needs_comparator() || self.executor.needs_action_values();
         has_clock
             && self.planning_time == PlanningTime::Measured
-            && self.planner != NOBODY
+            && self.planner != NO_PLANNER
             && !keeps
     }
 
     /// Returns the quantities to vary, and the settings of the search for envelopes.
-    pub fn envelopes(&self) -> flow::Settings {
-        let mut flow = flow::Settings {
+    pub fn envelopes(&self) -> pipeline::Settings {
+        let mut flow = pipeline::Settings {
             vary: self.vary.clone(),
             guarantee: self.guarantee,
             timeout: self.timeout.clone(),
             search: self.objective.map_or_else(Search::irr, Search::best),
-            ..flow::Settings::default()
+            ..pipeline::Settings::default()
         };
         if let Some(precision) = &self.precision {
             flow.search = flow.search.with_precision(precision.clone());
@@ -308,7 +308,7 @@ impl RunSpec {
         match self.believed_world() {
             Some(text) => read_world(text, problem).map(Some),
             None if self.world_process.is_some() => Ok(None),
-            None => Ok(Some(WorldModel::as_planned())),
+            None => Ok(Some(WorldModel::without_deviations())),
         }
     }
 
@@ -320,7 +320,7 @@ impl RunSpec {
         match &self.world {
             _ if self.world_process.is_some() => Ok(None),
             Some(text) => read_world(text, problem).map(Some),
-            None => Ok(Some(WorldModel::as_planned())),
+            None => Ok(Some(WorldModel::without_deviations())),
         }
     }
 

@@ -66,7 +66,7 @@ mod tests {
     use super::is_label;
 
     #[test]
-    fn steps_are_called_by_numbers() {
+    fn step_labels_are_recognised() {
         assert!(is_label("n12"));
         assert!(!is_label("n"));
         assert!(!is_label("nap"));

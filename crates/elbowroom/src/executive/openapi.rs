@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_description_refers_to_is_described() {
+    fn all_references_are_defined() {
         let document = openapi();
         let mut found = Vec::new();
         references(&document, &mut found);
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_that_changes_something_needs_a_token() {
+    fn modifying_methods_require_a_token() {
         let document = openapi();
         for method in METHODS {
             let operation = &document["paths"][method.path][method.verb.to_lowercase()];
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn members_that_may_be_left_out_are_not_required() {
+    fn optional_members_are_not_required() {
         let goal = &openapi()["components"]["schemas"]["NewGoal"];
         assert_eq!(goal["required"], serde_json::json!(["goal"]));
         assert!(goal["properties"]["name"]["description"].as_str().is_some());

@@ -5,10 +5,10 @@ mod goals;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::run::{FIRST_GOAL, TimeoutRule, Verdict};
+use elbowroom_execution::run::{PROBLEM_GOAL_NAME, TimeoutRule, Verdict};
 use elbowroom_execution::{
-    Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalTerms, Mission, Observation,
-    Progression, Promise, Request, StepId, Ticket, WarningCause,
+    ActionHandle, BeliefState, Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalTerms,
+    GuaranteeLevel, Observation, PreparedPlan, Request, StepId, WarningCause,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Task};
@@ -28,21 +28,21 @@ use super::documents::{
 /// Follows a persistent run by its record. Clones share the state. Requests are answered at once
 /// and do not block the run, because names are computed from a copy of the belief state.
 #[derive(Clone, Default)]
-pub struct Status(Arc<Mutex<Known>>);
+pub struct Status(Arc<Mutex<StatusData>>);
 
 #[derive(Default)]
-struct Known {
+struct StatusData {
     timeout: TimeoutRule,
     now: Rational,
     is_planning: bool,
     is_paused: bool,
     is_over: bool,
     /// The reason why the state is outdated, if it is.
-    past: Option<&'static str>,
+    outdated_reason: Option<&'static str>,
     /// The reason why the executive is idle, if it is.
-    rest: Option<String>,
+    idle_reason: Option<String>,
     /// The reason for making a plan.
-    why: Option<String>,
+    planning_reason: Option<String>,
     goals: GoalList,
     running: BTreeMap<u64, Running>,
     /// The tickets of running actions whose start was reported.
@@ -50,11 +50,11 @@ struct Known {
     plans: usize,
     steps: Vec<StepNow>,
     since: Option<Rational>,
-    room: Vec<Room>,
-    promise: Option<(Promise, Rational)>,
+    parameters: Vec<Room>,
+    promise: Option<(GuaranteeLevel, Rational)>,
     deviation: Option<String>,
     decided: Option<(Rational, Decided)>,
-    belief: Option<Arc<Progression>>,
+    belief: Option<Arc<BeliefState>>,
 }
 
 impl Status {
@@ -63,63 +63,67 @@ impl Status {
         let mut goals = GoalList::default();
         if !task.problem().goal.is_trivial() {
             let goal = goal_text(task);
-            goals.give((FIRST_GOAL, &goal), &GoalTerms::default(), &Rational::ZERO);
+            goals.add(
+                (PROBLEM_GOAL_NAME, &goal),
+                &GoalTerms::default(),
+                &Rational::ZERO,
+            );
         }
-        let known = Known {
+        let known = StatusData {
             timeout,
             goals,
-            ..Known::default()
+            ..StatusData::default()
         };
         Self(Arc::new(Mutex::new(known)))
     }
 
-    fn known(&self) -> MutexGuard<'_, Known> {
+    fn lock(&self) -> MutexGuard<'_, StatusData> {
         // Each update is complete or has no effect, so a poisoned lock is ignored.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Updates the state with an entry of the record.
     pub fn record(&self, entry: &Entry<'_>) {
-        self.known().record(entry);
+        self.lock().record(entry);
     }
 
     /// Sets the state to the snapshot of an earlier run, which the run continues.
     pub fn begin_at(&self, snapshot: &SnapshotLine) {
-        self.known().begin_at(snapshot);
+        self.lock().begin_at(snapshot);
     }
 
     /// Updates the belief state.
-    pub fn believe(&self, belief: &Progression) {
+    pub fn set_belief(&self, belief: &BeliefState) {
         let belief = Arc::new(belief.clone());
-        self.known().belief = Some(belief);
+        self.lock().belief = Some(belief);
     }
 
     /// Returns the names of the open goals.
     pub fn goals(&self) -> Vec<String> {
-        let goals = self.known().goals.open();
+        let goals = self.lock().goals.open();
         goals.into_iter().map(|goal| goal.name).collect()
     }
 
     /// Returns the open goals, and the most recently closed ones.
     pub fn all_goals(&self) -> GoalsNow {
-        self.known().goals.all()
+        self.lock().goals.all()
     }
 
     /// Returns the present state. Its facts and numbers include timed initials and continuous
     /// effects since the last entry of the record.
     pub fn state(&self) -> State {
         let (mut state, belief) = {
-            let known = self.known();
+            let known = self.lock();
             (known.state(), known.belief.clone())
         };
         if let Some(belief) = belief {
-            let mut belief = Progression::clone(&belief);
+            let mut belief = BeliefState::clone(&belief);
             // Timed initials and continuous effects since the last entry. A number that cannot be
             // computed keeps its value.
             let _ = belief.advance(&state.now.0);
             // Actions that have timed out are no longer running in the belief state.
-            let runs = |ticket: u64| belief.running().contains_key(&Ticket(ticket));
-            let started = self.known().started.clone();
+            let runs = |ticket: u64| belief.running().contains_key(&ActionHandle(ticket));
+            let started = self.lock().started.clone();
             state
                 .running
                 .retain(|it| runs(it.ticket) || !started.contains(&it.ticket));
@@ -141,17 +145,17 @@ impl Status {
 
     /// Sets whether the run replays its journal. Its state is then outdated.
     pub fn set_replayed(&self, is_replayed: bool) {
-        self.known().past = is_replayed.then_some("the journal is replayed");
+        self.lock().outdated_reason = is_replayed.then_some("the journal is replayed");
     }
 
     /// Returns `true` if the run replays its journal.
     pub fn is_replayed(&self) -> bool {
-        self.known().past.is_some()
+        self.lock().outdated_reason.is_some()
     }
 
     /// Updates the time of the world's clock, without an event.
-    pub fn pass(&self, now: &Rational) {
-        let mut known = self.known();
+    pub fn set_time(&self, now: &Rational) {
+        let mut known = self.lock();
         if *now > known.now {
             known.now.clone_from(now);
         }
@@ -159,7 +163,7 @@ impl Status {
 
     /// Returns the current plan.
     pub fn plan(&self) -> PlanNow {
-        let known = self.known();
+        let known = self.lock();
         PlanNow {
             steps: known.steps.clone(),
             since: known.since.clone().map(Exact),
@@ -169,10 +173,10 @@ impl Status {
 
     /// Returns the guarantee.
     pub fn guarantee(&self) -> GuaranteeNow {
-        let known = self.known();
+        let known = self.lock();
         let promise = known.promise.as_ref();
-        let mut parameters = known.room.clone();
-        if promise.is_none_or(|(promise, _)| *promise > Promise::PartOfEnvelope) {
+        let mut parameters = known.parameters.clone();
+        if promise.is_none_or(|(promise, _)| *promise > GuaranteeLevel::PartOfEnvelope) {
             for room in &mut parameters {
                 (room.least, room.most) = (None, None);
             }
@@ -188,7 +192,7 @@ impl Status {
 
     /// Returns the last decision and the next action.
     pub fn next(&self) -> NextNow {
-        let known = self.known();
+        let known = self.lock();
         let decided = known.decided.as_ref();
         let until = decided.and_then(|(_, decided)| match &decided.decision {
             Decision::Wait { until } => until.clone().map(Exact),
@@ -200,7 +204,7 @@ impl Status {
             decided: decided.map(|(time, _)| Exact(time.clone())),
             until,
             why: known
-                .rest
+                .idle_reason
                 .clone()
                 .or_else(|| decided.map(|(_, it)| it.reason.to_string())),
             step: to_come.cloned(),
@@ -209,7 +213,7 @@ impl Status {
 }
 
 /// Reason of an idle run whose present segment of the journal does not contain the reason.
-const BEFORE: &str = "the reason is in an earlier segment of the journal";
+const EARLIER_SEGMENT: &str = "the reason is in an earlier segment of the journal";
 /// Reason for making a plan at the beginning, and when a run continues after its end.
 const NO_PLAN: &str = "there is no plan yet";
 /// Reason of an idle run without goals.
@@ -227,7 +231,7 @@ pub fn goal_text(task: &Task) -> String {
     line.strip_suffix(')').unwrap_or(line).to_owned()
 }
 
-fn in_doubt(belief: &Progression) -> Vec<InDoubt> {
+fn in_doubt(belief: &BeliefState) -> Vec<InDoubt> {
     let task = belief.task();
     let of = |name: &str, doubts: &[Doubt], settles: &str| {
         let one = |doubt: &Doubt| InDoubt {
@@ -249,23 +253,23 @@ fn in_doubt(belief: &Progression) -> Vec<InDoubt> {
     facts.chain(values).collect()
 }
 
-impl Known {
+impl StatusData {
     fn state(&self) -> State {
         let activity = match () {
             () if self.is_over => Activity::Over,
-            () if self.past.is_some() => Activity::Beginning,
+            () if self.outdated_reason.is_some() => Activity::Beginning,
             () if self.is_paused => Activity::Paused,
-            () if self.rest.is_some() => Activity::Resting,
+            () if self.idle_reason.is_some() => Activity::Resting,
             () if self.is_planning => Activity::Planning,
             () if self.plans == 0 => Activity::Beginning,
             () => Activity::Executing,
         };
-        let past = self.past.map(str::to_owned);
-        let why = past.or_else(|| self.rest.clone());
+        let past = self.outdated_reason.map(str::to_owned);
+        let why = past.or_else(|| self.idle_reason.clone());
         State {
             now: Exact(self.now.clone()),
             unanswered: None,
-            why: why.or_else(|| self.why.clone()),
+            why: why.or_else(|| self.planning_reason.clone()),
             activity,
             goals: self.goals.open(),
             running: self.running.values().cloned().collect(),
@@ -284,9 +288,9 @@ impl Known {
             let why = if self.goals.open().is_empty() {
                 NO_GOAL
             } else {
-                BEFORE
+                EARLIER_SEGMENT
             };
-            self.rest = Some(why.to_owned());
+            self.idle_reason = Some(why.to_owned());
         }
         for start in snapshot.starts.iter().filter(|it| it.is_open()) {
             if start.started.is_some() {
@@ -308,7 +312,7 @@ impl Known {
 
     fn record(&mut self, entry: &Entry<'_>) {
         match entry {
-            Entry::Mission(mission) => self.take_up(mission),
+            Entry::PlanAdopted(mission) => self.adopt_plan(mission),
             Entry::Decided { now, decided } => self.decide(now, decided),
             Entry::Command { now, command, .. } => self.command(now, command),
             Entry::Passed { now, .. } | Entry::Looked { now, .. } => self.now.clone_from(now),
@@ -319,9 +323,9 @@ impl Known {
             } => self.observe(observation, remark.is_some()),
             Entry::Planning { reason, .. } => {
                 self.is_planning = true;
-                self.goals.try_again();
-                self.rest = None;
-                self.why = Some(match reason.cause {
+                self.goals.mark_pursued();
+                self.idle_reason = None;
+                self.planning_reason = Some(match reason.cause {
                     // The record of a run begins with the cause of a new plan.
                     Cause::NewPlan => NO_PLAN.to_owned(),
                     _ => reason.to_string(),
@@ -353,13 +357,13 @@ impl Known {
                 self.now.clone_from(now);
                 self.steps.clear();
                 self.since = None;
-                self.room.clear();
+                self.parameters.clear();
                 self.promise = None;
                 self.deviation = None;
                 self.decided = None;
                 let reasons: Vec<String> = dead_end.iter().map(ToString::to_string).collect();
                 let goals = goals.join(", ");
-                self.rest = Some(match verdict {
+                self.idle_reason = Some(match verdict {
                     None => NO_GOAL.to_owned(),
                     Some(Verdict::GoalReached) => {
                         self.goals.close_all(now);
@@ -367,10 +371,11 @@ impl Known {
                     }
                     Some(verdict) => {
                         let is_certain = **verdict == Verdict::Unsolvable;
-                        self.goals.give_up(is_certain, &reasons.join("; "), now);
+                        self.goals
+                            .mark_unplanned(is_certain, &reasons.join("; "), now);
                         let why = verdict.why().map(str::to_owned).into_iter().chain(reasons);
                         let why: Vec<String> = why.collect();
-                        let words = in_words(verdict);
+                        let words = verdict_text(verdict);
                         if why.is_empty() {
                             format!("{words}: {goals}")
                         } else {
@@ -386,14 +391,15 @@ impl Known {
                     .verdict
                     .why()
                     .map_or(String::new(), |why| format!(": {why}"));
-                self.rest = Some(format!("{}{why}", report.verdict.name().replace('-', " ")));
+                self.idle_reason =
+                    Some(format!("{}{why}", report.verdict.name().replace('-', " ")));
             }
         }
     }
 
-    fn take_up(&mut self, mission: &Mission) {
+    fn adopt_plan(&mut self, mission: &PreparedPlan) {
         self.plans += 1;
-        (self.is_planning, self.rest, self.why) = (false, None, None);
+        (self.is_planning, self.idle_reason, self.planning_reason) = (false, None, None);
         self.since = Some(mission.now.clone());
         let numbered = mission.time_triggered.steps.iter().zip(&mission.instances);
         let mut steps: Vec<StepNow> = numbered
@@ -419,7 +425,7 @@ impl Known {
         steps.sort_by(|one, other| one.start.0.cmp(&other.start.0));
         self.steps = steps;
         let parameters = mission.plan.parameters.iter().enumerate();
-        self.room = parameters
+        self.parameters = parameters
             .map(|(index, parameter)| {
                 let allowed = mission.envelope.as_ref();
                 let allowed = allowed.and_then(|envelope| envelope.intervals().get(index));
@@ -448,7 +454,7 @@ impl Known {
     }
 
     fn decide(&mut self, now: &Rational, decided: &Decided) {
-        if let Some(promise) = decided.reason.promise
+        if let Some(promise) = decided.reason.guarantee
             && self
                 .promise
                 .as_ref()
@@ -533,7 +539,7 @@ impl Known {
                 }
             }
             // Rejected requests have no effect.
-            Event::Asked(request) if !is_remarkable => self.asked(request),
+            Event::Asked(request) if !is_remarkable => self.on_request(request),
             Event::Asked(_)
             | Event::Fact { .. }
             | Event::Value { .. }
@@ -543,11 +549,11 @@ impl Known {
         }
     }
 
-    fn asked(&mut self, request: &Request) {
+    fn on_request(&mut self, request: &Request) {
         match request {
             Request::Pursue { name, goal, terms } => {
                 self.goals.cancel(name, "replaced", &self.now);
-                self.goals.give((name, goal), terms, &self.now);
+                self.goals.add((name, goal), terms, &self.now);
             }
             Request::Abandon { name } => self.goals.cancel(name, "abandoned", &self.now),
             Request::CancelAction { .. } => {}
@@ -557,7 +563,7 @@ impl Known {
     }
 }
 
-fn in_words(verdict: &Verdict) -> &'static str {
+fn verdict_text(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::Unsolvable => "no plan reaches the goals from here",
         Verdict::NoPlan { .. } => "no plan was found",

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_num::{Rational, Total};
+use elbowroom_num::{Accumulator, Rational};
 use elbowroom_plan::{
     Bound, Constraint, NodeId, Origin, ParameterId, Reason, Side, StnPlan, Valuation,
 };
@@ -22,20 +22,20 @@ pub(super) struct Conflict {
 
 /// Known conflicts of a plan. Usually, a single conflict limits many ends.
 #[derive(Debug, Default)]
-pub(crate) struct Seen {
-    conflicts: Vec<SeenConflict>,
+pub(crate) struct KnownConflicts {
+    conflicts: Vec<KnownConflict>,
     /// The conflicts of each parameter.
-    of: BTreeMap<ParameterId, Vec<usize>>,
+    by_parameter: BTreeMap<ParameterId, Vec<usize>>,
 }
 
 /// A conflict whose description does not depend on the values.
 #[derive(Debug)]
-struct SeenConflict {
+struct KnownConflict {
     cycle: Vec<Origin>,
     reason: String,
 }
 
-impl Seen {
+impl KnownConflicts {
     /// Returns the reason why the plan has no schedule at these values, where only the parameter
     /// deviates too far. Empty if the plan has a schedule.
     pub(super) fn reason(
@@ -45,7 +45,7 @@ impl Seen {
         valuation: &Valuation,
     ) -> String {
         let plan = &explainer.plan.plan;
-        let own = self.of.get(&id).into_iter().flatten();
+        let own = self.by_parameter.get(&id).into_iter().flatten();
         let seen = own.map(|index| &self.conflicts[*index]);
         for seen in seen {
             if is_too_long(plan, &seen.cycle, valuation) {
@@ -69,9 +69,12 @@ impl Seen {
             }
         }
         for id in parameters {
-            self.of.entry(id).or_default().push(self.conflicts.len());
+            self.by_parameter
+                .entry(id)
+                .or_default()
+                .push(self.conflicts.len());
         }
-        self.conflicts.push(SeenConflict {
+        self.conflicts.push(KnownConflict {
             cycle,
             reason: reason.clone(),
         });
@@ -83,7 +86,7 @@ impl Seen {
 #[derive(Clone, Copy)]
 enum Edge<'a> {
     /// Nothing happens before time 0.
-    Beginning,
+    TimeZero,
     /// The lower bound of a constraint.
     AtLeast(&'a Constraint),
     /// The upper bound of a constraint.
@@ -93,7 +96,7 @@ enum Edge<'a> {
 impl<'a> Edge<'a> {
     fn of(plan: &'a StnPlan, origin: Origin) -> Self {
         match origin {
-            Origin::Beginning => Self::Beginning,
+            Origin::Beginning => Self::TimeZero,
             Origin::AtLeast(index) => Self::AtLeast(&plan.constraints[index]),
             Origin::AtMost(index) => Self::AtMost(&plan.constraints[index]),
         }
@@ -102,7 +105,7 @@ impl<'a> Edge<'a> {
     /// Returns the constraint and its bound.
     fn bound(self) -> Option<(&'a Constraint, &'a Bound)> {
         match self {
-            Self::Beginning => None,
+            Self::TimeZero => None,
             Self::AtLeast(constraint) => Some((constraint, &constraint.lower)),
             Self::AtMost(constraint) => Some((constraint, &constraint.upper)),
         }
@@ -112,7 +115,7 @@ impl<'a> Edge<'a> {
 /// Returns `true` if a cycle of bounds is negative at these values, so that there is no schedule.
 /// `false` if one of the bounds is infinite.
 fn is_too_long(plan: &StnPlan, cycle: &[Origin], valuation: &Valuation) -> bool {
-    let mut room = Total::default();
+    let mut room = Accumulator::default();
     for edge in cycle.iter().map(|origin| Edge::of(plan, *origin)) {
         let Some((_, bound)) = edge.bound() else {
             continue;
@@ -124,7 +127,7 @@ fn is_too_long(plan: &StnPlan, cycle: &[Origin], valuation: &Valuation) -> bool 
         };
         match edge {
             Edge::AtLeast(_) => room.add(&-value),
-            Edge::AtMost(_) | Edge::Beginning => room.add(value),
+            Edge::AtMost(_) | Edge::TimeZero => room.add(value),
         }
     }
     room.value().is_negative()
@@ -146,21 +149,23 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
     let first_room = walked.iter().position(|o| matches!(o, Edge::AtMost(_)));
     walked.rotate_left(first_room.unwrap_or(0));
     let mut needs: Vec<String> = Vec::new();
-    let mut rooms: Vec<Room> = Vec::new();
+    let mut rooms: Vec<UpperBound> = Vec::new();
     for (position, origin) in walked.iter().enumerate() {
         match origin {
-            Edge::Beginning => {}
-            Edge::AtLeast(constraint) => needs.extend(need(explainer, constraint, valuation)),
+            Edge::TimeZero => {}
+            Edge::AtLeast(constraint) => {
+                needs.extend(describe_lower_bound(explainer, constraint, valuation));
+            }
             Edge::AtMost(constraint) => {
                 let next = walked[(position + 1) % walked.len()];
-                rooms.push(room(explainer, constraint, next, valuation));
+                rooms.push(describe_upper_bound(explainer, constraint, next, valuation));
             }
         }
     }
     needs.reverse();
     let mut orders = walked
         .iter()
-        .filter_map(|origin| own_order(explainer, *origin, valuation));
+        .filter_map(|origin| describe_own_order(explainer, *origin, valuation));
     let reason = orders.next().unwrap_or_else(|| sentence(&needs, &rooms));
     Some(Conflict {
         reason,
@@ -172,13 +177,15 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
 impl Explainer<'_> {
     /// Describes a bound at the nominal values: a lower bound by the time that it takes, an upper
     /// bound by the time that it allows. `None` for mere orderings.
-    pub(crate) fn bound_words(&self, constraint: &Constraint, side: Side) -> Option<String> {
+    pub(crate) fn describe_bound(&self, constraint: &Constraint, side: Side) -> Option<String> {
         let nominal = self.plan.nominal();
         match side {
-            Side::Lower => need(self, constraint, &nominal),
-            Side::Upper => Some(match room(self, constraint, Edge::Beginning, &nominal) {
-                Room::Action(words) | Room::Limit(words) => words,
-            }),
+            Side::Lower => describe_lower_bound(self, constraint, &nominal),
+            Side::Upper => Some(
+                match describe_upper_bound(self, constraint, Edge::TimeZero, &nominal) {
+                    UpperBound::Action(words) | UpperBound::Limit(words) => words,
+                },
+            ),
         }
     }
 }
@@ -187,7 +194,7 @@ impl Explainer<'_> {
     /// Describes a sum of bounds: actions with the durations `takes` must fit into actions with the
     /// durations `gives` and into fixed bounds. Each bound is the position of a constraint of the
     /// plan, and a side of it. Bounds that are parameters are ignored.
-    pub(crate) fn sum_words(
+    pub(crate) fn describe_sum(
         &self,
         takes: Vec<String>,
         gives: Vec<String>,
@@ -199,8 +206,8 @@ impl Explainer<'_> {
             own.map(|(index, _)| &plan.constraints[*index])
         };
         let nominal = self.plan.nominal();
-        let mut orders =
-            constraints(Side::Lower).filter_map(|it| own_order(self, Edge::AtLeast(it), &nominal));
+        let mut orders = constraints(Side::Lower)
+            .filter_map(|it| describe_own_order(self, Edge::AtLeast(it), &nominal));
         if takes.is_empty()
             && let Some(order) = orders.next()
         {
@@ -209,22 +216,22 @@ impl Explainer<'_> {
         let mut needs = takes;
         for constraint in constraints(Side::Lower) {
             if matches!(constraint.lower, Bound::Finite(_)) {
-                needs.extend(need(self, constraint, &nominal));
+                needs.extend(describe_lower_bound(self, constraint, &nominal));
             }
         }
-        let mut rooms: Vec<Room> = gives.into_iter().map(Room::Action).collect();
+        let mut rooms: Vec<UpperBound> = gives.into_iter().map(UpperBound::Action).collect();
         for constraint in constraints(Side::Upper) {
             if matches!(constraint.upper, Bound::Finite(_)) {
                 let comes_before =
                     |it: &&Constraint| it.to == constraint.to && it.from != constraint.from;
                 let next = constraints(Side::Lower).find(comes_before);
-                let next = next.map_or(Edge::Beginning, Edge::AtLeast);
-                rooms.push(room(self, constraint, next, &nominal));
+                let next = next.map_or(Edge::TimeZero, Edge::AtLeast);
+                rooms.push(describe_upper_bound(self, constraint, next, &nominal));
             }
         }
-        let into_actions = |room: &Room| match room {
-            Room::Action(name) => Some(name.clone()),
-            Room::Limit(_) => None,
+        let into_actions = |room: &UpperBound| match room {
+            UpperBound::Action(name) => Some(name.clone()),
+            UpperBound::Limit(_) => None,
         };
         if needs.is_empty()
             && let Some(actions) = rooms.iter().map(into_actions).collect::<Option<Vec<_>>>()
@@ -250,7 +257,7 @@ impl Explainer<'_> {
 }
 
 /// An upper bound on a chain of actions.
-enum Room {
+enum UpperBound {
     /// The duration of an action that contains the chain.
     Action(String),
     /// Another upper bound, such as a deadline.
@@ -259,14 +266,14 @@ enum Room {
 
 /// Forms the sentence: `A, B must fit into C`, or `deadline of D at 60, because A, B must be over
 /// before it`.
-fn sentence(needs: &[String], rooms: &[Room]) -> String {
+fn sentence(needs: &[String], rooms: &[UpperBound]) -> String {
     let needs = needs.join(", ");
     let mut actions = Vec::new();
     let mut limits = Vec::new();
     for room in rooms {
         match room {
-            Room::Action(name) => actions.push(name.as_str()),
-            Room::Limit(words) => limits.push(words.as_str()),
+            UpperBound::Action(name) => actions.push(name.as_str()),
+            UpperBound::Limit(words) => limits.push(words.as_str()),
         }
     }
     let (actions, limits) = (actions.join(" and "), limits.join(" and "));
@@ -287,14 +294,18 @@ fn sentence(needs: &[String], rooms: &[Room]) -> String {
 
 /// Describes an edge that orders the start and the end of one action: because they interfere, or
 /// because of trajectory constraints, processes or events.
-fn own_order(explainer: &Explainer<'_>, origin: Edge<'_>, valuation: &Valuation) -> Option<String> {
+fn describe_own_order(
+    explainer: &Explainer<'_>,
+    origin: Edge<'_>,
+    valuation: &Valuation,
+) -> Option<String> {
     let Edge::AtLeast(constraint) = origin else {
         return None;
     };
     let id = explainer.plan.plan.duration_of(constraint)?;
     match constraint.reason {
-        Reason::Interference => Some(explainer.own_separation()),
-        Reason::Course | Reason::Pinned => {
+        Reason::Interference => Some(explainer.describe_own_separation()),
+        Reason::TrajectoryConstraint | Reason::Pinned => {
             let least = constraint.lower.at(valuation)?;
             let is_order = least <= *explainer.task.epsilon();
             is_order.then(|| {
@@ -309,7 +320,7 @@ fn own_order(explainer: &Explainer<'_>, origin: Edge<'_>, valuation: &Valuation)
 }
 
 /// Describes the time that a lower bound takes; `None` for mere separations.
-fn need(
+fn describe_lower_bound(
     explainer: &Explainer<'_>,
     constraint: &Constraint,
     valuation: &Valuation,
@@ -325,44 +336,44 @@ fn need(
     Some(if constraint.from == NodeId::ZERO {
         format!(
             "{} not before {}",
-            plan.node_words(explainer.task, constraint.to),
+            plan.describe_node(explainer.task, constraint.to),
             least.to_decimal(6)
         )
     } else {
         format!(
             "at least {} from {} to {}",
             least.to_decimal(6),
-            plan.node_words(explainer.task, constraint.from),
-            plan.node_words(explainer.task, constraint.to),
+            plan.describe_node(explainer.task, constraint.from),
+            plan.describe_node(explainer.task, constraint.to),
         )
     })
 }
 
 /// Describes the time that an upper bound allows. `next` is the next edge of the cycle.
-fn room(
+fn describe_upper_bound(
     explainer: &Explainer<'_>,
     constraint: &Constraint,
     next: Edge<'_>,
     valuation: &Valuation,
-) -> Room {
+) -> UpperBound {
     let plan = &explainer.plan.plan;
     if let Reason::Timed(index) = constraint.reason {
         let before = match next {
             Edge::AtLeast(after) => after.from,
-            Edge::AtMost(_) | Edge::Beginning => constraint.to,
+            Edge::AtMost(_) | Edge::TimeZero => constraint.to,
         };
-        return Room::Limit(explainer.deadline(before, index));
+        return UpperBound::Limit(explainer.deadline(before, index));
     }
     if let Some(id) = explainer.plan.plan.duration_of(constraint) {
-        return Room::Action(explainer.action_name(id).to_owned());
+        return UpperBound::Action(explainer.action_name(id).to_owned());
     }
     let most = constraint.upper.at(valuation).unwrap_or_default();
-    let to = plan.node_words(explainer.task, constraint.to);
-    Room::Limit(if constraint.from == NodeId::ZERO {
-        let deadline = explainer.deadline_behind(constraint.to, &most);
+    let to = plan.describe_node(explainer.task, constraint.to);
+    UpperBound::Limit(if constraint.from == NodeId::ZERO {
+        let deadline = explainer.deadline_of_bound(constraint.to, &most);
         deadline.unwrap_or_else(|| format!("{to} at {} or before", most.to_decimal(6)))
     } else {
-        let from = plan.node_words(explainer.task, constraint.from);
+        let from = plan.describe_node(explainer.task, constraint.from);
         format!("at most {} from {from} to {to}", most.to_decimal(6))
     })
 }

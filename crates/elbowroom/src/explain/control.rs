@@ -28,10 +28,13 @@ impl Explainer<'_> {
             }
         }
         unknown.sort_unstable();
-        let unknown: Vec<String> = unknown.into_iter().map(|id| self.lasting(id)).collect();
+        let unknown: Vec<String> = unknown
+            .into_iter()
+            .map(|id| self.describe_duration(id))
+            .collect();
         let mut reason = match unknown.as_slice() {
             [] => "no executor can see to this beforehand".to_owned(),
-            _ => format!("one would have to know in advance {}", listed(&unknown)),
+            _ => format!("one would have to know in advance {}", join_list(&unknown)),
         };
         if !between.is_empty() {
             reason.push_str(": ");
@@ -60,7 +63,7 @@ impl Explainer<'_> {
         }
     }
 
-    fn lasting(&self, id: ParameterId) -> String {
+    fn describe_duration(&self, id: ParameterId) -> String {
         match self.plan.parameter(id).kind {
             ParameterKind::Duration(instance) => {
                 format!("how long {} takes", self.action_name(instance))
@@ -73,7 +76,7 @@ impl Explainer<'_> {
     pub(crate) fn constraint(&self, index: usize) -> String {
         let plan = &self.plan.plan;
         let constraint = &plan.constraints[index];
-        let node = |id: NodeId| plan.node_words(self.task, id);
+        let node = |id: NodeId| plan.describe_node(self.task, id);
         if let Reason::Timed(timed) = constraint.reason {
             return format!(
                 "{}{}",
@@ -94,7 +97,7 @@ impl Explainer<'_> {
     }
 }
 
-fn listed(items: &[String]) -> String {
+fn join_list(items: &[String]) -> String {
     match items {
         [] => String::new(),
         [one] => one.clone(),

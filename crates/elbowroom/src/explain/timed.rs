@@ -12,11 +12,11 @@ impl Explainer<'_> {
     /// 320.118`.
     pub(super) fn deadline(&self, node: NodeId, timed: usize) -> String {
         let time = self.at_time(timed);
-        match self.lost(node, timed) {
+        match self.deleted_condition(node, timed) {
             Some(fact) => format!("deadline of {}{time}", self.task.fact_name(fact)),
             None => format!(
                 "{} must come before {}{time}",
-                self.plan.plan.node_words(self.task, node),
+                self.plan.plan.describe_node(self.task, node),
                 self.timed_change(node, timed),
             ),
         }
@@ -25,19 +25,19 @@ impl Explainer<'_> {
     /// Describes a plan's bound on a node's absolute time by the deadline behind it, if there is
     /// one: the first timed initial at or after the bound that deletes a condition of the node. If
     /// the bound is more than ε before the deadline, the description names both.
-    pub(super) fn deadline_behind(&self, node: NodeId, bound: &Rational) -> Option<String> {
+    pub(super) fn deadline_of_bound(&self, node: NodeId, bound: &Rational) -> Option<String> {
         let (index, timed) = self
             .task
             .timed()
             .iter()
             .enumerate()
             .filter(|(_, timed)| timed.time >= *bound)
-            .find(|(index, _)| self.lost(node, *index).is_some())?;
+            .find(|(index, _)| self.deleted_condition(node, *index).is_some())?;
         let deadline = self.deadline(node, index);
         if &timed.time - bound <= *self.task.epsilon() {
             return Some(deadline);
         }
-        let node = self.plan.plan.node_words(self.task, node);
+        let node = self.plan.plan.describe_node(self.task, node);
         let bound = bound.to_decimal(6);
         Some(format!("{deadline} ({node} at {bound} or before)"))
     }
@@ -95,7 +95,7 @@ impl Explainer<'_> {
 
     /// Returns a fact that the timed initials delete, and that is a condition of the node or of the
     /// action that it ends.
-    fn lost(&self, node: NodeId, timed: usize) -> Option<FactId> {
+    fn deleted_condition(&self, node: NodeId, timed: usize) -> Option<FactId> {
         let mut needed = self.plan.plan.footprint(self.task, node).reads;
         if let Node::End(id) = self.plan.plan.nodes[node.index()]
             && let Some(body) = self.plan.plan.instance(id).action.durative()

@@ -44,7 +44,7 @@ mod tests {
     use super::distinct;
 
     #[test]
-    fn names_that_become_the_same_are_told_apart() {
+    fn colliding_names_are_made_distinct() {
         let wanted = ["a.b", "a-b", "a_b_2", ".a b"].map(str::to_owned);
         let names = distinct(wanted.into_iter());
         assert_eq!(names, ["a_b", "a_b_2", "a_b_2_2", "a_b_3"]);

@@ -16,7 +16,7 @@ mod untimed;
 
 use elbowroom_probability::Unsupported;
 use elbowroom_probability::likelihoods::Missing;
-use elbowroom_probability::optimum::NotSmall;
+use elbowroom_probability::optimum::TabulationError;
 
 use crate::timed::NotTabulated;
 
@@ -38,7 +38,7 @@ pub enum PrismError {
     Missing(#[from] Missing),
     /// There are too many states to find the dead ends.
     #[error(transparent)]
-    NotSmall(#[from] NotSmall),
+    NotSmall(#[from] TabulationError),
     /// The world has no timed optimum.
     #[error(transparent)]
     NotTabulated(#[from] NotTabulated),

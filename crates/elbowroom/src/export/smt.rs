@@ -228,7 +228,7 @@ impl<'a> Text<'a> {
 
     fn declare_times(&self, text: &mut String) {
         for (node, _) in self.plan.plan.nodes().skip(1) {
-            let words = one_line(&self.plan.plan.node_words(self.task, node));
+            let words = one_line(&self.plan.plan.describe_node(self.task, node));
             let name = &self.symbols.times[node.index()];
             let _ = writeln!(text, "(declare-const {name} Real) ; {words}");
         }

@@ -102,13 +102,13 @@ mod tests {
     use super::{Symbols, number};
 
     #[test]
-    fn numbers_are_real_and_positive() {
+    fn numbers_are_written_as_positive_reals() {
         assert_eq!(number(&Rational::new(-7, 2)), "(- (/ 7.0 2.0))");
         assert_eq!(number(&Rational::ZERO), "0.0");
     }
 
     #[test]
-    fn terms_with_negative_factors_go_to_the_other_side() {
+    fn negative_terms_move_to_the_other_side() {
         let symbols = Symbols {
             times: vec!["z".to_owned(), "a".to_owned(), "b".to_owned()],
             parameters: vec!["p".to_owned()],

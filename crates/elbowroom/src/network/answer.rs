@@ -28,16 +28,16 @@ pub struct Answer {
     /// Remarks on parts of the file that were interpreted leniently, or left out.
     pub remarks: Vec<String>,
     /// Consistency: there is a schedule for some durations of the links.
-    pub consistent: Promise,
+    pub consistent: ControllabilityCheck,
     /// Weak controllability: there is a schedule for all durations of the links. `None` for
     /// networks without links.
-    pub weak: Option<Promise>,
+    pub weak: Option<ControllabilityCheck>,
     /// Dynamic controllability: an executor that observes durations as they occur can always find a
     /// schedule. `None` for networks without links.
-    pub dynamic: Option<Promise>,
+    pub dynamic: Option<ControllabilityCheck>,
     /// Strong controllability: a single schedule works for all durations of the links. `None` for
     /// networks without links.
-    pub strong: Option<Promise>,
+    pub strong: Option<ControllabilityCheck>,
     /// Success rate of simulated dispatch.
     pub simulation: Option<Simulated>,
 }
@@ -65,7 +65,7 @@ pub enum Verdict {
 
 /// The result of a controllability check, with the conflict if it fails.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Promise {
+pub struct ControllabilityCheck {
     /// The result.
     pub verdict: Verdict,
     /// The conflict, if the property does not hold.
@@ -78,7 +78,7 @@ pub struct Promise {
     pub branches: Option<usize>,
 }
 
-impl Promise {
+impl ControllabilityCheck {
     pub(super) fn yes() -> Self {
         Self {
             verdict: Verdict::Yes,
@@ -163,7 +163,7 @@ impl Number {
     /// Formats it in short decimals, for users.
     pub fn short(&self) -> String {
         let number = self.exact.parse::<Rational>();
-        number.map_or_else(|_| self.exact.clone(), |it| elbowroom_network::number(&it))
+        number.map_or_else(|_| self.exact.clone(), |it| elbowroom_network::decimal(&it))
     }
 }
 
@@ -197,12 +197,12 @@ pub struct Simulated {
     /// The number of runs with a duration outside the bounds of its link.
     pub outside: u64,
     /// The requirements that were violated most often.
-    pub broken: Vec<Broken>,
+    pub broken: Vec<ViolatedRequirement>,
 }
 
 /// A violated requirement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Broken {
+pub struct ViolatedRequirement {
     /// The requirement in words.
     pub requirement: String,
     /// The number of runs that violated it.

@@ -59,18 +59,18 @@ pub(super) fn run(
             (Some(world), None) => world,
             (None, None) => return None,
         };
-        run.happen(node, time);
+        run.record_happening(node, time);
     }
     let times: Option<Vec<Rational>> = run.happened.into_iter().collect();
     times.map(Schedule::new)
 }
 
 impl Run<'_> {
-    fn happen(&mut self, node: NodeId, time: Rational) {
+    fn record_happening(&mut self, node: NodeId, time: Rational) {
         if let Decider::Dispatcher(dispatcher) = &mut self.decider {
             // A duration outside the bounds of its link may miss a window; the requirements are
             // checked at the end.
-            let _ = dispatcher.happen(node, &time);
+            let _ = dispatcher.record(node, &time);
         }
         self.now.clone_from(&time);
         self.happened[node.index()] = Some(time);

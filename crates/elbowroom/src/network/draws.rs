@@ -68,7 +68,7 @@ impl<'a> Draws<'a> {
             .zip(&self.sources)
             .map(|(id, source)| {
                 let value = source.distribution.draw(&mut self.random(id, run));
-                source.tidy(value)
+                source.round_to_resolution(value)
             })
             .collect();
         for group in &self.groups {
@@ -87,7 +87,7 @@ impl<'a> Draws<'a> {
                     continue;
                 };
                 let sum: f64 = factors.iter().zip(&independent).map(|(a, b)| a * b).sum();
-                drawn[id.index()] = source.tidy(mean + deviation * sum);
+                drawn[id.index()] = source.round_to_resolution(mean + deviation * sum);
             }
         }
         drawn
@@ -120,7 +120,7 @@ impl Source {
                     from: link.lower.to_f64(),
                     to: upper.to_f64(),
                 },
-                resolution: fine(&(upper - &link.lower)),
+                resolution: decimal_unit(&(upper - &link.lower)),
                 least: link.lower.clone(),
                 most: Some(upper.clone()),
             });
@@ -158,14 +158,14 @@ impl Source {
         };
         Ok(Self {
             distribution,
-            resolution: fine(&width),
+            resolution: decimal_unit(&width),
             // Durations are not negative.
             least: Rational::ZERO,
             most: None,
         })
     }
 
-    fn tidy(&self, value: f64) -> Rational {
+    fn round_to_resolution(&self, value: f64) -> Rational {
         let value = rounded(value, &self.resolution).max(self.least.clone());
         match &self.most {
             Some(most) => value.min(most.clone()),
@@ -175,7 +175,7 @@ impl Source {
 }
 
 /// Returns a decimal unit small enough that the width has at least [`STEPS`] units.
-fn fine(width: &Rational) -> Rational {
+fn decimal_unit(width: &Rational) -> Rational {
     let ten = Rational::from(10);
     let mut unit = Rational::ONE;
     while width.is_positive() && &unit * Rational::from(STEPS) > *width {

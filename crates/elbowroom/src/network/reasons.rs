@@ -1,18 +1,18 @@
 //! Explanations for failed controllability checks, with the names of the file.
 
-use elbowroom_network::weak::Given;
-use elbowroom_network::{NetworkFile, Weak, weak as find_weak};
+use elbowroom_network::weak::StepGround;
+use elbowroom_network::{NetworkFile, WeakControllability, weak as find_weak};
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{Conflict, Ground, LinkId};
 use elbowroom_stn::{ConstraintId, NodeId};
 
-use super::answer::{LinkDuration, Number, Promise, Reason, Step, Time, Verdict};
+use super::answer::{ControllabilityCheck, LinkDuration, Number, Reason, Step, Time, Verdict};
 
 /// Checks whether there is a schedule for some durations of the links.
-pub(super) fn consistent(file: &NetworkFile) -> Promise {
+pub(super) fn consistent(file: &NetworkFile) -> ControllabilityCheck {
     let network = file.kind_network();
     let Err(cycle) = network.consistency() else {
-        return Promise::yes();
+        return ControllabilityCheck::yes();
     };
     let mut grounds = Vec::new();
     let mut steps = Vec::new();
@@ -28,7 +28,7 @@ pub(super) fn consistent(file: &NetworkFile) -> Promise {
         grounds.push(ground);
     }
     // All bounds of links are used as they are; no duration is at an end of its interval.
-    Promise::no(Reason {
+    ControllabilityCheck::no(Reason {
         by: Number::from(&-cycle.total),
         steps,
         is_whole: true,
@@ -60,24 +60,24 @@ fn kind_ground(file: &NetworkFile, id: ConstraintId) -> Ground {
 }
 
 /// Checks weak controllability.
-pub(super) fn weak(file: &NetworkFile, most_branches: usize) -> Promise {
+pub(super) fn weak(file: &NetworkFile, most_branches: usize) -> ControllabilityCheck {
     match find_weak(&file.network, most_branches) {
-        Weak::Controllable => Promise::yes(),
-        Weak::Undecided { branches } => Promise {
+        WeakControllability::Controllable => ControllabilityCheck::yes(),
+        WeakControllability::Undecided { branches } => ControllabilityCheck {
             verdict: Verdict::Undecided,
             branches: Some(branches),
-            ..Promise::yes()
+            ..ControllabilityCheck::yes()
         },
-        Weak::Uncontrollable(conflict) => {
+        WeakControllability::Uncontrollable(conflict) => {
             let durations = conflict.durations.iter();
-            let steps = conflict.steps.iter().map(|given| match given.given {
-                Given::Requirement(id) => step("requirement", file.requirement_in_words(id)),
-                Given::Link(id) => {
+            let steps = conflict.steps.iter().map(|given| match given.ground {
+                StepGround::Requirement(id) => step("requirement", file.requirement_in_words(id)),
+                StepGround::Link(id) => {
                     let duration = &conflict.durations[&id];
                     step("duration", file.duration_in_words(id, duration))
                 }
             });
-            Promise::no(Reason {
+            ControllabilityCheck::no(Reason {
                 by: Number::from(&-&conflict.total),
                 steps: steps.collect(),
                 is_whole: true,
@@ -90,10 +90,10 @@ pub(super) fn weak(file: &NetworkFile, most_branches: usize) -> Promise {
 }
 
 /// Returns the answer for a network that is not dynamically controllable, with the conflict.
-pub(super) fn dynamic(file: &NetworkFile, conflict: &Conflict<Rational>) -> Promise {
+pub(super) fn dynamic(file: &NetworkFile, conflict: &Conflict<Rational>) -> ControllabilityCheck {
     let grounds: Vec<Ground> = conflict.steps.iter().map(|step| step.ground).collect();
     let total = conflict.total.clone().into_finite();
-    Promise::no(Reason {
+    ControllabilityCheck::no(Reason {
         by: total.map_or_else(Number::infinite, |total| Number::from(&-total)),
         steps: steps(file, &grounds),
         is_whole: conflict.is_whole,
@@ -102,7 +102,7 @@ pub(super) fn dynamic(file: &NetworkFile, conflict: &Conflict<Rational>) -> Prom
 }
 
 /// Checks strong controllability.
-pub(super) fn strong(file: &NetworkFile) -> Promise {
+pub(super) fn strong(file: &NetworkFile) -> ControllabilityCheck {
     match file.network.strong() {
         Ok(schedule) => {
             let network = &file.network;
@@ -120,12 +120,12 @@ pub(super) fn strong(file: &NetworkFile) -> Promise {
                 point: file.point(node).to_owned(),
                 time: Number::from(&(&schedule[node] - &zero)),
             });
-            Promise {
+            ControllabilityCheck {
                 schedule: times.collect(),
-                ..Promise::yes()
+                ..ControllabilityCheck::yes()
             }
         }
-        Err(conflict) => Promise::no(Reason {
+        Err(conflict) => ControllabilityCheck::no(Reason {
             by: match &conflict.total {
                 Some(total) => Number::from(&-total),
                 None => Number::infinite(),

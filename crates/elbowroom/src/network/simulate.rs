@@ -10,12 +10,12 @@ use elbowroom_stn::uncertain::Dispatchable;
 use elbowroom_stn::{ConsistentNetwork, ConstraintId};
 use serde::{Deserialize, Serialize};
 
-use super::answer::{Broken, Simulated};
+use super::answer::{Simulated, ViolatedRequirement};
 use super::dispatch::{self, Executor};
 use super::draws::Draws;
 
 /// Maximum number of reported violated requirements.
-const MOST_BROKEN: usize = 3;
+const MOST_VIOLATIONS: usize = 3;
 
 /// Settings of simulated runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,8 +101,8 @@ pub(super) fn run(
     broken.sort_by_key(|&(id, runs)| (std::cmp::Reverse(runs), id));
     let broken = broken
         .into_iter()
-        .take(MOST_BROKEN)
-        .map(|(id, runs)| Broken {
+        .take(MOST_VIOLATIONS)
+        .map(|(id, runs)| ViolatedRequirement {
             requirement: file.requirement_in_words(id),
             runs,
         });

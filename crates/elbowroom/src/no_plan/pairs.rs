@@ -4,22 +4,22 @@
 use elbowroom_num::Rational;
 use elbowroom_verify::no_plan::pairs::{Bounds, Claims, Earliest, Key, Structure};
 
-use super::{Effort, Spent};
+use super::{Effort, EffortExhausted};
 
 /// Maximum number of atoms, and of actions.
-const MOST: usize = 1_000;
+const MOST_ELEMENTS: usize = 1_000;
 
 /// Maximum number of looked-up bounds (some seconds).
-const MOST_LOOKS: usize = 200_000_000;
+const MOST_LOOKUPS: usize = 200_000_000;
 
 /// Number of looked-up bounds per unit of work: see [`Effort`].
-const LOOKS_OF_A_WORK: u64 = 10;
+const LOOKUPS_PER_WORK: u64 = 10;
 
 /// Reasons for a missing proof by pairs.
 pub(super) enum Failure {
     TooMany,
     /// The goal is reachable by the rules for pairs.
-    InReach,
+    Reachable,
     Stopped,
 }
 
@@ -28,11 +28,11 @@ pub(super) fn claims(
     structure: &Structure<'_>,
     effort: &mut Effort<'_>,
 ) -> Result<Claims, Failure> {
-    if structure.atom_count() > MOST || structure.action_count() > MOST {
+    if structure.atom_count() > MOST_ELEMENTS || structure.action_count() > MOST_ELEMENTS {
         return Err(Failure::TooMany);
     }
     let mut table = Table::of(structure);
-    table.settle(effort)?;
+    table.propagate(effort)?;
     table.needed()
 }
 
@@ -65,9 +65,9 @@ impl Bounds for Table<'_> {
 }
 
 /// The bounds without the present bound of a happening, whose time is being recomputed.
-struct Anew<'a>(&'a Table<'a>, usize);
+struct TableWithout<'a>(&'a Table<'a>, usize);
 
-impl Bounds for Anew<'_> {
+impl Bounds for TableWithout<'_> {
     fn get(&self, key: Key) -> Option<&Earliest> {
         self.0.get(key)
     }
@@ -105,7 +105,7 @@ impl<'a> Table<'a> {
     }
 
     /// Applies happenings until no bound is lowered any more.
-    fn settle(&mut self, effort: &mut Effort<'_>) -> Result<(), Failure> {
+    fn propagate(&mut self, effort: &mut Effort<'_>) -> Result<(), Failure> {
         let happenings = self.structure.happening_count();
         let mut last = vec![0; happenings];
         let mut looks = 0;
@@ -119,14 +119,14 @@ impl<'a> Table<'a> {
                 *last = self.round;
                 let own = self.count * (1 + self.structure.needed_by(happening).count());
                 looks += own;
-                let spent = effort.spend(1 + own as u64 / LOOKS_OF_A_WORK);
-                spent.map_err(|Spent| Failure::Stopped)?;
+                let spent = effort.spend(1 + own as u64 / LOOKUPS_PER_WORK);
+                spent.map_err(|EffortExhausted| Failure::Stopped)?;
                 changed |= self.fire(happening);
             }
             if !changed {
                 return Ok(());
             }
-            if looks > MOST_LOOKS {
+            if looks > MOST_LOOKUPS {
                 return Err(Failure::TooMany);
             }
         }
@@ -144,7 +144,7 @@ impl<'a> Table<'a> {
     /// Lowers the bounds on the effects of a happening. Returns `true` if a bound changed.
     fn fire(&mut self, happening: usize) -> bool {
         let structure = self.structure;
-        let begin = structure.earliest(happening, &Anew(self, happening));
+        let begin = structure.earliest(happening, &TableWithout(self, happening));
         let [started, _] = structure.start_or_end(happening);
         if begin == Earliest::Never {
             return false;
@@ -228,17 +228,20 @@ impl<'a> Table<'a> {
     /// Returns the claims of the proof: those that exclude the goal, those that imply them, and so
     /// on.
     fn needed(&self) -> Result<Claims, Failure> {
-        let mut wanted = Wanted::default();
+        let mut wanted = PendingClaims::default();
         for goal in self.structure.goals() {
             let found = self.structure.contradiction(goal, self);
-            let (one, other) = found.ok_or(Failure::InReach)?;
-            if *self.structure.floor(one, other) != Earliest::Never {
-                wanted.add(self.own(one, other, &|time| *time == Earliest::Never), self);
+            let (one, other) = found.ok_or(Failure::Reachable)?;
+            if *self.structure.relaxed_bound(one, other) != Earliest::Never {
+                wanted.add(
+                    self.single_bound(one, other, &|time| *time == Earliest::Never),
+                    self,
+                );
             }
         }
         while let Some(key) = wanted.open.pop() {
             let Some(time) = self.get(key) else { continue };
-            for (happening, with) in self.structure.occasions(key) {
+            for (happening, with) in self.structure.enabling_happenings(key) {
                 self.justify(happening, with, time, &mut wanted);
             }
         }
@@ -247,7 +250,7 @@ impl<'a> Table<'a> {
 
     /// Returns a bound of a pair that is late enough: that of one of the atoms alone, or that of
     /// the pair.
-    fn own(&self, one: usize, other: usize, is_enough: &dyn Fn(&Earliest) -> bool) -> Key {
+    fn single_bound(&self, one: usize, other: usize, is_enough: &dyn Fn(&Earliest) -> bool) -> Key {
         let alone = [Key::Pair(one, one), Key::Pair(other, other)];
         let enough = |key: &Key| self.get(*key).is_some_and(is_enough);
         alone
@@ -257,10 +260,17 @@ impl<'a> Table<'a> {
     }
 
     /// Adds a bound that implies that a happening is not before `time`.
-    fn justify(&self, happening: usize, with: Option<usize>, time: &Earliest, wanted: &mut Wanted) {
+    fn justify(
+        &self,
+        happening: usize,
+        with: Option<usize>,
+        time: &Earliest,
+        wanted: &mut PendingClaims,
+    ) {
         let structure = self.structure;
-        let is_enough = |known: Earliest| structure.when_possible(happening, known) >= *time;
-        let base = structure.earliest_alone(happening, with);
+        let is_enough =
+            |known: Earliest| structure.earliest_allowed_time(happening, known) >= *time;
+        let base = structure.earliest_without_bounds(happening, with);
         if base >= *time {
             return;
         }
@@ -269,17 +279,18 @@ impl<'a> Table<'a> {
         let delays = [structure.epsilon().clone(), Rational::default()];
         let mut look = |one: usize, other: usize, is_read: bool| {
             let delay = &delays[usize::from(!is_read)];
-            if is_enough(structure.floor(one, other).plus(delay)) {
+            if is_enough(structure.relaxed_bound(one, other).plus(delay)) {
                 is_free = true;
             } else if !is_free && is_enough(structure.pair(self, one, other).plus(delay)) {
-                reasons.push(self.own(one, other, &|known| is_enough(known.plus(delay))));
+                reasons.push(self.single_bound(one, other, &|known| is_enough(known.plus(delay))));
             }
         };
-        structure.visit(happening, &mut |one, other, delay| {
+        structure.visit_pairs_before(happening, &mut |one, other, delay| {
             look(one, other, delay.is_positive());
         });
         if let Some(atom) = with {
-            structure.visit_with(happening, atom, &mut |one, other| look(one, other, false));
+            structure
+                .visit_atoms_kept_with(happening, atom, &mut |one, other| look(one, other, false));
         }
         if is_free {
             return;
@@ -296,7 +307,7 @@ impl<'a> Table<'a> {
             return;
         };
         let least = structure.least(action);
-        if is_enough(structure.begun(action, self).plus(least)) {
+        if is_enough(structure.earliest_start(action, self).plus(least)) {
             // The bounds that delay the start also delay the end.
             if let Some(start) = structure.start_of(action) {
                 self.justify(start, None, &self.begin[start], wanted);
@@ -314,12 +325,12 @@ impl<'a> Table<'a> {
 
 /// Needed claims, and those among them that are not justified yet.
 #[derive(Default)]
-struct Wanted {
+struct PendingClaims {
     claims: Claims,
     open: Vec<Key>,
 }
 
-impl Wanted {
+impl PendingClaims {
     fn add(&mut self, key: Key, table: &Table<'_>) {
         if !self.claims.contains_key(&key)
             && let Some(time) = table.get(key)

@@ -3,7 +3,7 @@
 use elbowroom_model::{Situation, Task};
 use elbowroom_verify::no_plan::Instances;
 
-use super::{Effort, reached};
+use super::{Effort, add_reachable};
 
 /// Work limit for each of two lists of reachable facts: some tenths of a second.
 const WORK: u64 = 3_000_000;
@@ -19,8 +19,8 @@ pub fn fluents_without_value(task: &Task, situation: &Situation) -> Vec<String> 
 fn names(task: &Task, situation: &Situation) -> Option<Vec<String>> {
     let mut always = || true;
     let mut stated = Instances::from(task, situation).ok()?;
-    let stated = reached(&mut stated, &mut Effort::of(WORK, &mut always)).ok()?;
+    let stated = add_reachable(&mut stated, &mut Effort::of(WORK, &mut always)).ok()?;
     let mut assuming = Instances::with_assumed_values(task, situation).ok()?;
-    let all = reached(&mut assuming, &mut Effort::of(WORK, &mut always)).ok()?;
+    let all = add_reachable(&mut assuming, &mut Effort::of(WORK, &mut always)).ok()?;
     Some(assuming.fluents_without_value(&all, &stated))
 }

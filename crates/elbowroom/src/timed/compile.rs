@@ -10,12 +10,12 @@ use elbowroom_model::ground::{
 use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
-use elbowroom_sim::{Distribution, ExogenousChange, Failure, WorldModel};
+use elbowroom_sim::{Distribution, ExogenousChange, FailureTime, WorldModel};
 
 use super::NotTabulated;
-use super::act::{Act, Event, Needs, Occurs, Snap};
-use super::available::left_by_failures;
-use super::numbers::{Amount, By, Changed, Number, Test, units};
+use super::action_model::{ActionModel, Event, Needs, Occurs, Snap};
+use super::applicable::facts_changed_by_failures;
+use super::value_intervals::{Amount, ChangeOperator, ChangeValue, Number, Test, units};
 use super::world::Facts;
 
 /// Returns the facts and numbers that the goal depends on, through all actions and their failures.
@@ -28,12 +28,12 @@ fn relevant(
     let left: Vec<Vec<FactId>> = actions
         .iter()
         .map(|action| {
-            let left = left_by_failures(task, model, &action.name);
+            let left = facts_changed_by_failures(task, model, &action.name);
             left.into_iter().map(|(fact, _)| fact).collect()
         })
         .collect();
     let (mut facts, mut numbers) = (BTreeSet::new(), BTreeSet::new());
-    read(goal, &mut facts, &mut numbers);
+    collect_reads(goal, &mut facts, &mut numbers);
     loop {
         let before = facts.len() + numbers.len();
         for (action, left) in actions.iter().zip(&left) {
@@ -45,10 +45,10 @@ fn relevant(
             });
             if matters || left.iter().any(|fact| facts.contains(fact)) {
                 for snap in snaps {
-                    read(&snap.condition, &mut facts, &mut numbers);
+                    collect_reads(&snap.condition, &mut facts, &mut numbers);
                 }
                 if let Some(body) = action.durative() {
-                    read(&body.over_all, &mut facts, &mut numbers);
+                    collect_reads(&body.over_all, &mut facts, &mut numbers);
                 }
             }
         }
@@ -59,7 +59,11 @@ fn relevant(
 }
 
 /// Adds the facts and fluents that a condition reads.
-fn read(condition: &Condition, facts: &mut BTreeSet<FactId>, numbers: &mut BTreeSet<FluentId>) {
+fn collect_reads(
+    condition: &Condition,
+    facts: &mut BTreeSet<FactId>,
+    numbers: &mut BTreeSet<FluentId>,
+) {
     condition.visit_facts(&mut |fact| {
         facts.insert(fact);
     });
@@ -185,7 +189,7 @@ impl<'t> Compiler<'t> {
                 });
             }
             (Some(number), _, _, Some(bound)) => (number, comparison, bound),
-            (_, Some(bound), Some(number), _) => (number, turned(comparison), bound),
+            (_, Some(bound), Some(number), _) => (number, flipped(comparison), bound),
             _ => {
                 return Err(NotTabulated::new(
                     "a condition compares something else than a number that changes with one that \
@@ -231,9 +235,9 @@ impl<'t> Compiler<'t> {
             return Ok(None);
         };
         let change = match operator {
-            UpdateOperator::Assign => Changed::Set,
-            UpdateOperator::Increase => Changed::Added,
-            UpdateOperator::Decrease => Changed::Taken,
+            UpdateOperator::Assign => ChangeOperator::Set,
+            UpdateOperator::Increase => ChangeOperator::Add,
+            UpdateOperator::Decrease => ChangeOperator::Subtract,
             UpdateOperator::ScaleUp | UpdateOperator::ScaleDown => {
                 return refuse("effects that scale numbers");
             }
@@ -242,13 +246,13 @@ impl<'t> Compiler<'t> {
             return refuse("an amount that depends on what changes, or on a duration");
         };
         let by = match self.model.amount(name, &self.task.fluent_name(fluent)) {
-            Some(rule) => By::Drawn {
+            Some(rule) => ChangeValue::Random {
                 rule: rule.clone(),
                 planned: planned.to_f64(),
             },
-            None => By::Known(units(&planned).ok_or_else(too_fine)?),
+            None => ChangeValue::Constant(units(&planned).ok_or_else(too_fine)?),
         };
-        if let By::Drawn { rule, planned } = &by
+        if let ChangeValue::Random { rule, planned } = &by
             && rule.is_relative
             && *planned <= 0.0
         {
@@ -294,16 +298,16 @@ impl<'t> Compiler<'t> {
             adds,
             deletes,
             amounts,
-            helps: 0,
+            helped_tests: 0,
             draws: Vec::new(),
         })
     }
 
     /// Returns `true` if an action, or a failure of it, changes a relevant fact or number.
-    fn matters(&self, action: &Action) -> bool {
+    fn is_relevant(&self, action: &Action) -> bool {
         let snaps = snaps(action).into_iter();
         let mut effects = snaps.flat_map(|snap| &snap.effects);
-        let mut left = left_by_failures(self.task, self.model, &action.name).into_iter();
+        let mut left = facts_changed_by_failures(self.task, self.model, &action.name).into_iter();
         let is_number = |fluent: &FluentId| {
             let mut numbers = self.numbers.iter();
             numbers.any(|number| number.fluent == *fluent)
@@ -319,7 +323,7 @@ impl<'t> Compiler<'t> {
         &self,
         action: &Action,
         model: &WorldModel,
-    ) -> Result<Option<Act>, NotTabulated> {
+    ) -> Result<Option<ActionModel>, NotTabulated> {
         let name = &action.name;
         let refuse = |what: &str| Err(NotTabulated::new(format!("{name} has {what}")));
         if model.delay_rule(name).is_some() {
@@ -330,7 +334,7 @@ impl<'t> Compiler<'t> {
         {
             return refuse("continuous effects");
         }
-        if !self.matters(action) {
+        if !self.is_relevant(action) {
             return Ok(None);
         }
         let (start, rest, planned) = match &action.body {
@@ -348,24 +352,24 @@ impl<'t> Compiler<'t> {
         }
         let failures = self.failures(name, model, &start, rest.is_some())?;
         let (mut midway, mut at_end) = (0.0, 0.0);
-        if let Some(failing) = model.failing(name) {
-            let is_at_start = failing.when == Failure::AtStart || rest.is_none();
+        if let Some(failing) = model.failure_rule(name) {
+            let is_at_start = failing.when == FailureTime::AtStart || rest.is_none();
             match failing.when {
                 _ if is_at_start && failing.probability >= 1.0 => return Ok(None),
                 // The start can be retried at once until it succeeds.
                 _ if is_at_start => {}
-                Failure::Midway => midway = failing.probability,
-                Failure::AtEnd | Failure::AtStart => at_end = failing.probability,
+                FailureTime::Midway => midway = failing.probability,
+                FailureTime::AtEnd | FailureTime::AtStart => at_end = failing.probability,
             }
         }
-        Ok(Some(Act {
+        Ok(Some(ActionModel {
             name: name.clone(),
             action: Arc::new(action.clone()),
             start,
             rest,
             planned,
-            midway,
-            at_end,
+            midway_failure: midway,
+            end_failure: at_end,
             failures,
             may_be_cancelled: true,
             is_eager: false,
@@ -403,7 +407,7 @@ impl<'t> Compiler<'t> {
         }
         let goal = Footprint::of_condition(self.task, self.task.goal());
         for timed in self.task.timed() {
-            if Footprint::of_timed(timed).writes_what_is_read_by(&goal) {
+            if Footprint::of_timed(timed).writes_reads_of(&goal) {
                 return Err(NotTabulated::new(
                     "a timed initial changes what the goal reads, so that the goal is not reached \
                      as soon as it holds",
@@ -456,7 +460,7 @@ impl<'t> Compiler<'t> {
 }
 
 /// Returns the comparison with its sides exchanged.
-fn turned(comparison: Comparison) -> Comparison {
+fn flipped(comparison: Comparison) -> Comparison {
     match comparison {
         Comparison::Less => Comparison::Greater,
         Comparison::AtMost => Comparison::AtLeast,

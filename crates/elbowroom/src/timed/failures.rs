@@ -1,15 +1,15 @@
 //! Failures of actions, and their outcomes.
 
-use elbowroom_sim::{Becoming, Failing, Failure, Outcome, WorldModel};
+use elbowroom_sim::{FactOutcome, FailureRule, FailureTime, Outcome, WorldModel};
 
 use super::NotTabulated;
-use super::act::{Act, Snap};
+use super::action_model::{ActionModel, Snap};
 use super::compile::Compiler;
 use super::world::Facts;
 
 /// An outcome of a failure.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Failed {
+pub(crate) struct FailureKind {
     /// Conditional probability of this outcome, given that the action fails.
     pub(crate) share: f64,
     /// The added facts, without deleted ones.
@@ -23,18 +23,18 @@ pub(crate) struct Failed {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Ending {
     /// Success, with this draw of the amounts.
-    Well(u16),
+    Success(u16),
     /// Failure, with this outcome.
-    Badly(u8),
+    Failure(u8),
 }
 
-impl Failed {
+impl FailureKind {
     pub(super) fn apply(&self, facts: Facts) -> Facts {
         (facts & !self.deletes) | self.adds
     }
 }
 
-impl Act {
+impl ActionModel {
     /// Returns all facts that a failure may make true.
     pub(super) fn adds_by_failing(&self) -> Facts {
         let failures = self.failures.iter();
@@ -48,16 +48,16 @@ impl Act {
     }
 
     /// Returns the outcome of the failure, if it is one.
-    pub(super) fn failed(&self, ending: Ending) -> Option<&Failed> {
+    pub(super) fn failed(&self, ending: Ending) -> Option<&FailureKind> {
         match ending {
-            Ending::Well(_) => None,
-            Ending::Badly(way) => self.failures.get(usize::from(way)),
+            Ending::Success(_) => None,
+            Ending::Failure(way) => self.failures.get(usize::from(way)),
         }
     }
 
     /// Returns `true` if it may have failed already while it is still running, so that it cannot be
     /// cancelled.
-    pub(super) fn may_hold_up(&self) -> bool {
+    pub(super) fn can_delay_its_failure(&self) -> bool {
         self.failures.iter().any(|failed| failed.delay > 0.0)
     }
 }
@@ -73,13 +73,13 @@ impl Compiler<'_> {
         model: &WorldModel,
         start: &Snap,
         takes_time: bool,
-    ) -> Result<Vec<Failed>, NotTabulated> {
+    ) -> Result<Vec<FailureKind>, NotTabulated> {
         let refuse = |what: &str| Err(NotTabulated::new(format!("{name} has {what}")));
-        let mut ways: Vec<Failed> = Vec::new();
-        let Some(failing) = model.failing(name) else {
+        let mut ways: Vec<FailureKind> = Vec::new();
+        let Some(failing) = model.failure_rule(name) else {
             return Ok(ways);
         };
-        let is_at_start = failing.when == Failure::AtStart || !takes_time;
+        let is_at_start = failing.when == FailureTime::AtStart || !takes_time;
         if is_at_start && !failing.outcomes.is_empty() {
             return refuse("a start that fails with outcomes");
         }
@@ -88,14 +88,16 @@ impl Compiler<'_> {
             if !outcome.is_reported {
                 return refuse("failures with outcomes that are not reported");
             }
-            let Some((adds, deletes)) = self.left(name, failing, Some(outcome), start) else {
+            let Some((adds, deletes)) =
+                self.facts_after_failure(name, failing, Some(outcome), start)
+            else {
                 return refuse("failures with outcomes that change numbers");
             };
             rest -= outcome.probability;
             let delay = outcome.delay.to_f64();
             add(&mut ways, outcome.probability, (adds, deletes), delay);
         }
-        let undone = self.left(name, failing, None, start);
+        let undone = self.facts_after_failure(name, failing, None, start);
         // Decimal fractions may not add up to exactly 1 in binary.
         if rest > 1e-9 {
             add(&mut ways, rest, undone.unwrap_or_default(), 0.0);
@@ -114,10 +116,10 @@ impl Compiler<'_> {
     }
 
     /// Returns the facts that a failure makes true and false; `None` if it changes numbers.
-    fn left(
+    fn facts_after_failure(
         &self,
         name: &str,
-        failing: &Failing,
+        failing: &FailureRule,
         outcome: Option<&Outcome>,
         start: &Snap,
     ) -> Option<(Facts, Facts)> {
@@ -127,10 +129,10 @@ impl Compiler<'_> {
             (0, 0)
         };
         for change in outcome.iter().flat_map(|outcome| &outcome.changes) {
-            let Becoming::Truth(truth) = change.becomes else {
+            let FactOutcome::Truth(truth) = change.change else {
                 return None;
             };
-            let fact = self.task.fact_named(&change.what.of(name));
+            let fact = self.task.fact_named(&change.target.instantiate(name));
             let bit = fact.map_or(0, |fact| self.bit(fact));
             (adds, deletes) = if truth {
                 (adds | bit, deletes & !bit)
@@ -142,16 +144,16 @@ impl Compiler<'_> {
     }
 }
 
-fn add(ways: &mut Vec<Failed>, share: f64, (adds, deletes): (Facts, Facts), delay: f64) {
+fn add(ways: &mut Vec<FailureKind>, share: f64, (adds, deletes): (Facts, Facts), delay: f64) {
     if share <= 0.0 {
         return;
     }
-    let is_same = |way: &&mut Failed| {
+    let is_same = |way: &&mut FailureKind| {
         (way.adds, way.deletes, way.delay.to_bits()) == (adds, deletes, delay.to_bits())
     };
     match ways.iter_mut().find(is_same) {
         Some(way) => way.share += share,
-        None => ways.push(Failed {
+        None => ways.push(FailureKind {
             share,
             adds,
             deletes,

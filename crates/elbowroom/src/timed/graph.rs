@@ -22,9 +22,9 @@ pub(super) enum Target {
     /// Another node of the same cell.
     Here(u32),
     /// The goal.
-    Won,
+    Goal,
     /// A hopeless state: the goal is unreachable.
-    Lost,
+    DeadEnd,
 }
 
 /// A choice of the agent: the probabilities of its results, with their targets. If a result has
@@ -68,7 +68,7 @@ pub(super) trait Expansion {
         cell: usize,
         states: &IndexSet<State>,
         later: &mut Layers,
-        hopes: &mut Hopes,
+        hopes: &mut ReachabilityCache,
         limits: &Limits<'_>,
     ) -> Result<Nodes, Stop>;
 
@@ -81,14 +81,14 @@ pub(super) struct Limits<'l> {
     /// Maximum number of nodes of a cell.
     pub(super) nodes: usize,
     /// Called before each node; returns `false` to stop the expansion.
-    pub(super) goes_on: &'l dyn Fn() -> bool,
+    pub(super) may_continue: &'l dyn Fn() -> bool,
 }
 
 impl Limits<'static> {
     /// No limits.
     pub(super) const NONE: Self = Self {
         nodes: usize::MAX,
-        goes_on: &|| true,
+        may_continue: &|| true,
     };
 }
 
@@ -98,7 +98,7 @@ impl Limits<'_> {
     /// # Errors
     /// The reason, if it cannot.
     pub(super) fn check(&self, nodes: &Nodes) -> Result<(), Stop> {
-        if !(self.goes_on)() {
+        if !(self.may_continue)() {
             return Err(Stop::Interrupted);
         }
         let ways = nodes.ways.len() / WAYS;
@@ -121,7 +121,7 @@ const NODE_WORK: u64 = 500;
 const WAY_WORK: u64 = 300;
 
 /// Cache of reachability checks of the goal.
-pub(super) type Hopes = IndexMap<(Facts, u64, u32), bool>;
+pub(super) type ReachabilityCache = IndexMap<(Facts, u64, u32), bool>;
 
 /// Converts a count; memory is too small for 2^32 elements.
 fn small(count: usize) -> u32 {
@@ -172,12 +172,12 @@ impl Nodes {
 
     /// Returns the value of each choice of a node, given the values of the cell's nodes and of
     /// later states.
-    pub(super) fn worths<'n>(
+    pub(super) fn choice_values<'n>(
         &'n self,
         node: usize,
         here: &'n [f64],
         later: &'n Values,
-        tolls: Tolls,
+        tolls: Discounts,
     ) -> impl DoubleEndedIterator<Item = f64> + 'n {
         span(&self.ends, node).map(move |choice| {
             let ways = span(&self.choices, choice);
@@ -187,7 +187,7 @@ impl Nodes {
                 let targets = &self.targets[first as usize..end as usize];
                 let of = targets
                     .iter()
-                    .map(|target| self.worth(*target, here, later, tolls));
+                    .map(|target| self.target_value(*target, here, later, tolls));
                 let worst = of.fold(f64::INFINITY, f64::min);
                 p * if worst.is_finite() { worst } else { 0.0 }
             });
@@ -195,7 +195,7 @@ impl Nodes {
         })
     }
 
-    fn worth(&self, target: Target, here: &[f64], later: &Values, tolls: Tolls) -> f64 {
+    fn target_value(&self, target: Target, here: &[f64], later: &Values, tolls: Discounts) -> f64 {
         match target {
             Target::Later { cell, state } => {
                 let values = later.0.get(&cell);
@@ -203,8 +203,8 @@ impl Nodes {
                 value * tolls.of_cells(cell - self.cell)
             }
             Target::Here(node) => here[node as usize] * tolls.step,
-            Target::Won => 1.0,
-            Target::Lost => 0.0,
+            Target::Goal => 1.0,
+            Target::DeadEnd => 0.0,
         }
     }
 }
@@ -225,7 +225,7 @@ pub(super) fn value(
     left: &mut usize,
     goes_on: &dyn Fn() -> bool,
 ) -> Result<f64, Stop> {
-    let (layers, values) = backwards(bound, left, Tolls::NONE, goes_on)?;
+    let (layers, values) = backward_induction(bound, left, Discounts::NONE, goes_on)?;
     let of = |state: &State| {
         let place = layers.get(&0)?.get_index_of(state)?;
         Some(values.0.get(&0)?[place])
@@ -238,14 +238,14 @@ pub(super) fn value(
 }
 
 /// Computes all states and their values, from the last cell to the first.
-pub(super) fn backwards(
+pub(super) fn backward_induction(
     bound: &impl Expansion,
     left: &mut usize,
-    tolls: Tolls,
+    tolls: Discounts,
     goes_on: &dyn Fn() -> bool,
 ) -> Result<(Layers, Values), Stop> {
-    let mut hopes = Hopes::new();
-    let mut layers = explored(bound, &mut hopes, left, goes_on)?;
+    let mut hopes = ReachabilityCache::new();
+    let mut layers = explore_forward(bound, &mut hopes, left, goes_on)?;
     let mut found = Values::default();
     let cells: Vec<u32> = layers.keys().copied().collect();
     for cell in cells.into_iter().rev() {
@@ -257,11 +257,11 @@ pub(super) fn backwards(
             states.iter().map(|state| bound.last(state)).collect()
         } else {
             let limits = Limits {
-                goes_on,
+                may_continue: goes_on,
                 ..Limits::NONE
             };
             let nodes = bound.expand(cell as usize, &states, &mut layers, &mut hopes, &limits)?;
-            let mut values = settled(&nodes, &found, tolls);
+            let mut values = solve_cell(&nodes, &found, tolls);
             values.truncate(states.len());
             values
         };
@@ -276,9 +276,9 @@ pub(super) fn backwards(
 const NODES: usize = 4;
 
 /// Returns the states at the beginning of each cell, and at the end of the last.
-fn explored(
+fn explore_forward(
     bound: &impl Expansion,
-    hopes: &mut Hopes,
+    hopes: &mut ReachabilityCache,
     left: &mut usize,
     goes_on: &dyn Fn() -> bool,
 ) -> Result<Layers, Stop> {
@@ -286,7 +286,7 @@ fn explored(
     let mut layers = Layers::from([(0, initial.map(|(_, state)| state).collect())]);
     let limits = Limits {
         nodes: left.saturating_mul(NODES),
-        goes_on,
+        may_continue: goes_on,
     };
     let mut cell = 0;
     loop {
@@ -313,14 +313,14 @@ fn explored(
 
 /// Discount factors. They make the shorter of two equally likely ways more valuable.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tolls {
+pub(super) struct Discounts {
     /// Factor per cell.
     pub(super) cell: f64,
     /// Factor per move of the agent.
     pub(super) step: f64,
 }
 
-impl Tolls {
+impl Discounts {
     /// No discount: values are probabilities.
     pub(super) const NONE: Self = Self {
         cell: 1.0,
@@ -339,12 +339,12 @@ impl Tolls {
 /// Computes the values of a cell's nodes. Nodes lead to later ones, or back through instantaneous
 /// actions and actions shorter than a cell. So they are processed from the last to the first, until
 /// no value changes any more.
-pub(super) fn settled(nodes: &Nodes, later: &Values, tolls: Tolls) -> Vec<f64> {
+pub(super) fn solve_cell(nodes: &Nodes, later: &Values, tolls: Discounts) -> Vec<f64> {
     let mut values = vec![0.0_f64; nodes.len()];
     loop {
         let mut greatest: f64 = 0.0;
         for node in (0..nodes.len()).rev() {
-            let worths = nodes.worths(node, &values, later, tolls);
+            let worths = nodes.choice_values(node, &values, later, tolls);
             let best = worths.fold(0.0, f64::max);
             greatest = greatest.max(best - values[node]);
             values[node] = best;

@@ -2,21 +2,24 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_execution::{Move as Choice, Outlook, Standing, Weighed};
+use elbowroom_execution::{ActionValues, DecisionState, Move as Choice, RankedMoves};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_sim::{Side as Part, WorldModel};
 use indexmap::{IndexMap, IndexSet};
 
-use super::below::{Below, Manner, Move};
-use super::chances::Chances;
-use super::graph::{Expansion, Hopes, Layers, Limits, Tolls, Values, backwards, settled};
-use super::numbers::Span;
+use super::cell_probabilities::CellProbabilities;
+use super::graph::{
+    Discounts, Expansion, Layers, Limits, ReachabilityCache, Values, backward_induction, solve_cell,
+};
+use super::lower_bound::{DecisionEpochs, LowerBound, Move};
+use super::restricted_policy::Search;
 use super::state::{Phase, Running, State};
-use super::within::Search;
+use super::value_intervals::Span;
 use super::world::{Facts, TimedWorld};
 use super::{
-    Grid, NotTabulated, QUICK_SHARE, Settings, Side, TimedOptimum, grid, moments, refined,
+    FIRST_STATES_DIVISOR, Grid, NotTabulated, Settings, Side, TimedOptimum, discrete_events, grid,
+    refine_bounds,
 };
 
 /// Table of the values of all states on the grid of the lower bound, for evaluating each move.
@@ -27,23 +30,23 @@ use super::{
 #[derive(Debug)]
 pub struct Policy {
     world: TimedWorld,
-    chances: Chances,
+    chances: CellProbabilities,
     step: Rational,
     /// The values of states, by cell.
     values: BTreeMap<u32, IndexMap<State, f64>>,
-    manner: Manner,
-    tolls: Tolls,
+    epochs: DecisionEpochs,
+    discounts: Discounts,
     optimum: TimedOptimum,
 }
 
 /// Distance from 1 within which the bound of a plan's actions is good enough to end the search.
-const SURE: f64 = 0.005;
+const CERTAINTY_TOLERANCE: f64 = 0.005;
 
 /// Difference of the bounds within which the policy counts as optimal.
-const CLOSE: f64 = 0.02;
+const OPTIMALITY_GAP: f64 = 0.02;
 
 /// Maximum probability that the policy trades for being earlier.
-const HASTE: f64 = 1e-4;
+const EARLINESS_TOLERANCE: f64 = 1e-4;
 
 /// Default growth of the number of states when cells are halved: twice as many cells, with twice as
 /// many possible start cells of running actions.
@@ -62,7 +65,7 @@ fn exact_step(world: &TimedWorld, cells: usize) -> Rational {
 
 /// Extrapolates whether the bounds become close before there are too many states: each further grid
 /// halves their difference, and multiplies the number of states as the last one did.
-fn may_get_close(grids: &[Grid], most_states: usize) -> bool {
+fn can_converge(grids: &[Grid], most_states: usize) -> bool {
     #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
     let states = |grid: &Grid| grid.states.max(1) as f64;
     let Some(last) = grids.last() else {
@@ -73,11 +76,11 @@ fn may_get_close(grids: &[Grid], most_states: usize) -> bool {
     #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
     let most = most_states as f64;
     let (mut next, mut gap) = (states(last) * growth, last.upper - last.lower);
-    while next <= most && gap > CLOSE {
+    while next <= most && gap > OPTIMALITY_GAP {
         next *= growth;
         gap /= 2.0;
     }
-    gap <= CLOSE
+    gap <= OPTIMALITY_GAP
 }
 
 impl Policy {
@@ -93,7 +96,7 @@ impl Policy {
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
         let world = TimedWorld::new(task, model, settings)?;
-        let optimum = refined(
+        let optimum = refine_bounds(
             &world,
             TimedOptimum::unknown(),
             settings,
@@ -114,7 +117,7 @@ impl Policy {
     ///
     /// # Errors
     /// As for [`new`](Self::new).
-    pub fn close(
+    pub fn if_near_optimal(
         task: &Task,
         model: &WorldModel,
         settings: &Settings,
@@ -124,38 +127,52 @@ impl Policy {
         let horizon = world.as_ref().ok().map(|world| world.horizon);
         let mut search = Search::new(task, model, settings, horizon);
         let sure = Settings {
-            gap: SURE,
+            gap: CERTAINTY_TOLERANCE,
             ..settings.clone()
         };
-        search.refine(1.0, settings.most_states / QUICK_SHARE, &sure, goes_on);
-        if 1.0 - search.lower() <= SURE {
+        search.refine(
+            1.0,
+            settings.most_states / FIRST_STATES_DIVISOR,
+            &sure,
+            goes_on,
+        );
+        if 1.0 - search.lower() <= CERTAINTY_TOLERANCE {
             return Self::within(search, settings, goes_on);
         }
-        let whole = world.and_then(|world| match Self::by_moments(&world, settings, goes_on)? {
-            Some(policy) => Ok(Some(policy)),
-            None => Self::close_in(world, settings, goes_on),
-        });
-        if !matches!(whole, Ok(Some(_))) && 1.0 - search.lower() <= CLOSE {
+        let whole =
+            world.and_then(
+                |world| match Self::for_known_times(&world, settings, goes_on)? {
+                    Some(policy) => Ok(Some(policy)),
+                    None => Self::if_near_optimal_in_full_process(world, settings, goes_on),
+                },
+            );
+        if !matches!(whole, Ok(Some(_))) && 1.0 - search.lower() <= OPTIMALITY_GAP {
             return Self::within(search, settings, goes_on);
         }
         whole
     }
 
     /// Computes the policy for worlds with known times, if the bounds are close.
-    fn by_moments(
+    fn for_known_times(
         world: &TimedWorld,
         settings: &Settings,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
-        let found = moments::bounds(world, settings, moments::Effort::QUICK, goes_on)?;
-        let Some(found) = found.filter(|found| found.grid.upper - found.grid.lower <= CLOSE) else {
+        let found =
+            discrete_events::bounds(world, settings, discrete_events::Effort::QUICK, goes_on)?;
+        let Some(found) =
+            found.filter(|found| found.grid.upper - found.grid.lower <= OPTIMALITY_GAP)
+        else {
             return Ok(None);
         };
         let Some(within) = found.within else {
             return Ok(None);
         };
-        let moments::Keeping { world, manner } = within;
-        let chances = super::chances(&world, found.cells, Side::Below)?;
+        let discrete_events::RestrictedAgent {
+            world,
+            epochs: manner,
+        } = within;
+        let chances = super::cell_probabilities_of(&world, found.cells, Side::Below)?;
         let step = exact_step(&world, found.cells);
         let optimum = TimedOptimum {
             lower: found.grid.lower,
@@ -164,11 +181,11 @@ impl Policy {
             ..TimedOptimum::unknown()
         };
         let acts = (found.cells, manner);
-        Ok(Self::of(world, chances, optimum, step, acts).filled(settings, goes_on))
+        Ok(Self::of(world, chances, optimum, step, acts).with_values(settings, goes_on))
     }
 
     /// Computes the policy in the whole process, if the bounds become close.
-    fn close_in(
+    fn if_near_optimal_in_full_process(
         world: TimedWorld,
         settings: &Settings,
         goes_on: &dyn Fn() -> bool,
@@ -180,15 +197,15 @@ impl Policy {
         if grid(&world, settings.first_cells.max(1), &first, goes_on)?.is_err() {
             return Ok(None);
         }
-        let is_promising = |grids: &[Grid]| may_get_close(grids, settings.most_states);
-        let optimum = refined(
+        let is_promising = |grids: &[Grid]| can_converge(grids, settings.most_states);
+        let optimum = refine_bounds(
             &world,
             TimedOptimum::unknown(),
             settings,
             &is_promising,
             goes_on,
         )?;
-        if optimum.upper - optimum.lower > CLOSE {
+        if optimum.upper - optimum.lower > OPTIMALITY_GAP {
             return Ok(None);
         }
         Self::on_finest(world, optimum, settings, goes_on)
@@ -207,14 +224,14 @@ impl Policy {
         let Some(exact) = fit.exact_step() else {
             return Ok(None);
         };
-        let chances = Chances::new(&world, fit.step(), fit.cells, Side::Below)?;
+        let chances = CellProbabilities::new(&world, fit.step(), fit.cells, Side::Below)?;
         let optimum = TimedOptimum {
             lower: within.lower,
             within: Some(within),
             ..TimedOptimum::unknown()
         };
-        let acts = (fit.cells, Manner::WhenSomethingHappens);
-        Ok(Self::of(world, chances, optimum, exact, acts).filled(settings, goes_on))
+        let acts = (fit.cells, DecisionEpochs::AfterHappenings);
+        Ok(Self::of(world, chances, optimum, exact, acts).with_values(settings, goes_on))
     }
 
     fn on_finest(
@@ -229,31 +246,35 @@ impl Policy {
         };
         #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
         let step = world.horizon / cells as f64;
-        let chances = Chances::new(&world, step, cells, Side::Below)?;
+        let chances = CellProbabilities::new(&world, step, cells, Side::Below)?;
         let exact = exact_step(&world, cells);
-        Ok(
-            Self::of(world, chances, optimum, exact, (cells, Manner::Always))
-                .filled(settings, goes_on),
+        Ok(Self::of(
+            world,
+            chances,
+            optimum,
+            exact,
+            (cells, DecisionEpochs::Always),
         )
+        .with_values(settings, goes_on))
     }
 
     /// Creates the policy without its values.
     fn of(
         world: TimedWorld,
-        chances: Chances,
+        chances: CellProbabilities,
         optimum: TimedOptimum,
         step: Rational,
-        (cells, manner): (usize, Manner),
+        (cells, manner): (usize, DecisionEpochs),
     ) -> Self {
         #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
         let count = cells as f64;
         Self {
             step,
             values: BTreeMap::new(),
-            manner,
-            tolls: Tolls {
-                cell: 1.0 - HASTE / count,
-                step: 1.0 - HASTE / count,
+            epochs: manner,
+            discounts: Discounts {
+                cell: 1.0 - EARLINESS_TOLERANCE / count,
+                step: 1.0 - EARLINESS_TOLERANCE / count,
             },
             optimum,
             world,
@@ -261,10 +282,11 @@ impl Policy {
         }
     }
 
-    fn filled(mut self, settings: &Settings, goes_on: &dyn Fn() -> bool) -> Option<Self> {
+    fn with_values(mut self, settings: &Settings, goes_on: &dyn Fn() -> bool) -> Option<Self> {
         let mut left = settings.most_states;
-        let bound = Below::new(&self.world, &self.chances, self.manner);
-        let (layers, values) = backwards(&bound, &mut left, self.tolls, goes_on).ok()?;
+        let bound = LowerBound::new(&self.world, &self.chances, self.epochs);
+        let (layers, values) =
+            backward_induction(&bound, &mut left, self.discounts, goes_on).ok()?;
         let tables = layers.into_iter().zip(values.0.into_values());
         let tables =
             tables.map(|((cell, states), values)| (cell, states.into_iter().zip(values).collect()));
@@ -280,11 +302,11 @@ impl Policy {
     /// Returns the moves in a state at the beginning of a cell, with their values.
     fn values(&self, cell: usize, state: &State) -> Vec<(Move, f64)> {
         let world = &self.world;
-        let mut hopes = Hopes::new();
-        if state.is_won(world) || !state.is_hopeful(world, &mut hopes) {
+        let mut hopes = ReachabilityCache::new();
+        if state.is_goal(world) || !state.can_reach_goal(world, &mut hopes) {
             return Vec::new();
         }
-        let bound = Below::new(world, &self.chances, self.manner);
+        let bound = LowerBound::new(world, &self.chances, self.epochs);
         let mut later = Layers::new();
         let only = IndexSet::from([state.clone()]);
         let nodes = bound.expand(cell, &only, &mut later, &mut hopes, &Limits::NONE);
@@ -294,8 +316,8 @@ impl Policy {
             (cell, values.collect())
         });
         let after = Values(after.collect());
-        let here = settled(&nodes, &after, self.tolls);
-        let worths = nodes.worths(0, &here, &after, self.tolls);
+        let here = solve_cell(&nodes, &after, self.discounts);
+        let worths = nodes.choice_values(0, &here, &after, self.discounts);
         bound.moves(state).into_iter().zip(worths).collect()
     }
 
@@ -311,7 +333,7 @@ impl Policy {
     /// Converts the situation of an executor to a state with the past events `happened`.
     fn state(
         &self,
-        standing: &Standing<'_>,
+        standing: &DecisionState<'_>,
         (facts, numbers): (Facts, &[Span]),
         happened: u32,
     ) -> State {
@@ -324,26 +346,26 @@ impl Policy {
             running.push(Running {
                 act: u8::try_from(act).unwrap_or(u8::MAX),
                 since: u16::try_from(*since).unwrap_or(u16::MAX),
-                phase: Phase::Goes,
+                phase: Phase::Open,
             });
         }
         running.sort_unstable();
         let state = State {
             facts: self.world.tested(facts, numbers),
             numbers: numbers.to_vec(),
-            is_doubtful: false,
+            is_undecided: false,
             happened,
             running,
             may_act: true,
         };
         match standing.started.and_then(act_of) {
-            Some(act) => state.started(&self.world, act, (act, standing.period, Phase::Goes)),
+            Some(act) => state.started(&self.world, act, (act, standing.period, Phase::Open)),
             None => state,
         }
     }
 
     /// Returns the possible intervals of the numbers; `None` if a number has no value.
-    fn spans(&self, standing: &Standing<'_>) -> Option<Vec<Vec<Span>>> {
+    fn spans(&self, standing: &DecisionState<'_>) -> Option<Vec<Vec<Span>>> {
         let numbers = self.world.numbers.iter();
         let values = numbers.map(|number| standing.belief.value(number.fluent).cloned());
         let values: Vec<Rational> = values.collect::<Option<_>>()?;
@@ -351,12 +373,12 @@ impl Policy {
     }
 
     /// Returns the events that are over for certain, or according to the observed changes.
-    fn happened(&self, standing: &Standing<'_>) -> u32 {
+    fn happened(&self, standing: &DecisionState<'_>) -> u32 {
         let now =
             (&self.step * &Rational::from(i64::try_from(standing.period).unwrap_or(0))).to_f64();
         let resolution = self.world.model.resolution.to_f64();
-        let share = |event: &super::act::Event| {
-            let share = event.is_over_by(now, Part::UpTo, resolution);
+        let share = |event: &super::action_model::Event| {
+            let share = event.is_over_by(now, Part::AtMost, resolution);
             share.unwrap_or(0.0)
         };
         let mut happened = 0_u32;
@@ -384,14 +406,14 @@ impl Policy {
 
     /// Moves the starts of overdue actions to later times, just late enough that they can still be
     /// running. Returns `true` if there are overdue actions.
-    fn rejuvenate(&self, cell: usize, state: &mut State) -> bool {
+    fn postpone_overdue_starts(&self, cell: usize, state: &mut State) -> bool {
         let mut is_overdue = false;
         for running in &mut state.running {
             let ends = &self.chances.ends[usize::from(running.act)];
             let is_alive = |since: u16| {
                 let age = cell.saturating_sub(usize::from(since));
                 let mut later = ends.iter().skip(age);
-                later.any(|ends| ends.in_all() > 0.0)
+                later.any(|ends| ends.total() > 0.0)
             };
             let here = u16::try_from(cell).unwrap_or(u16::MAX);
             running.since = running.since.min(here);
@@ -405,19 +427,19 @@ impl Policy {
     }
 }
 
-impl Outlook for Policy {
+impl ActionValues for Policy {
     fn period(&self) -> &Rational {
         &self.step
     }
 
-    fn weigh(&self, standing: &Standing<'_>) -> Option<Weighed> {
+    fn evaluate(&self, standing: &DecisionState<'_>) -> Option<RankedMoves> {
         let cell = standing.period;
         if cell >= self.chances.cells {
             return None;
         }
         // The table knows nothing about actions outside the plan.
         let knows = |name: &str| self.world.acts.iter().any(|act| act.name == name);
-        if self.manner != Manner::Always && !standing.started.is_none_or(knows) {
+        if self.epochs != DecisionEpochs::Always && !standing.started.is_none_or(knows) {
             return None;
         }
         let facts = self.world.facts.iter().enumerate();
@@ -438,28 +460,28 @@ impl Outlook for Policy {
         let ways = ways.flat_map(|happened| spans.iter().map(move |spans| (happened, spans)));
         for (happened, spans) in ways {
             let mut state = self.state(standing, (facts, spans), happened);
-            if state.is_won(&self.world) {
-                return Some(Weighed {
+            if state.is_goal(&self.world) {
+                return Some(RankedMoves {
                     moves: vec![(Choice::Wait, 1.0)],
-                    is_overdue: false,
+                    is_action_overdue: false,
                 });
             }
-            let is_overdue = self.rejuvenate(cell, &mut state);
+            let is_overdue = self.postpone_overdue_starts(cell, &mut state);
             let mut values = self.values(cell, &state);
             // A stable sort: moves of equal value keep the order of the problem's actions.
             values.sort_by(|(_, a), (_, b)| b.total_cmp(a));
             if values.first().is_some_and(|(_, value)| *value > 0.0) {
                 let choice = |(choice, value)| (self.choice(&state, choice), value);
-                return Some(Weighed {
+                return Some(RankedMoves {
                     moves: values.into_iter().map(choice).collect(),
-                    is_overdue,
+                    is_action_overdue: is_overdue,
                 });
             }
             // The state may only lack the end of the overdue action.
             if is_overdue {
-                overdue = Some(Weighed {
+                overdue = Some(RankedMoves {
                     moves: Vec::new(),
-                    is_overdue,
+                    is_action_overdue: is_overdue,
                 });
             }
         }

@@ -6,8 +6,8 @@
 //! actions that delete only such facts. Without it, the earliest time of the goal is the same.
 
 use super::Side;
-use super::act::{Act, Event};
-use super::chances::Chances;
+use super::action_model::{ActionModel, Event};
+use super::cell_probabilities::CellProbabilities;
 use super::state::State;
 use super::world::{Facts, TimedWorld};
 
@@ -17,16 +17,16 @@ impl TimedWorld {
     ///
     /// `chances` are those of this world for the upper bound, on a grid with [known
     /// times](super::moments).
-    pub(super) fn without_certainties(&self, chances: &Chances) -> Option<Self> {
+    pub(super) fn without_certainties(&self, chances: &CellProbabilities) -> Option<Self> {
         if !self.is_monotone {
             return None;
         }
         let soonest = |world: &Self| {
             let state = State::initial(world);
-            chances.soonest(world, &state, 0, Side::Above)
+            chances.earliest_goal_cell(world, &state, 0, Side::Above)
         };
         let first = soonest(self)?;
-        let certain = self.certain();
+        let certain = self.certain_facts();
         let mut left_out: Facts = 0;
         for bit in (0..self.facts.len()).map(|place| 1 << place) {
             let more = left_out | bit;
@@ -35,29 +35,30 @@ impl TimedWorld {
             }
         }
         let mut leaner = self.without_facts(left_out);
-        leaner.acts.retain(|act| act.adds() != 0 || act.helps());
+        leaner.acts.retain(|act| act.adds() != 0 || act.can_help());
         if leaner.acts.len() == self.acts.len() {
             return None;
         }
         leaner.cut().ok()?;
-        leaner.see_what_changes();
+        leaner.compute_changes();
         Some(leaner)
     }
 
     /// Returns the facts that an agent can make true for certain.
-    fn certain(&self) -> Facts {
+    fn certain_facts(&self) -> Facts {
         let by_chance = |event: &Event| event.adds | event.deletes;
         let events = self
             .events
             .iter()
             .fold(0, |all, event| all | by_chance(event));
         let all: Facts = (0..self.facts.len()).fold(0, |all, place| all | 1 << place);
-        let mut certain = all & !events & !self.goal.mentions() & !self.leads_to_chances();
+        let mut certain =
+            all & !events & !self.goal.mentions() & !self.facts_before_random_results();
         for act in &self.acts {
-            if act.fails() {
+            if act.can_fail() {
                 certain &= !act.adds();
             } else if let Some((_, end)) = &act.rest
-                && act.has_chances()
+                && act.has_random_ends()
             {
                 certain &= !end.adds;
             }
@@ -82,12 +83,12 @@ impl TimedWorld {
     /// Returns the facts in the start conditions of actions with random results, and of actions
     /// that lead to these. Omitting them would allow more attempts. Actions that reach the goal are
     /// ignored.
-    fn leads_to_chances(&self) -> Facts {
+    fn facts_before_random_results(&self) -> Facts {
         let mut leading: Facts = 0;
         loop {
-            let leads = |act: &&Act| {
-                let leads = act.has_chances() || act.adds() & leading != 0;
-                leads && !act.wins(&self.goal)
+            let leads = |act: &&ActionModel| {
+                let leads = act.has_random_ends() || act.adds() & leading != 0;
+                leads && !act.achieves_goal(&self.goal)
             };
             let acts = self.acts.iter().filter(leads);
             let more = acts.fold(leading, |all, act| all | act.start.needs.mentions());

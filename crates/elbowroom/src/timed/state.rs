@@ -1,10 +1,10 @@
 //! States of the process: [`State`].
 
 use super::Side;
-use super::act::Snap;
+use super::action_model::Snap;
 use super::failures::Ending;
-use super::graph::Hopes;
-use super::numbers::Span;
+use super::graph::ReachabilityCache;
+use super::value_intervals::Span;
 use super::world::{Facts, TimedWorld};
 
 /// A state at the beginning of a cell.
@@ -15,7 +15,7 @@ pub(super) struct State {
     pub(super) numbers: Vec<Span>,
     /// `true` if it is undecided whether an action was aborted or has failed, because of an
     /// interval of a number. Such a state counts as lost in the lower bound.
-    pub(super) is_doubtful: bool,
+    pub(super) is_undecided: bool,
     /// Past events, as bits, without recurrent ones.
     pub(super) happened: u32,
     /// The running actions, sorted by action.
@@ -37,7 +37,7 @@ pub(super) struct Running {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Phase {
     /// The end is unknown.
-    Goes,
+    Open,
     /// It may end in this cell, or in the next one.
     Ready(Ending),
     /// It ends in this cell.
@@ -51,44 +51,44 @@ impl State {
         Self {
             facts: world.tested(world.initial, &numbers),
             numbers,
-            is_doubtful: false,
+            is_undecided: false,
             happened: 0,
             running: Vec::new(),
             may_act: true,
         }
     }
 
-    pub(super) fn under_way(&self) -> u64 {
+    pub(super) fn running_actions(&self) -> u64 {
         self.running
             .iter()
             .fold(0, |set, running| set | 1 << running.act)
     }
 
-    pub(super) fn is_hopeful(&self, world: &TimedWorld, hopes: &mut Hopes) -> bool {
-        if self.is_doubtful {
+    pub(super) fn can_reach_goal(&self, world: &TimedWorld, hopes: &mut ReachabilityCache) -> bool {
+        if self.is_undecided {
             return false;
         }
         let facts = self.facts | world.tested;
-        let (set, happened) = (self.under_way(), self.happened);
+        let (set, happened) = (self.running_actions(), self.happened);
         *hopes
             .entry((facts, set, happened))
-            .or_insert_with(|| world.is_hopeful(facts, set, happened))
+            .or_insert_with(|| world.can_reach_goal(facts, set, happened))
     }
 
     /// Aborts the actions whose over-all conditions no longer hold.
-    pub(super) fn settle(&mut self, world: &TimedWorld) {
+    pub(super) fn abort_invalid_actions(&mut self, world: &TimedWorld) {
         let facts = self.facts;
         let may_hold = self.may_hold(world);
         let mut is_doubtful = false;
         self.running.retain(|running| {
             let rest = world.acts[usize::from(running.act)].rest.as_ref();
             rest.is_some_and(|(over_all, _)| {
-                let holds = over_all.hold(facts);
-                is_doubtful |= !holds && over_all.hold(may_hold);
+                let holds = over_all.holds(facts);
+                is_doubtful |= !holds && over_all.holds(may_hold);
                 holds
             })
         });
-        self.is_doubtful |= is_doubtful;
+        self.is_undecided |= is_doubtful;
     }
 
     /// Returns the facts, and the comparisons that hold for some of the possible values of numbers.
@@ -103,7 +103,7 @@ impl State {
     fn apply(&mut self, world: &TimedWorld, snap: &Snap, draw: usize) {
         self.facts = snap.apply(self.facts);
         if !snap.amounts.is_empty() {
-            world.changed(&mut self.numbers, snap, draw);
+            world.apply_changes(&mut self.numbers, snap, draw);
             self.facts = world.tested(self.facts, &self.numbers);
         }
     }
@@ -127,15 +127,16 @@ impl State {
             let place = after.running.partition_point(|other| *other < running);
             after.running.insert(place, running);
         }
-        after.settle(world);
+        after.abort_invalid_actions(world);
         after
     }
 
     /// Returns `true` if the goal is reached: it holds, and no action is running whose delayed
     /// failure could still violate it.
-    pub(super) fn is_won(&self, world: &TimedWorld) -> bool {
-        let holds_up = |running: &Running| world.acts[usize::from(running.act)].may_hold_up();
-        world.goal.hold(self.facts) && !self.is_doubtful && !self.running.iter().any(holds_up)
+    pub(super) fn is_goal(&self, world: &TimedWorld) -> bool {
+        let holds_up =
+            |running: &Running| world.acts[usize::from(running.act)].can_delay_its_failure();
+        world.goal.holds(self.facts) && !self.is_undecided && !self.running.iter().any(holds_up)
     }
 
     /// Returns the state after the end of the running action at `place`. An end whose condition
@@ -146,13 +147,13 @@ impl State {
         let act = &world.acts[usize::from(running.act)];
         if let Some(failed) = act.failed(ending) {
             after.facts = failed.apply(after.facts);
-            after.settle(world);
-        } else if let (Some((_, end)), Ending::Well(draw)) = (&act.rest, ending) {
-            if end.needs.hold(after.facts) {
+            after.abort_invalid_actions(world);
+        } else if let (Some((_, end)), Ending::Success(draw)) = (&act.rest, ending) {
+            if end.needs.holds(after.facts) {
                 after.apply(world, end, usize::from(draw));
-                after.settle(world);
+                after.abort_invalid_actions(world);
             } else {
-                after.is_doubtful |= end.needs.hold(after.may_hold(world));
+                after.is_undecided |= end.needs.holds(after.may_hold(world));
             }
         }
         after
@@ -165,7 +166,7 @@ impl State {
             after.happened |= 1 << event;
         }
         after.facts = world.events[event].apply(after.facts);
-        after.settle(world);
+        after.abort_invalid_actions(world);
         after
     }
 
@@ -178,9 +179,9 @@ impl State {
     ) -> Vec<usize> {
         let can_start = |act: &usize| {
             is_idle(*act)
-                && world.acts[*act].start.needs.hold(self.facts)
+                && world.acts[*act].start.needs.holds(self.facts)
                 && world.is_useful(*act, self.facts)
-                && !self.breaks_off_at_once(world, *act)
+                && !self.aborts_at_once(world, *act)
         };
         let acts: Vec<usize> = (0..world.acts.len()).filter(can_start).collect();
         let is_eager = |act: &&usize| {
@@ -188,7 +189,7 @@ impl State {
                 return false;
             };
             let facts = world.acts[**act].start.apply(self.facts);
-            world.acts[**act].is_eager && over_all.hold(facts)
+            world.acts[**act].is_eager && over_all.holds(facts)
         };
         match acts.iter().find(is_eager) {
             Some(eager) => vec![*eager],
@@ -198,24 +199,24 @@ impl State {
 
     /// Returns `true` if the over-all condition of an action fails right after its start, which
     /// makes the start useless.
-    fn breaks_off_at_once(&self, world: &TimedWorld, act: usize) -> bool {
+    fn aborts_at_once(&self, world: &TimedWorld, act: usize) -> bool {
         let act = &world.acts[act];
         let Some((over_all, _)) = &act.rest else {
             return false;
         };
         if act.start.amounts.is_empty() {
-            return !over_all.hold(act.start.apply(self.facts));
+            return !over_all.holds(act.start.apply(self.facts));
         }
         let mut after = self.clone();
         after.apply(world, &act.start, 0);
-        !over_all.hold(after.facts)
+        !over_all.holds(after.facts)
     }
 
     /// Returns `true` if the only startable action is optimal to start at once.
     pub(super) fn must_start(&self, world: &TimedWorld, startable: &[usize]) -> bool {
         matches!(startable, [only] if world.acts[*only].is_eager && {
             let facts = world.acts[*only].start.apply(self.facts);
-            world.acts[*only].rest.as_ref().is_some_and(|(over_all, _)| over_all.hold(facts))
+            world.acts[*only].rest.as_ref().is_some_and(|(over_all, _)| over_all.holds(facts))
         })
     }
 }

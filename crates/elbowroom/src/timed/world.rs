@@ -4,11 +4,11 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::FactId;
 use elbowroom_sim::{Side, WorldModel};
 
-use super::act::{Act, Event, Needs, Occurs};
-use super::available::actions;
+use super::action_model::{ActionModel, Event, Needs, Occurs};
+use super::applicable::actions;
 use super::compile::Compiler;
 use super::failures::Ending;
-use super::numbers::{Number, Span, Test};
+use super::value_intervals::{Number, Span, Test};
 use super::{NotTabulated, Settings, Side as Bounding};
 
 /// A set of true facts.
@@ -27,7 +27,7 @@ pub(crate) struct TimedWorld {
     pub(super) tested: Facts,
     /// The side of the bound, which decides on comparisons that hold for some values only.
     side: Bounding,
-    pub(crate) acts: Vec<Act>,
+    pub(crate) acts: Vec<ActionModel>,
     pub(crate) events: Vec<Event>,
     pub(crate) initial: Facts,
     pub(crate) goal: Needs,
@@ -54,7 +54,7 @@ impl TimedWorld {
         model: &WorldModel,
         settings: &Settings,
     ) -> Result<Self, NotTabulated> {
-        if let Some(feature) = task.only_judged() {
+        if let Some(feature) = task.validator_only_feature() {
             return Err(NotTabulated::new(format!(
                 "it does not support {feature}, which the problem has"
             )));
@@ -109,7 +109,7 @@ impl TimedWorld {
             side: Bounding::Below,
             facts: compiler.facts,
             horizon: latest(&events, model)?,
-            is_monotone: !goal.has_negation() && !acts.iter().any(Act::has_negation),
+            is_monotone: !goal.has_negation() && !acts.iter().any(ActionModel::has_negation),
             deletable: 0,
             addable: 0,
             model: model.clone(),
@@ -119,14 +119,14 @@ impl TimedWorld {
             goal,
         };
         world.cut()?;
-        world.see_what_helps();
-        world.see_what_changes();
-        world.horizon = world.end_of_runs(settings)?;
+        world.compute_helpful_tests();
+        world.compute_changes();
+        world.horizon = world.latest_end(settings)?;
         Ok(world)
     }
 
     /// Computes the comparisons that each happening may make true.
-    fn see_what_helps(&mut self) {
+    fn compute_helpful_tests(&mut self) {
         let first = self.facts.len();
         for act in &mut self.acts {
             let ends = act.rest.iter_mut().map(|(_, end)| end);
@@ -134,13 +134,13 @@ impl TimedWorld {
                 let tests = self.tests.iter().enumerate();
                 let helped = tests
                     .filter(|(_, test)| snap.amounts.iter().any(|amount| amount.may_help(test)));
-                snap.helps = helped.fold(0, |all, (place, _)| all | 1 << (first + place));
+                snap.helped_tests = helped.fold(0, |all, (place, _)| all | 1 << (first + place));
             }
         }
     }
 
     /// Computes the data that depends on the set of actions and events.
-    pub(super) fn see_what_changes(&mut self) {
+    pub(super) fn compute_changes(&mut self) {
         let acts = &self.acts;
         let events = &self.events;
         self.deletable = acts.iter().fold(0, |all, act| all | act.deletes())
@@ -150,12 +150,12 @@ impl TimedWorld {
         if self.is_monotone {
             for act in &mut self.acts {
                 act.may_be_cancelled =
-                    act.may_gain_by_cancelling(&self.model) || act.is_about_numbers(self.tested);
+                    act.can_gain_by_cancelling(&self.model) || act.is_about_numbers(self.tested);
                 // It deletes nothing, and its added facts stay true. So an earlier start is never
                 // worse.
-                act.is_eager = act.ends_safely()
+                act.is_eager = act.has_guaranteed_end()
                     && !act.is_about_numbers(self.tested)
-                    && !act.may_hold_up()
+                    && !act.can_delay_its_failure()
                     && act.deletes() == 0
                     && act.adds() & self.deletable == 0;
             }
@@ -164,7 +164,7 @@ impl TimedWorld {
 
     /// Returns `true` if the goal is reachable from these facts in the delete relaxation, with the
     /// remaining events and the running actions.
-    pub(super) fn is_hopeful(&self, facts: Facts, under_way: u64, happened: u32) -> bool {
+    pub(super) fn can_reach_goal(&self, facts: Facts, under_way: u64, happened: u32) -> bool {
         // All comparisons of numbers are assumed to hold.
         let mut facts = facts | self.tested;
         for (index, event) in self.events.iter().enumerate() {
@@ -214,7 +214,7 @@ impl TimedWorld {
     }
 
     /// Returns the same world for a bound of this side.
-    pub(super) fn seen_from(&self, side: Bounding) -> Self {
+    pub(super) fn for_bound(&self, side: Bounding) -> Self {
         Self {
             side,
             ..self.clone()
@@ -231,7 +231,7 @@ impl TimedWorld {
             }
         }
         kinder.cut()?;
-        kinder.see_what_changes();
+        kinder.compute_changes();
         Ok(kinder)
     }
 
@@ -241,7 +241,7 @@ impl TimedWorld {
     }
 
     /// Returns the facts that a certain event deletes and that never become true again.
-    pub(super) fn lost_for_good(&self, event: usize) -> Facts {
+    pub(super) fn permanently_deleted(&self, event: usize) -> Facts {
         let event = &self.events[event];
         match event.occurs {
             Occurs::Once { probability, .. } if probability >= 1.0 => event.deletes & !self.addable,
@@ -251,7 +251,7 @@ impl TimedWorld {
 
     /// Returns `true` if an event is best applied at once: the world is monotone, and the event
     /// only adds facts that stay true. If a fact can be deleted, a later addition may be better.
-    pub(super) fn is_best_at_once(&self, event: usize) -> bool {
+    pub(super) fn is_optimal_at_once(&self, event: usize) -> bool {
         let event = &self.events[event];
         self.is_monotone && event.deletes == 0 && event.adds & self.deletable == 0
     }
@@ -259,13 +259,13 @@ impl TimedWorld {
     /// Returns `true` if an event is best applied last: the world is monotone, and the event only
     /// deletes facts that stay false. If a fact can be added again, an earlier deletion may be
     /// better.
-    pub(super) fn is_best_last(&self, event: usize) -> bool {
+    pub(super) fn is_optimal_last(&self, event: usize) -> bool {
         let event = &self.events[event];
         self.is_monotone && event.adds == 0 && event.deletes & self.addable == 0
     }
 
     /// Returns `true` if the pending end of an action is best applied at once.
-    pub(super) fn ends_best_at_once(&self, act: usize, ending: Ending, facts: Facts) -> bool {
+    pub(super) fn end_is_optimal_at_once(&self, act: usize, ending: Ending, facts: Facts) -> bool {
         let act = &self.acts[act];
         let Some((_, end)) = &act.rest else {
             return false;
@@ -273,7 +273,7 @@ impl TimedWorld {
         let (gives, does_no_harm) = match act.failed(ending) {
             None => (
                 end.adds,
-                act.ends_kindly() && end.amounts.is_empty() && end.needs.hold(facts),
+                act.has_harmless_end() && end.amounts.is_empty() && end.needs.holds(facts),
             ),
             Some(failed) => (failed.adds, failed.deletes == 0),
         };
@@ -281,9 +281,9 @@ impl TimedWorld {
     }
 
     /// Returns `true` if cancelling an action may be useful for an agent that can do so at any
-    /// time: by [`Act::may_be_cancelled`], or because a later end may be better for facts that can
+    /// time: by [`ActionModel::may_be_cancelled`], or because a later end may be better for facts that can
     /// be deleted.
-    pub(super) fn may_gain_by_cancelling(&self, act: usize) -> bool {
+    pub(super) fn can_gain_by_cancelling(&self, act: usize) -> bool {
         let act = &self.acts[act];
         let gives = act.rest.as_ref().map_or(0, |(_, end)| end.adds);
         act.may_be_cancelled || gives & self.deletable != 0
@@ -298,7 +298,8 @@ fn latest(events: &[Event], model: &WorldModel) -> Result<f64, NotTabulated> {
             continue;
         };
         let beyond = |time: f64| {
-            let share = rule.share(time, Side::UpTo, 0.0, model.resolution.to_f64());
+            let share =
+                rule.probability_of_side(time, Side::AtMost, 0.0, model.resolution.to_f64());
             share.map(|share| 1.0 - share)
         };
         let mut time: f64 = 1.0;
@@ -334,7 +335,7 @@ impl TimedWorld {
     /// Both bounds hold for any horizon: a run that has not reached the goal by then counts as
     /// failed in the lower bound, and as successful in the upper bound if the goal is still
     /// reachable.
-    fn end_of_runs(&self, settings: &Settings) -> Result<f64, NotTabulated> {
+    fn latest_end(&self, settings: &Settings) -> Result<f64, NotTabulated> {
         if let Some(horizon) = &settings.horizon {
             return Ok(horizon.to_f64());
         }
@@ -343,7 +344,7 @@ impl TimedWorld {
             Occurs::Once { .. } => None,
         });
         let slowest = rates.fold(f64::INFINITY, f64::min);
-        if slowest.is_finite() && self.may_go_on() {
+        if slowest.is_finite() && self.can_continue_after_events() {
             let planned = self.acts.iter().map(|act| act.planned.to_f64());
             let all = planned.sum::<f64>().max(1.0);
             return Ok((self.horizon + 2.0 * all + (7.0 / slowest).min(100.0 * all)).ceil());
@@ -357,7 +358,7 @@ impl TimedWorld {
     }
 
     /// Returns `true` if the goal may be reachable after all events that happen at most once.
-    fn may_go_on(&self) -> bool {
+    fn can_continue_after_events(&self) -> bool {
         let mut gone = 0;
         for event in &self.events {
             if let Occurs::Once { probability, .. } = event.occurs
@@ -368,7 +369,7 @@ impl TimedWorld {
         }
         let under_way = self.acts.iter().enumerate();
         let under_way = under_way.fold(0, |all, (index, _)| all | 1 << index);
-        self.is_hopeful(!gone, under_way, u32::MAX)
+        self.can_reach_goal(!gone, under_way, u32::MAX)
     }
 }
 

@@ -7,7 +7,7 @@ use elbowroom::num::simplex::{Simplex, VariableId};
 use elbowroom::num::{Delta, Rational};
 use elbowroom::stn::uncertain::{ContingentLink, UncertainNetwork};
 use elbowroom::stn::{self, ConsistentNetwork, Network, NodeId};
-use elbowroom::verify::sound::{Condition, Difference, Failing, Multiplied, Sound, Way};
+use elbowroom::verify::sound::{Condition, Difference, FailureCase, Multiplied, Sound, Violation};
 use elbowroom::verify::{Certificate, End, Guarantee, Limit};
 use serde_json::Value;
 
@@ -194,7 +194,7 @@ impl<'a> Judge<'a> {
         while let Some((index, known)) = open.pop() {
             match condition.cases.get(index) {
                 None => return false,
-                Some(Failing::Either { event, cases }) => {
+                Some(FailureCase::Either { event, cases }) => {
                     let mut after = before(*event, moment);
                     after.strict = false;
                     for (case, difference) in cases.iter().zip([after, before(moment, *event)]) {
@@ -203,8 +203,8 @@ impl<'a> Judge<'a> {
                         open.push((*case, known));
                     }
                 }
-                Some(Failing::Never(_)) => {
-                    let nothing = Way {
+                Some(FailureCase::Never(_)) => {
+                    let nothing = Violation {
                         differences: Vec::new(),
                         inequalities: Vec::new(),
                         corners: Vec::new(),
@@ -214,7 +214,7 @@ impl<'a> Judge<'a> {
                         return false;
                     }
                 }
-                Some(Failing::Ways(ways)) => {
+                Some(FailureCase::Ways(ways)) => {
                     if ways.iter().any(|way| self.is_possible(way, &known)) {
                         return false;
                     }
@@ -225,7 +225,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Returns `true` if a violation is possible at some corner.
-    fn is_possible(&self, way: &Way, known: &[Difference]) -> bool {
+    fn is_possible(&self, way: &Violation, known: &[Difference]) -> bool {
         (0..1_usize << way.corners.len()).any(|corner| {
             let mut intervals = self.intervals.clone();
             for (place, &parameter) in way.corners.iter().enumerate() {
@@ -240,7 +240,7 @@ impl<'a> Judge<'a> {
     fn program(
         &self,
         intervals: &[[Option<Rational>; 2]],
-        way: &Way,
+        way: &Violation,
         known: &[Difference],
     ) -> bool {
         let mut simplex = Simplex::new();

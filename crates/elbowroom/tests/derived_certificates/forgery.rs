@@ -1,7 +1,7 @@
 //! Forged certificates: random modifications of valid ones, and ones with tighter inequalities.
 
 use elbowroom::num::Rational;
-use elbowroom::verify::{AnswerError, Certificate, Verified, added_up};
+use elbowroom::verify::{AnswerError, Certificate, Verified, with_sums};
 use serde_json::{Value, json};
 
 use super::shared::changed::{changed, numbers};
@@ -45,7 +45,7 @@ impl Forger {
     }
 
     /// Prints the counts, and returns the number of forged certificates.
-    pub(super) fn told(&self) -> usize {
+    pub(super) fn print_counts(&self) -> usize {
         let Self {
             count, harmless, ..
         } = self;
@@ -79,7 +79,7 @@ pub(super) fn tightened(answer: &Value) -> Vec<Value> {
 fn add_up(broken: &mut Value) {
     let certificate = broken["best"]["certificate"].clone();
     let certificate: Option<Certificate> = serde_json::from_value(certificate).ok();
-    if let Some(certificate) = certificate.and_then(|own| added_up(own).ok()) {
+    if let Some(certificate) = certificate.and_then(|own| with_sums(own).ok()) {
         broken["best"]["certificate"] = json!(certificate);
     }
 }

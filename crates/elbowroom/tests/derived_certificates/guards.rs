@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, envelope};
 use elbowroom::envelope::{Guarantee, Objective};
 use elbowroom::execution::run::TimeoutRule;
@@ -89,7 +89,7 @@ fn is_inside(task: &Arc<Task>, plan: &TimeTriggeredPlan, answer: &Value) -> bool
     request.guarantee = Guarantee::Dynamic;
     request.timeout = TimeoutRule::Off;
     request.contains = Some(intervals.join(" "));
-    let outcome = envelope(&request, &mut Unwatched).expect("an answer");
+    let outcome = envelope(&request, &mut NoObserver).expect("an answer");
     matches!(outcome.answer.finding, EnvelopeFinding::Inside { .. })
 }
 
@@ -167,5 +167,5 @@ fn mutated_certificates_with_such_effects_are_refused_unless_they_claim_the_same
             }
         }
     }
-    assert!(forger.told() > 300);
+    assert!(forger.print_counts() > 300);
 }

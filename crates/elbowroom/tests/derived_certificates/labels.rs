@@ -133,7 +133,7 @@ fn symmetric_box_with_an_infinite_end_is_refused() {
         let mut request = request(&task, &plan, (Guarantee::Dynamic, objective));
         request.vary = vec!["initial (fuel blue)".parse().expect("a specification")];
         request.search.best.symmetric = true;
-        request.search.best.most = elbowroom::num::Rational::new(1, 2);
+        request.search.best.max_deviation = elbowroom::num::Rational::new(1, 2);
         let answer = answered(&request).expect("a box");
         let verdict = verify_answer_of(&answer.to_string(), &task, &plan);
         verdict.unwrap_or_else(|wrong| panic!("{objective:?}: {wrong}"));

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use elbowroom::chance;
+use elbowroom::duration_distribution;
 use elbowroom::envelope::Objective;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::pddl::Source;
@@ -45,7 +45,7 @@ fn verified_in(
     world: &WorldModel,
 ) -> Result<Verified, AnswerError> {
     let distributions = |action: &str, planned: &_| {
-        chance(action, planned, world).map_err(|wrong| wrong.to_string())
+        duration_distribution(action, planned, world).map_err(|wrong| wrong.to_string())
     };
     verify_answer_in_world(
         &answer.to_string(),
@@ -95,7 +95,7 @@ fn probability_is_checked_with_the_world_and_assumed_without_it() {
         }
     }
     assert!(accepted >= 10, "{accepted}");
-    assert!(forger.told() > 500);
+    assert!(forger.print_counts() > 500);
 }
 
 /// Boxes that contain almost none of the drawn durations, and for which the search has no

@@ -179,7 +179,7 @@ fn mutated_certificates_of_plan_files_are_refused_unless_they_claim_the_same() {
             }
         }
     }
-    assert!(forger.told() > 800);
+    assert!(forger.print_counts() > 800);
 }
 
 /// Without an order between interfering happenings, or with a duration that the domain forbids,

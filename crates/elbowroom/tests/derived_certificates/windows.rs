@@ -58,7 +58,7 @@ fn certificates_of_symmetric_boxes_are_accepted() {
             symmetric: true,
             ..BestSettings::default()
         };
-        let outcome = envelope(&request, &mut Unwatched).expect("a box");
+        let outcome = envelope(&request, &mut NoObserver).expect("a box");
         let answer = serde_json::to_value(&outcome.answer).expect("a document");
         let verified = verify_answer_of(&answer.to_string(), &task, &plan);
         verified.unwrap_or_else(|wrong| panic!("{guarantee:?}: {wrong}"));

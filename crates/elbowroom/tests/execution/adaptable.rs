@@ -62,7 +62,7 @@ fn times(report: &Report, name: &str) -> (Rational, Rational) {
 }
 
 #[test]
-fn what_can_be_lost_is_over_before_anything_else_begins_where_there_is_time() {
+fn losable_facts_are_used_first_if_time_permits() {
     let scene = field(100);
     let report = scene.run("adaptable", &scene.world(""), 1);
     assert_eq!(report.verdict, Verdict::GoalReached);
@@ -84,7 +84,7 @@ fn an_order_that_misses_its_deadline_is_not_chosen() {
 
 /// The next start is decided when the previous one is reported, which is immediately here.
 #[test]
-fn starts_that_are_due_at_once_begin_at_once() {
+fn simultaneous_starts_are_dispatched_together() {
     let scene = field(7);
     let starts = |world: &str| {
         let report = scene.run("adaptable", &scene.world(world), 1);
@@ -99,7 +99,7 @@ fn starts_that_are_due_at_once_begin_at_once() {
 }
 
 #[test]
-fn what_has_come_about_by_itself_is_skipped() {
+fn action_with_achieved_effects_is_skipped() {
     let scene = field(100);
     let world = scene.world("[[event]]\nfact = \"(photo)\"\nbecomes = true\nconstant = 1");
     let report = scene.run("adaptable", &world, 1);
@@ -108,7 +108,7 @@ fn what_has_come_about_by_itself_is_skipped() {
 }
 
 #[test]
-fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
+fn failed_action_is_retried_while_likelihoods_explain_it() {
     let scene = field(100);
     let fails = |probability: &str| {
         let section = "[[failure]]\naction = \"*\"\nwhen = \"start\"\nprobability = ";
@@ -135,7 +135,7 @@ fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
     // Retries are also limited if a start hardly ever succeeds; a retry takes no time here.
     let hopeless = CHANCES.replace("start = 0.5", "start = 1e-9");
     let mut scene = field(100).with_likelihoods(&hopeless);
-    scene.settings.most_replans = 1;
+    scene.settings.max_replans = 1;
     for executor in ["adaptable", "lookahead"] {
         let report = scene.run(executor, &fails("1"), 1);
         assert_eq!(report.verdict, Verdict::ReplanLimit);
@@ -145,7 +145,7 @@ fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
 
 /// The parcel of `cases/delivery`, whose picks fail at their end three times in ten.
 #[test]
-fn a_pick_that_fails_at_its_end_and_is_undone_is_tried_again() {
+fn undone_pick_is_retried() {
     // The sections after the header.
     let sections = |name: &str| {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/delivery/");
@@ -187,7 +187,7 @@ fn a_pick_that_fails_at_its_end_and_is_undone_is_tried_again() {
 }
 
 #[test]
-fn a_failure_that_is_explained_by_what_was_seen_does_not_count() {
+fn failure_explained_by_observation_is_not_counted() {
     let domain = DOMAIN.replace("(over all (rock))", "(at start (rock))");
     let problem = "(define (problem day) (:domain field) (:init (light) (rock) (photo) (report))
         (:goal (sample)))";
@@ -212,7 +212,7 @@ fn a_failure_that_is_explained_by_what_was_seen_does_not_count() {
 }
 
 #[test]
-fn what_is_not_certain_of_the_beginning_decides_what_is_tried_first() {
+fn initial_belief_determines_the_first_action() {
     let domain = "
         (define (domain house) (:requirements :durative-actions)
           (:predicates (open-front) (open-back) (inside))

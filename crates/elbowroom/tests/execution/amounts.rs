@@ -3,12 +3,12 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use elbowroom::execute::{Analyst, WholeRegion};
-use elbowroom::execution::executors::{ExecutorSpec, Means};
+use elbowroom::execute::{ExactRegion, PlanPreparer};
+use elbowroom::execution::executors::{ExecutorServices, ExecutorSpec};
 use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::execution::{
-    Cause, Decided, Ending, Entry, Executor, Mission, Moment, Need, Planned, Reason, Recorder,
-    Region, StepId,
+    Cause, Decided, DecisionContext, Ending, Entry, Executor, PlanForm, Planned, PreparedPlan,
+    Reason, Recorder, RegionOracle, StepId,
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -39,7 +39,7 @@ const PROBLEM: &str = "(define (problem p) (:domain sites) (:objects a b - site)
 
 /// A survey consumes 90 of the battery instead of 40. The domain says `(* (draw ?r) ?duration)`.
 #[test]
-fn an_amount_in_which_the_duration_stands_is_held_against_how_long_it_took() {
+fn amount_with_duration_uses_observed_duration() {
     let scene = Scene::case("battery");
     let model =
         scene.world("[[amount]]\naction = \"survey\"\nfluent = \"charge\"\nconstant = 90\n");
@@ -51,7 +51,7 @@ fn an_amount_in_which_the_duration_stands_is_held_against_how_long_it_took() {
     }
     let report = scene.run("adaptable", &model, 0);
     // Executors based on orders name the event after which no order was left.
-    let [behind] = report.reasons[0].behind.as_slice() else {
+    let [behind] = report.reasons[0].evidence.as_slice() else {
         panic!("{:?}", report.reasons);
     };
     assert_eq!(behind.to_string(), "(survey rover crater) succeeded at 20");
@@ -63,7 +63,7 @@ fn an_amount_in_which_the_duration_stands_is_held_against_how_long_it_took() {
 
 /// The amounts are no parameters, and are still measured: 60 for each instead of 30.
 #[test]
-fn live_holds_amounts_that_were_not_left_open_against_the_rest() {
+fn live_checks_fixed_amounts_against_remaining_plan() {
     for (plan, known) in [
         ("0: (survey a) [20]\n20.001: (survey b) [20]", 20),
         // Measured and known at the start.
@@ -86,7 +86,7 @@ fn live_holds_amounts_that_were_not_left_open_against_the_rest() {
 /// Filling raises the level of a tank, which overflows after 20. A survey of 25 leaves too little
 /// charge for the next one.
 #[test]
-fn live_gives_up_what_runs_too_long_for_the_numbers_while_it_runs() {
+fn live_abandons_plan_while_overlong_action_is_running() {
     for (case, action, longest, limit) in [("tank", "fill", 300, 20), ("battery", "survey", 60, 25)]
     {
         let mut scene = Scene::case(case);
@@ -96,11 +96,11 @@ fn live_gives_up_what_runs_too_long_for_the_numbers_while_it_runs() {
                 .parse()
                 .expect("a specification"),
         ];
-        scene.settings.most_replans = 0;
+        scene.settings.max_replans = 0;
         let world = format!("[[duration]]\naction = \"{action}\"\nconstant = {longest}\n");
         let model = scene.world(&world);
         let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 0);
-        let mut analyst = Analyst::new(scene.flow.clone());
+        let mut analyst = PlanPreparer::new(scene.flow.clone());
         let mut abandoned = FirstAbandoned::default();
         let report = scene.run_in("live", &mut world, &mut analyst, &mut abandoned);
         let reason = &report.reasons[0];
@@ -139,7 +139,7 @@ impl Recorder for FirstAbandoned {
 fn a_goal_that_is_reached_needs_no_new_plan() {
     let problem = PROBLEM.replace(" (surveyed b)", "");
     let mut scene = Scene::new(DOMAIN, &problem, Some("0: (survey a) [20]"));
-    scene.settings.most_replans = 0;
+    scene.settings.max_replans = 0;
     let model = scene.world("[[amount]]\naction = \"*\"\nfluent = \"charge\"\nconstant = 60\n");
     let report = scene.run("fixed:0", &model, 0);
     assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
@@ -153,7 +153,7 @@ fn a_goal_that_is_reached_needs_no_new_plan() {
 /// A duration has its lower bound from one constraint and its upper bound from another; a reason
 /// shows both.
 #[test]
-fn a_reason_shows_all_that_bounds_a_duration() {
+fn reason_lists_all_bounds_of_a_duration() {
     let scene = Scene::case("delivery");
     let model = scene.world("[[duration]]\naction = \"drive\"\nconstant = 12\n");
     for executor in ["stn", "fixed:10"] {
@@ -174,24 +174,24 @@ fn a_reason_shows_all_that_bounds_a_duration() {
 /// Region that counts the queries about the remaining plan, for points or for boxes.
 #[derive(Default)]
 struct Counting {
-    asked: Arc<AtomicUsize>,
+    queries: Arc<AtomicUsize>,
     /// `true` if it searches for boxes as usual, and counts these; otherwise each point is a query
     /// of its own.
     finds_boxes: bool,
     /// `true` if it is queried even if the observations are within a valid box.
-    is_asked_inside: bool,
+    is_queried_inside: bool,
 }
 
-impl Region for Counting {
-    fn objection(
+impl RegionOracle for Counting {
+    fn find_violation(
         &mut self,
         task: &Arc<Task>,
         plan: &ParametrizedPlan,
         values: &Valuation,
     ) -> Option<String> {
         let counts = usize::from(!self.finds_boxes);
-        self.asked.fetch_add(counts, Ordering::Relaxed);
-        WholeRegion.objection(task, plan, values)
+        self.queries.fetch_add(counts, Ordering::Relaxed);
+        ExactRegion.find_violation(task, plan, values)
     }
 
     fn surroundings(
@@ -201,31 +201,31 @@ impl Region for Counting {
         values: &Valuation,
     ) -> Result<DecoupledEnvelope, String> {
         if self.finds_boxes {
-            self.asked.fetch_add(1, Ordering::Relaxed);
-            return WholeRegion.surroundings(task, plan, values);
+            self.queries.fetch_add(1, Ordering::Relaxed);
+            return ExactRegion.surroundings(task, plan, values);
         }
-        let works = self.objection(task, plan, values).map_or(Ok(()), Err);
+        let works = self.find_violation(task, plan, values).map_or(Ok(()), Err);
         works.map(|()| DecoupledEnvelope::point(values))
     }
 
     fn is_asked_inside(&self) -> bool {
-        self.is_asked_inside
+        self.is_queried_inside
     }
 }
 
 /// Executor given from outside.
-struct Made(Box<dyn Executor>);
+struct ForwardingExecutor(Box<dyn Executor>);
 
-impl Executor for Made {
-    fn need(&self) -> Need {
+impl Executor for ForwardingExecutor {
+    fn need(&self) -> PlanForm {
         self.0.need()
     }
 
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {
         self.0.adopt(mission)
     }
 
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided {
         self.0.decide(moment)
     }
 
@@ -235,7 +235,7 @@ impl Executor for Made {
 }
 
 #[test]
-fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
+fn live_rechecks_numbers_only_after_deviation() {
     let problem = "(define (problem p) (:domain sites) (:objects a b - site)
         (:init (idle) (= (charge) 200)) (:goal (and (surveyed a) (surveyed b))))";
     let plan = "0: (survey a) [20]\n20.001: (warm-up b) [20]";
@@ -257,12 +257,14 @@ fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
     ] {
         let asked = Arc::new(AtomicUsize::new(0));
         let live: ExecutorSpec = "live".parse().unwrap();
-        let live = live.build(Means::from(Box::new(Counting {
-            asked: Arc::clone(&asked),
+        let live = live.build(ExecutorServices::from(Box::new(Counting {
+            queries: Arc::clone(&asked),
             ..Counting::default()
         })));
         let model = scene.world(world);
-        let execution = scene.execution("live").decided_by(Made(live));
+        let execution = scene
+            .execution("live")
+            .with_executor(ForwardingExecutor(live));
         let report = execution.run_in(&mut *model.world(&scene.task, 0));
         assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
         // Later ends are only queried if the plan had no envelope.
@@ -277,7 +279,7 @@ fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
 /// The limits of a running action's duration are found with one oracle that widens a box. Separate
 /// queries for each duration give the same limits up to ε, and so the same runs.
 #[test]
-fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_about() {
+fn duration_limits_do_not_depend_on_the_query_method() {
     let mut outlived = 0;
     for case in ["battery", "tank", "hatchery", "delivery"] {
         let scene = Scene::case(case);
@@ -285,13 +287,15 @@ fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_abou
             let model = scene.world(&format!(
                 "[[duration]]\naction = \"*\"\nnormal = {{ mean = 1.1, deviation = {spread} }}\nrelative = true\n"
             ));
-            let run = |means: Means| {
+            let run = |means: ExecutorServices| {
                 let live: ExecutorSpec = "live".parse().unwrap();
-                let execution = scene.execution("live").decided_by(Made(live.build(means)));
+                let execution = scene
+                    .execution("live")
+                    .with_executor(ForwardingExecutor(live.build(means)));
                 execution.run_in(&mut *model.world(&scene.task, seed))
             };
-            let widened = run(Means::from(Box::new(WholeRegion)));
-            let asked = run(Means::from(Box::new(Counting::default())));
+            let widened = run(ExecutorServices::from(Box::new(ExactRegion)));
+            let asked = run(ExecutorServices::from(Box::new(Counting::default())));
             let of = |it: &Report| (it.verdict.clone(), it.replans, it.starts);
             assert_eq!(of(&widened), of(&asked), "{case}, seed {seed}");
             // Limits are found up to ε.
@@ -310,7 +314,7 @@ fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_abou
 /// A drive takes longer than in the envelope, so that a survey may not consume more than planned.
 /// It consumes as much as the envelope allowed before.
 #[test]
-fn once_something_has_left_the_envelope_amounts_are_held_against_what_is_left() {
+fn amounts_are_checked_against_remaining_plan_after_deviation() {
     let domain = "(define (domain rover)
         (:requirements :durative-actions :fluents)
         (:predicates (idle) (there) (surveyed) (sent)) (:functions (charge))
@@ -359,7 +363,7 @@ fn once_something_has_left_the_envelope_amounts_are_held_against_what_is_left() 
 /// assigns this reserve to some of the drives. The box for the remaining plan gives each drive a
 /// share, and running actions may end earlier than planned.
 #[test]
-fn the_box_for_the_rest_has_room_for_all_of_it() {
+fn box_of_remaining_plan_contains_all_its_actions() {
     let domain = "(define (domain patrol)
         (:requirements :durative-actions :fluents :typing) (:types robot)
         (:predicates (idle ?r - robot)) (:functions (charge ?r - robot) (trips ?r - robot))
@@ -396,12 +400,14 @@ fn the_box_for_the_rest_has_room_for_all_of_it() {
         let asked = Arc::new(AtomicUsize::new(0));
         let live: ExecutorSpec = "live".parse().unwrap();
         let region = Counting {
-            asked: Arc::clone(&asked),
+            queries: Arc::clone(&asked),
             finds_boxes: true,
             ..Counting::default()
         };
-        let live = live.build(Means::from(Box::new(region)));
-        let execution = scene.execution("live").decided_by(Made(live));
+        let live = live.build(ExecutorServices::from(Box::new(region)));
+        let execution = scene
+            .execution("live")
+            .with_executor(ForwardingExecutor(live));
         let report = execution.run_in(&mut *model.world(&scene.task, seed));
         assert_eq!(
             (report.verdict, report.replans),
@@ -453,7 +459,7 @@ fn difference(one: &Report, other: &Report, epsilon: &Rational) -> Option<String
 /// If the observations are within the plan's envelope, the remaining plan is feasible. An executor
 /// that still queries it gets this answer, and the runs are the same.
 #[test]
-fn what_stays_within_the_envelope_needs_no_question() {
+fn values_inside_the_envelope_cause_no_query() {
     let asked = Arc::new(AtomicUsize::new(0));
     let mut lost = 0;
     let open = |mut scene: Scene| {
@@ -494,15 +500,17 @@ fn what_stays_within_the_envelope_needs_no_question() {
                 }
             }
             let model = scene.world(&world);
-            let run = |means: Means| {
+            let run = |means: ExecutorServices| {
                 let live: ExecutorSpec = "live".parse().unwrap();
-                let execution = scene.execution("live").decided_by(Made(live.build(means)));
+                let execution = scene
+                    .execution("live")
+                    .with_executor(ForwardingExecutor(live.build(means)));
                 execution.run_in(&mut *model.world(&scene.task, seed))
             };
-            let trusting = run(Means::from(Box::new(WholeRegion)));
-            let asking = run(Means::from(Box::new(Counting {
-                asked: Arc::clone(&asked),
-                is_asked_inside: true,
+            let trusting = run(ExecutorServices::from(Box::new(ExactRegion)));
+            let asking = run(ExecutorServices::from(Box::new(Counting {
+                queries: Arc::clone(&asked),
+                is_queried_inside: true,
                 ..Counting::default()
             })));
             let difference = difference(&trusting, &asking, scene.task.epsilon());

@@ -1,15 +1,15 @@
 //! Worlds that lose, repeat, delay and contradict their reports.
 
-use elbowroom::execute::Analyst;
+use elbowroom::execute::PlanPreparer;
 use elbowroom::execution::run::{RunningRule, Verdict};
-use elbowroom::sim::{Distribution, Reports};
+use elbowroom::sim::{Distribution, ReportReliability};
 
 use crate::scene::{EXECUTORS, Scene, runs};
 
 /// There must be no panic, no hang, and no wrong "goal reached". `ELBOWROOM_BAD_RUNS` sets the
 /// number of runs, and `ELBOWROOM_BAD_FIRST` the first one.
 #[test]
-fn no_report_is_believed_against_reason() {
+fn contradictory_reports_are_rejected() {
     let mut scenes = [
         Scene::case("delivery"),
         Scene::case("match"),
@@ -31,7 +31,7 @@ fn no_report_is_believed_against_reason() {
              [[failure]]\naction = \"*\"\nprobability = 0.03\nwhen = \"midway\"\n\
              [[delay]]\naction = \"*\"\nvalues = [0, 0, 0, 1.5]\n",
         );
-        let mut analyst = Analyst::new(scene.flow.clone());
+        let mut analyst = PlanPreparer::new(scene.flow.clone());
         let (report, is_goal) = scene.run_badly(executor, &model, &bad(run), run, &mut analyst);
         if report.verdict == Verdict::GoalReached {
             assert!(is_goal, "run {run}, {executor}: {report:#?}");
@@ -48,14 +48,14 @@ fn no_report_is_believed_against_reason() {
 }
 
 /// Returns each kind of fault separately, and all of them together.
-fn bad(run: u64) -> Reports {
-    let mut reports = Reports {
+fn bad(run: u64) -> ReportReliability {
+    let mut reports = ReportReliability {
         lateness: Distribution::Uniform {
             from: 0.0,
             to: 40.0,
         }
         .into(),
-        ..Reports::default()
+        ..ReportReliability::default()
     };
     match run % 5 {
         0 => reports.lost = 0.1,

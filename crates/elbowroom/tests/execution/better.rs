@@ -3,10 +3,13 @@
 
 use elbowroom::execution::Cause;
 use elbowroom::execution::run::{PlanningTime, Report, RunSettings, Verdict};
-use elbowroom::flow;
 use elbowroom::num::Rational;
+use elbowroom::pipeline;
 
-use crate::beside::{Beside, Readier, Told, assert_has, settings, told};
+use crate::background_planner::{
+    RunResult, ScriptedBackgroundPlanner, ScriptedBackgroundPreparer, assert_has, run_recorded,
+    settings,
+};
 use crate::scene::Scene;
 
 /// A large robot and a fast one. Either of them may walk to a place and inspect it before a deadline.
@@ -29,7 +32,7 @@ fn scene(deadline: u32, fast_pace: u32) -> Scene {
            (:goal (inspected)))"
     );
     let mut scene = Scene::new(DOMAIN, &problem, Some(PLAN));
-    scene.flow = flow::Settings::default();
+    scene.flow = pipeline::Settings::default();
     scene
 }
 
@@ -56,15 +59,19 @@ fn plan_with_more_slack_takes_over_while_the_present_one_is_still_feasible() {
 }
 
 /// Runs with a planner in the background. The walk of the large robot takes 22.5 s.
-fn run_with_background_planner(fast_pace: u32, seconds: i64, readying: &[Rational]) -> Told {
+fn run_with_background_planner(fast_pace: u32, seconds: i64, readying: &[Rational]) -> RunResult {
     let scene = scene(25, fast_pace);
-    let planner = Beside::taking(&[seconds.into()]).readying(readying);
+    let planner = ScriptedBackgroundPlanner::with_planning_times(&[seconds.into()])
+        .with_preparation_times(readying);
     let execution = scene.execution("live").with_settings(RunSettings {
         readies_aside: !readying.is_empty(),
         ..settings()
     });
-    let execution = execution.prepared_by(Readier(planner.clone(), scene.flow.clone()));
-    told(
+    let execution = execution.with_preparer(ScriptedBackgroundPreparer(
+        planner.clone(),
+        scene.flow.clone(),
+    ));
+    run_recorded(
         execution,
         &scene.task,
         (100, Vec::new()),
@@ -102,7 +109,7 @@ fn present_plan_continues_while_a_better_one_is_made() {
 }
 
 #[test]
-fn present_plan_continues_where_where_no_other_one_has_more_slack() {
+fn current_plan_continues_if_no_other_has_more_slack() {
     for (deadline, fast_pace, walk) in [
         // The other robot is too slow.
         (25, 4, "18"),

@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::envelope::{EnvelopeRequest, envelope};
-use elbowroom::execute::Analyst;
+use elbowroom::execute::PlanPreparer;
 use elbowroom::execution::NoRecord;
 use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::sim::SimWorld;
@@ -36,26 +36,26 @@ fn run(takes: &str, water: u32) -> (Scene, Report) {
     let world = format!("[[duration]]\naction = \"drain\"\nconstant = {takes}\n");
     let model = scene.world(&world);
     let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 0);
-    let mut analyst = Analyst::new(scene.flow.clone());
+    let mut analyst = PlanPreparer::new(scene.flow.clone());
     let report = scene.run_in("live", &mut world, &mut analyst, &mut NoRecord);
     (scene, report)
 }
 
 #[test]
-fn a_deviation_that_the_planned_rest_bears_needs_no_new_plan() {
+fn deviation_within_remaining_plan_needs_no_replan() {
     // 2 (10 t - t²/2): 57.75 after 3.5, 64 after 4, 69.75 after 4.5.
     for (takes, water) in [("3.5", 57), ("4.5", 64), ("3.999", 60)] {
         let (scene, report) = run(takes, water);
         assert_eq!(report.verdict, Verdict::GoalReached, "{takes}");
         assert_eq!(report.replans, 0, "{takes}: {:?}", report.reasons);
         let request = EnvelopeRequest::new(&scene.task, scene.plan.clone());
-        let refused = envelope(&request, &mut Unwatched);
+        let refused = envelope(&request, &mut NoObserver);
         assert!(refused.is_err(), "else the test is about nothing");
     }
 }
 
 #[test]
-fn a_rest_that_falls_short_as_planned_is_abandoned_at_once() {
+fn infeasible_remaining_plan_is_abandoned_at_once() {
     let (_, report) = run("3.5", 60);
     let reason = report.reasons.first().expect("the plan is abandoned");
     let since = reason.since.as_ref().expect("at a time");

@@ -42,7 +42,7 @@ fn scene(actions: &[(&str, &str, &str, &str)], init: &str, plan: &str) -> Scene 
         "(define (problem x) (:domain d) (:init (= (load) 1) {init}) (:goal (and {goal})))"
     );
     let mut scene = Scene::new(&domain, &problem, Some(plan));
-    scene.settings.most_replans = 0;
+    scene.settings.max_replans = 0;
     scene
 }
 
@@ -162,7 +162,7 @@ fn plan_with_coupled_happenings_reaches_the_goal() {
             "[defaults]\nbecomes_true = 0.0\nbecomes_false = 0.01\nstart = 0.9\neffect = 1.0\n";
         for scene in [scene.with_likelihoods(likely), scene_without(name)] {
             for executor in ADAPTIVE.iter().chain(&["esterel", "live"]) {
-                let report = scene.run(executor, &WorldModel::as_planned(), 0);
+                let report = scene.run(executor, &WorldModel::without_deviations(), 0);
                 assert!(has_reached(&report), "{name}, {executor}: {report:#?}");
                 let judged = scene.judged(&report);
                 assert!(judged.is_valid(), "{name}, {executor}: {judged:?}");
@@ -174,7 +174,7 @@ fn plan_with_coupled_happenings_reaches_the_goal() {
 #[test]
 fn coupled_starts_are_one_decision() {
     for scene in [pair(), circle()] {
-        let report = scene.run("adaptable", &WorldModel::as_planned(), 0);
+        let report = scene.run("adaptable", &WorldModel::without_deviations(), 0);
         let starts = report.executed.iter().map(|it| it.step.start.clone());
         assert!(starts.clone().all(|start| start.is_zero()), "{report:#?}");
         assert_eq!(report.starts, scene.plan.steps.len(), "{report:#?}");
@@ -183,12 +183,12 @@ fn coupled_starts_are_one_decision() {
 
 /// If one of several simultaneous starts fails, all are tried again together.
 #[test]
-fn coupled_starts_are_tried_again_after_failures() {
+fn coupled_starts_are_retried_after_failures() {
     for name in ["pair", "circle"] {
         for undone in ["", "undone = true\n"] {
             let likely = format!("{CERTAIN}[actions.a]\nstart = 0.6\nend = 0.7\n{undone}");
             let mut scene = scene_without(name).with_likelihoods(&likely);
-            scene.settings.most_replans = 100;
+            scene.settings.max_replans = 100;
             let world = scene.world(&format!(
                 "[[failure]]\naction = \"a\"\nwhen = \"start\"\nprobability = 0.4\n\
                  [[failure]]\naction = \"a\"\nprobability = 0.3\n{undone}"
@@ -335,7 +335,7 @@ fn random_plans_are_executed_where_baselines_execute_them() {
         let Some((scene, text)) = random(&mut rng) else {
             continue;
         };
-        let world = WorldModel::as_planned();
+        let world = WorldModel::without_deviations();
         let baselines = ["esterel", "live"];
         let reach = |executor: &&str| has_reached(&scene.run(executor, &world, 0));
         if !baselines.iter().any(reach) {

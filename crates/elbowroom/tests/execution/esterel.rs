@@ -1,7 +1,7 @@
 //! Baseline of paper 2 on a clock.
 
 use elbowroom::execution::run::{Report, Verdict};
-use elbowroom::execution::{About, Cause};
+use elbowroom::execution::{Cause, Subject};
 use elbowroom::num::Rational;
 
 use crate::scene::Scene;
@@ -16,7 +16,7 @@ fn count(report: &Report, action: &str) -> usize {
 }
 
 #[test]
-fn a_failed_start_is_tried_again_without_a_new_plan() {
+fn failed_start_is_retried_without_replanning() {
     let scene = Scene::case("delivery");
     let world = scene.world(&fails_at("start", "*", "0.5"));
     let mut failures = 0;
@@ -31,7 +31,7 @@ fn a_failed_start_is_tried_again_without_a_new_plan() {
 }
 
 #[test]
-fn a_start_that_always_fails_is_tried_ever_more_rarely_until_the_run_is_over() {
+fn repeatedly_failing_start_is_retried_with_backoff() {
     let scene = Scene::case("delivery");
     let world = scene.world(&fails_at("start", "drop", "1"));
     let report = scene.run("esterel", &world, 1);
@@ -43,7 +43,7 @@ fn a_start_that_always_fails_is_tried_ever_more_rarely_until_the_run_is_over() {
 }
 
 #[test]
-fn a_plan_is_given_up_when_a_condition_does_not_hold_where_it_is_needed() {
+fn plan_is_abandoned_if_a_needed_condition_is_false() {
     let scene = Scene::case("delivery");
     let locked = "[[event]]\nfact = \"(unlocked office)\"\nbecomes = false\nconstant = 20\n";
     let report = scene.run("esterel", &scene.world(locked), 1);
@@ -53,7 +53,7 @@ fn a_plan_is_given_up_when_a_condition_does_not_hold_where_it_is_needed() {
     assert_eq!(reason.cause, Cause::Condition, "{reason}");
     assert_eq!(reason.action.as_deref(), Some("(drop rover parcel office)"));
     let unlocked = vec!["(unlocked office)".to_owned()];
-    assert_eq!(reason.about, Some(About::Conditions(unlocked)));
+    assert_eq!(reason.about, Some(Subject::Conditions(unlocked)));
     assert_eq!(count(&report, "unlock"), 2);
     assert!(scene.judged(&report).is_valid());
     // Only at the failure. `guarded` knows at 20 that the remaining plan is infeasible.
@@ -61,7 +61,7 @@ fn a_plan_is_given_up_when_a_condition_does_not_hold_where_it_is_needed() {
 }
 
 #[test]
-fn a_plan_is_given_up_when_an_action_breaks_off() {
+fn plan_is_abandoned_if_an_action_aborts() {
     let scene = Scene::case("delivery");
     let world = scene.world(&fails_at("midway", "unlock", "1"));
     let report = scene.run("esterel", &world, 1);
@@ -70,7 +70,7 @@ fn a_plan_is_given_up_when_an_action_breaks_off() {
 
 /// The counter closes at 60, so a drop that begins later than 57 fails.
 #[test]
-fn a_deadline_is_noticed_only_where_something_fails_for_it() {
+fn missed_deadline_is_detected_only_by_a_failure() {
     let scene = Scene::case("delivery");
     let late = "[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 50\n";
     let world = scene.world(late);

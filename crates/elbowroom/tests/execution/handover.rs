@@ -8,7 +8,7 @@ use crate::scene::{EXECUTORS, Scene};
 /// Actions that end during planning are no steps of the abandoned plan. The new plan, which
 /// continues with the running actions, must not wait for them.
 #[test]
-fn what_ends_while_a_plan_is_made_has_ended_for_the_new_plan() {
+fn action_that_ends_during_planning_is_over_in_new_plan() {
     for name in ["delivery", "match"] {
         let mut scene = Scene::case(name);
         scene.settings.running = RunningRule::Keep;
@@ -38,7 +38,7 @@ fn what_ends_while_a_plan_is_made_has_ended_for_the_new_plan() {
 /// The first drive does not start while the door is being unlocked, so the new plan continues with
 /// the unlocking. A bug once treated it as another step of the new plan and repeated it endlessly.
 #[test]
-fn what_runs_is_not_started_again_by_the_new_plan() {
+fn running_action_is_not_restarted_by_new_plan() {
     let scene = Scene::case("delivery");
     let world = scene.world(
         "[[failure]]\naction = \"*\"\nprobability = 0.3\nwhen = \"start\"\n\

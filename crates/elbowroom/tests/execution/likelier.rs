@@ -19,7 +19,7 @@ fn hasty_order() -> (Scene, WorldModel) {
 }
 
 #[test]
-fn an_order_that_will_hardly_be_in_time_is_dropped_for_one_that_will() {
+fn improbable_order_is_replaced_by_likelier_one() {
     let (scene, model) = hasty_order();
     let first = scene
         .plan
@@ -55,20 +55,20 @@ fn an_order_that_will_hardly_be_in_time_is_dropped_for_one_that_will() {
 }
 
 #[test]
-fn where_everything_goes_as_planned_no_plan_is_likelier() {
+fn no_likelier_plan_without_deviations() {
     for scene in [
         Scene::case("delivery"),
         Scene::case("match"),
         hasty_order().0,
     ] {
-        let model = WorldModel::as_planned();
+        let model = WorldModel::without_deviations();
         let plain = scene.run("live", &model, 0);
         assert_eq!(scene.run_likeliest("live:0", &model, 0), plain);
     }
 }
 
 #[test]
-fn a_small_advantage_is_not_worth_a_new_plan() {
+fn small_advantage_causes_no_replan() {
     let (scene, model) = hasty_order();
     let plain = scene.run("live", &model, 3);
     assert_eq!(scene.run_likeliest("live:100", &model, 3), plain);

@@ -4,8 +4,9 @@ use std::sync::{Arc, Mutex};
 
 use elbowroom::execution::run::Report;
 use elbowroom::execution::{
-    Cause, Decided, Decision, Ending, Executor, Forms, Mission, Moment, Need, News, NoPlanner,
-    Order, Planned, PrepareError, Prepared, Preparer, Reason, StepId,
+    Cause, Decided, Decision, DecisionContext, DispatchableCache, Ending, Executor, NoPlanner,
+    Order, PlanEvent, PlanForm, Planned, PreparationResult, PrepareError, PreparedPlan, Preparer,
+    Reason, StepId,
 };
 use elbowroom::model::{State, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
@@ -27,7 +28,7 @@ pub(crate) struct Outcome {
 
 /// Executes the plan of a scene literally in a world without deviations.
 pub(crate) fn execute(scene: &Scene) -> Outcome {
-    let model = WorldModel::as_planned();
+    let model = WorldModel::without_deviations();
     let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 0);
     let belief = Arc::new(Mutex::new(None));
     let executor = Literal {
@@ -37,9 +38,9 @@ pub(crate) fn execute(scene: &Scene) -> Outcome {
     };
     let report = scene
         .execution("stn")
-        .decided_by(executor)
-        .prepared_by(AsItIs)
-        .planned_by(NoPlanner)
+        .with_executor(executor)
+        .with_preparer(IdentityPreparer)
+        .with_planner(NoPlanner)
         .run_in(&mut world);
     let belief = belief.lock().expect("nobody panics").take();
     Outcome {
@@ -51,28 +52,28 @@ pub(crate) fn execute(scene: &Scene) -> Outcome {
 }
 
 /// Preparer without any analysis of the plan.
-struct AsItIs;
+struct IdentityPreparer;
 
-impl Preparer for AsItIs {
+impl Preparer for IdentityPreparer {
     fn prepare(
         &mut self,
         task: &Arc<Task>,
         _plan: &TimeTriggeredPlan,
-        _need: Need,
-    ) -> Result<Prepared, PrepareError> {
+        _need: PlanForm,
+    ) -> Result<PreparationResult, PrepareError> {
         let plan = StnPlan::unconstrained(task, Vec::new());
-        Ok(Prepared {
+        Ok(PreparationResult {
             instances: Vec::new(),
             nominal: plan.nodes.iter().map(|_| Rational::ZERO).collect(),
             plan: ParametrizedPlan {
-                told: std::collections::BTreeMap::default(),
+                commanded_durations: std::collections::BTreeMap::default(),
                 plan,
                 parameters: Vec::new(),
                 initial: std::collections::BTreeMap::default(),
                 goal: task.goal().clone(),
             },
             envelope: None,
-            forms: Forms::default(),
+            forms: DispatchableCache::default(),
             order: None,
         })
     }
@@ -93,11 +94,11 @@ fn decided(decision: Decision, cause: Cause) -> Decided {
 }
 
 impl Executor for Literal {
-    fn need(&self) -> Need {
-        Need::Orderings
+    fn need(&self) -> PlanForm {
+        PlanForm::Orderings
     }
 
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {
         let steps = mission.time_triggered.steps.iter().cloned();
         self.steps = (0..).map(StepId).zip(steps).collect();
         self.steps.sort_by(|(_, a), (_, b)| b.start.cmp(&a.start));
@@ -105,21 +106,21 @@ impl Executor for Literal {
         Ok(())
     }
 
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
-        for news in moment.news {
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided {
+        for news in moment.plan_events {
             match news {
-                News::Ended {
+                PlanEvent::Ended {
                     ending: Ending::Succeeded,
                     ..
                 } => self.left -= 1,
-                News::Ended { .. } => return decided(Decision::Replan, Cause::Failed),
-                News::Started { step, .. } => {
+                PlanEvent::Ended { .. } => return decided(Decision::Replan, Cause::Failed),
+                PlanEvent::Started { step, .. } => {
                     let _ = step;
                 }
                 other => panic!("{other:?} in a world where everything goes as planned"),
             }
         }
-        if moment.belief.broken().is_some() {
+        if moment.belief.violated_action().is_some() {
             return decided(Decision::Replan, Cause::Condition);
         }
         let due = |(_, step): &(StepId, elbowroom::model::Step)| step.start <= *moment.now;

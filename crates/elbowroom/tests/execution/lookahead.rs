@@ -57,7 +57,7 @@ fn reached(scene: &Scene, executor: &str, world: &str, count: u64) -> u64 {
 }
 
 #[test]
-fn a_detour_that_is_not_in_the_plan_is_taken_where_it_is_likelier_to_work() {
+fn likelier_detour_outside_the_plan_is_taken() {
     let scene = house();
     let report = scene.run("lookahead", &scene.world(""), 0);
     assert_eq!(done(&report), ["climb", "fetch"]);
@@ -76,7 +76,7 @@ fn a_detour_that_is_not_in_the_plan_is_taken_where_it_is_likelier_to_work() {
 /// Without likelihoods both ways are certain. The table has no durations, so it does not prefer
 /// either.
 #[test]
-fn where_everything_is_certain_every_way_is_as_good() {
+fn certain_world_makes_all_routes_equal() {
     let scene = Scene::new(&domain(), &file("problem.pddl"), Some(SLIDE));
     let report = scene.run("lookahead", &scene.world(""), 0);
     assert!(has_reached(&report), "{report:#?}");
@@ -84,7 +84,7 @@ fn where_everything_is_certain_every_way_is_as_good() {
 }
 
 #[test]
-fn what_the_plan_did_not_need_is_done_when_it_is_needed_without_a_new_plan() {
+fn unplanned_action_is_executed_when_needed_without_replanning() {
     let problem = "
         (define (problem late) (:domain house) (:init (whole) (upstairs)) (:goal (fetched)))";
     let scene =
@@ -100,7 +100,7 @@ fn what_the_plan_did_not_need_is_done_when_it_is_needed_without_a_new_plan() {
 
 /// Another agent has fetched the vase, and may put it back.
 #[test]
-fn what_is_under_way_is_let_go_where_its_end_is_not_worth_waiting_for() {
+fn running_action_is_cancelled_if_waiting_does_not_pay() {
     let fleeting = format!("{}\n[facts.fetched]\nbecomes_false = 0.1\n", slippery());
     let scene = house().with_likelihoods(&fleeting);
     let world = "[[event]]\nfact = \"(fetched)\"\nbecomes = true\nconstant = 5\n";
@@ -117,7 +117,7 @@ fn what_is_under_way_is_let_go_where_its_end_is_not_worth_waiting_for() {
 }
 
 #[test]
-fn a_dead_end_is_a_reason_to_ask_for_a_plan_and_there_is_none() {
+fn dead_end_triggers_replanning_without_result() {
     let scene = house();
     let world = scene.world("[[event]]\nfact = \"(whole)\"\nbecomes = false\nconstant = 5\n");
     let report = scene.run("lookahead", &world, 0);
@@ -141,7 +141,7 @@ fn machines(name: &str, case: &str) -> Scene {
 /// become maintained spontaneously, which never happens here. An executor that waits for it would
 /// never end.
 #[test]
-fn the_machines_of_paper_2_are_maintained_on_a_clock() {
+fn machines_of_paper_2_are_maintained_in_timed_world() {
     let failing = "[[failure]]\naction = \"*\"\nwhen = \"start\"\nprobability = 0.25\n";
     let all = &["lookahead", "adaptable", "esterel"][..];
     for (name, case, executors, seeds) in

@@ -97,7 +97,7 @@ fn durations_that_read_changed_numbers_are_executed() {
 }
 
 #[test]
-fn durations_that_read_a_number_changed_from_outside_are_chosen_anew() {
+fn durations_are_chosen_again_after_external_change() {
     for bound in [
         "(= ?duration (m))",
         "(>= ?duration (m))",
@@ -120,7 +120,7 @@ fn durations_that_read_a_number_changed_from_outside_are_chosen_anew() {
 }
 
 #[test]
-fn open_duration_stays_as_planned_where_the_start_reads_it() {
+fn open_duration_read_by_start_stays_as_planned() {
     let scene = scene(
         "(:durative-action melt :parameters () :duration (and (>= ?duration 1) (<= ?duration 10))
            :condition (at start (>= ?duration 9)) :effect (at end (q)))",
@@ -132,7 +132,7 @@ fn open_duration_stays_as_planned_where_the_start_reads_it() {
 }
 
 #[test]
-fn open_duration_stays_as_planned_where_another_duration_reads_its_effect() {
+fn open_duration_read_by_other_duration_stays_as_planned() {
     let scene = scene(
         "(:durative-action grow :parameters () :duration (and (>= ?duration 2) (<= ?duration 10))
            :effect (and (at end (p)) (at end (increase (n) ?duration))))

@@ -16,13 +16,13 @@ const SHIPPING: &str = "(define (domain shipping)
 
 /// `fixed:X` once shipped at 4.001, although the van comes at 20.
 #[test]
-fn nobody_ships_before_the_van_is_there() {
+fn shipping_waits_for_the_van() {
     let problem = "(define (problem p) (:domain shipping)
         (:init (ordered) (at 20 (van))) (:goal (shipped)))";
     let plan = "0: (pack) [4]\n20.001: (ship) [6]";
     let scene = Scene::new(SHIPPING, problem, Some(plan));
     for executor in EXECUTORS.iter().chain(&["fixed:0", "fixed:60"]) {
-        let report = scene.run(executor, &WorldModel::as_planned(), 0);
+        let report = scene.run(executor, &WorldModel::without_deviations(), 0);
         assert_eq!(
             report.verdict,
             Verdict::GoalReached,
@@ -40,7 +40,7 @@ fn a_run_ends_after_the_last_timed_initial_that_the_goal_depends_on() {
         (:init (ordered) (at 20 (van)) (at 50 (shipped))) (:goal (and (packed) (van))))";
     let scene = Scene::new(SHIPPING, problem, Some("0: (pack) [4]"));
     for executor in EXECUTORS.iter() {
-        let report = scene.run(executor, &WorldModel::as_planned(), 0);
+        let report = scene.run(executor, &WorldModel::without_deviations(), 0);
         assert_eq!(
             report.verdict,
             Verdict::GoalReached,
@@ -57,7 +57,7 @@ fn a_run_ends_after_the_last_timed_initial_that_the_goal_depends_on() {
 /// The published baselines start at once, pack in 1 instead of 4, and have used up their replans
 /// before 20. They fail, but they must not count the package that will be thrown away as a success.
 #[test]
-fn what_a_timed_initial_will_undo_is_done_again() {
+fn effect_deleted_by_timed_initial_is_achieved_again() {
     let problem = "(define (problem p) (:domain shipping)
         (:init (ordered) (at 20 (not (packed)))) (:goal (packed)))";
     let scene = Scene::new(SHIPPING, problem, Some("17: (pack) [4]"));
@@ -83,7 +83,7 @@ fn what_a_timed_initial_will_undo_is_done_again() {
 }
 
 #[test]
-fn fixed_sees_that_the_van_has_left_when_it_comes_to_shipping() {
+fn fixed_detects_missing_van_at_start_of_shipping() {
     let problem = "(define (problem p) (:domain shipping)
         (:init (ordered) (van) (at 15 (not (van))) (at 40 (van))) (:goal (shipped)))";
     let plan = "0: (pack) [4]\n4.001: (ship) [6]";
@@ -124,7 +124,7 @@ fn durations_and_a_domains_open_number_are_varied_together() {
         let mut names: Vec<_> = names.into_iter().map(|parameter| parameter.name).collect();
         names.sort();
         assert_eq!(names.len(), 2, "{specs:?}: {names:?}");
-        let report = scene.run("guarded", &WorldModel::as_planned(), 0);
+        let report = scene.run("guarded", &WorldModel::without_deviations(), 0);
         assert_eq!(
             report.verdict,
             Verdict::GoalReached,

@@ -1,7 +1,7 @@
 //! `?duration` is the planned duration until an action ends, for envelopes, the simulator,
 //! executors and the validator of executed plans.
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::envelope::{EnvelopeRequest, envelope};
 use elbowroom::execution::run::{TimeoutRule, Verdict};
 use elbowroom::num::{End, Rational};
@@ -26,7 +26,7 @@ fn scene(condition: &str, effects: &str, goal: &str) -> Scene {
           (:init (= (tank) 0) (= (paid) 0) (= (used) 0)) (:goal (and (done) {goal})))"
     );
     let mut scene = Scene::new(&domain(condition, effects), &problem, Some("0: (fill) [2]"));
-    scene.settings.most_replans = 0;
+    scene.settings.max_replans = 0;
     scene.settings.timeout = TimeoutRule::Off;
     scene.flow.timeout = TimeoutRule::Off;
     scene
@@ -37,7 +37,7 @@ fn upper(scene: &Scene) -> End {
     let mut request = EnvelopeRequest::new(&scene.task, scene.plan.clone());
     request.timeout = TimeoutRule::Off;
     request.search.sharpen = true;
-    let outcome = envelope(&request, &mut Unwatched).expect("within exact analysis");
+    let outcome = envelope(&request, &mut NoObserver).expect("within exact analysis");
     let envelope = outcome.envelope.expect("an envelope");
     envelope.intervals()[0].upper.clone()
 }

@@ -6,7 +6,7 @@ use elbowroom::execution::{Cause, Ending};
 use crate::scene::{EXECUTORS, Scene};
 
 #[test]
-fn when_everything_goes_as_planned_so_does_every_executor() {
+fn executors_follow_the_plan_without_deviations() {
     for name in ["delivery", "match", "battery", "tank"] {
         let scene = Scene::case(name);
         let model = scene.world("");
@@ -31,7 +31,7 @@ fn when_everything_goes_as_planned_so_does_every_executor() {
 /// The flare burns for 15 instead of 30: there is too little time for the second inspection
 /// (required concurrency), and there is no second flare.
 #[test]
-fn work_that_must_lie_within_a_burning_flare_fails_with_it() {
+fn work_inside_flare_fails_with_the_flare() {
     let scene = Scene::case("match");
     let model = scene.world("[[duration]]\naction = \"burn\"\nconstant = 15\n");
     for executor in EXECUTORS.iter() {
@@ -45,7 +45,7 @@ fn work_that_must_lie_within_a_burning_flare_fails_with_it() {
 }
 
 #[test]
-fn a_drive_that_outlives_its_interval_is_noticed_while_it_runs() {
+fn overlong_drive_is_detected_while_running() {
     let scene = Scene::case("delivery");
     let model = scene.world("[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 55\n");
     let report = scene.run("guarded", &model, 0);
@@ -62,7 +62,7 @@ fn a_drive_that_outlives_its_interval_is_noticed_while_it_runs() {
 /// Nominally everything after the drive takes 20.003, and the counter closes at 60. The parcel can
 /// be in time until 39.996, and `live` does not abandon the plan before.
 #[test]
-fn live_gives_up_exactly_when_the_deadline_is_out_of_reach() {
+fn live_abandons_plan_exactly_when_deadline_is_unreachable() {
     let scene = Scene::case("delivery");
     for (drive, is_reached) in [("39.9", true), ("40.1", false)] {
         let model = scene.world(&format!(
@@ -83,7 +83,7 @@ fn live_gives_up_exactly_when_the_deadline_is_out_of_reach() {
     let deadline = "(counter-open office) becomes false at 60";
     assert!(
         reason
-            .behind
+            .evidence
             .iter()
             .any(|it| it.to_string().contains(deadline)),
         "{reason}"
@@ -110,7 +110,7 @@ fn fixed_replans_when_a_duration_leaves_the_percentage() {
 }
 
 #[test]
-fn a_failed_action_is_made_up_for() {
+fn failed_action_is_compensated() {
     let scene = Scene::case("delivery");
     let model = scene.world("[[failure]]\naction = \"drop\"\nprobability = 1\nwhen = \"start\"\n");
     let report = scene.run("guarded", &model, 0);
@@ -121,7 +121,7 @@ fn a_failed_action_is_made_up_for() {
 }
 
 #[test]
-fn what_runs_may_be_cancelled_awaited_or_kept() {
+fn running_actions_are_cancelled_awaited_or_kept() {
     let mut scene = Scene::case("delivery");
     // The drive is late during the long unlocking of the office.
     let model = scene.world(
@@ -155,7 +155,7 @@ fn what_runs_may_be_cancelled_awaited_or_kept() {
 
 /// Somebody else carries the parcel to the office, so no step remains.
 #[test]
-fn what_happens_by_itself_changes_the_plan() {
+fn spontaneous_change_triggers_replanning() {
     let scene = Scene::case("delivery");
     let moved = "[[event]]\nfact = \"(lies parcel shelf)\"\nbecomes = false\nconstant = 5\n";
     let report = scene.run("guarded", &scene.world(moved), 0);
@@ -174,7 +174,7 @@ fn what_happens_by_itself_changes_the_plan() {
 }
 
 #[test]
-fn planning_takes_time_from_the_deadline() {
+fn planning_time_reduces_time_to_deadline() {
     let mut scene = Scene::case("delivery");
     let model = scene.world(
         "[[failure]]\naction = \"(drive _ depot _)\"\nprobability = 0.6\nwhen = \"start\"\n",

@@ -5,17 +5,17 @@ use std::sync::atomic::Ordering;
 use elbowroom::execute::Execution;
 use elbowroom::execution::run::{RunSettings, Verdict};
 use elbowroom::execution::{
-    Command, Ending, Event, Observation, Passage, Request, World, WorldError,
+    Command, Ending, Event, Observation, Request, TimeAdvance, World, WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 
-use crate::beside::{Beside, Telling, telling};
-use crate::lasting::scripted::{Notes, fact, pursue, task};
+use crate::background_planner::{AnnouncingWorld, ScriptedBackgroundPlanner, announcing_world};
+use crate::persistent::scripted::{Notes, fact, pursue, task};
 
 /// World that refuses all starts before a time.
 struct Refusing {
-    inner: Telling,
+    inner: AnnouncingWorld,
     before: Rational,
 }
 
@@ -38,7 +38,7 @@ impl World for Refusing {
         }
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         self.inner.wait(until)
     }
 
@@ -53,15 +53,15 @@ impl World for Refusing {
 
 /// Runs in a world that refuses all starts before `tenths` tenths of a second. Returns the start
 /// times, the notes and the verdict.
-fn told(
+fn run_with_refusals(
     tenths: i64,
     script: Vec<(Rational, Event)>,
     is_lasting: bool,
     plans_aside: bool,
 ) -> (Vec<f64>, Vec<String>, Verdict) {
     let task = task("", "(have book)");
-    let planner = Beside::taking(&[Rational::ZERO]);
-    let (inner, is_to_end) = telling((300, script), &planner, &[]);
+    let planner = ScriptedBackgroundPlanner::with_planning_times(&[Rational::ZERO]);
+    let (inner, is_to_end) = announcing_world((300, script), &planner, &[]);
     let mut world = Refusing {
         inner,
         before: Rational::new(tenths, 10),
@@ -73,10 +73,10 @@ fn told(
             plans_aside,
             ..RunSettings::default()
         })
-        .lasting(is_lasting)
-        .planned_by(planner)
+        .persistent(is_lasting)
+        .with_planner(planner)
         .recorded_by(notes.clone())
-        .ending_when(move || is_to_end.load(Ordering::SeqCst))
+        .with_stop_check(move || is_to_end.load(Ordering::SeqCst))
         .run_in(&mut world);
     let notes = notes.0.lock().expect("not poisoned").clone();
     let starts = notes.iter().filter(|it| it.contains(": start"));
@@ -87,9 +87,9 @@ fn told(
 /// An action that is refused for twenty seconds does not use up ten new plans, and one that is
 /// refused once or twice is retried at once.
 #[test]
-fn what_is_refused_again_and_again_is_tried_later_and_later() {
+fn repeated_refusals_increase_the_backoff() {
     for is_lasting in [false, true] {
-        let (starts, notes, verdict) = told(200, Vec::new(), is_lasting, true);
+        let (starts, notes, verdict) = run_with_refusals(200, Vec::new(), is_lasting, true);
         let reached = verdict == Verdict::GoalReached
             || notes.iter().any(|it| it.contains("rest: goal-reached"));
         assert!(reached, "{verdict:?}: {notes:#?}");
@@ -102,11 +102,11 @@ fn what_is_refused_again_and_again_is_tried_later_and_later() {
             "{waits:?}"
         );
         // If the run waits for the planner, only planning takes time.
-        let (_, _, verdict) = told(200, Vec::new(), false, false);
+        let (_, _, verdict) = run_with_refusals(200, Vec::new(), false, false);
         assert_eq!(verdict, Verdict::ReplanLimit);
     }
     // The run stops retrying in the end.
-    let (starts, notes, _) = told(10_000, Vec::new(), true, true);
+    let (starts, notes, _) = run_with_refusals(10_000, Vec::new(), true, true);
     assert!(
         notes.iter().any(|it| it.contains("rest: replan-limit")),
         "{notes:#?}"
@@ -116,7 +116,7 @@ fn what_is_refused_again_and_again_is_tried_later_and_later() {
 
 /// Any other event may be the cause of the refusal, so it ends the delay.
 #[test]
-fn patience_ends_with_whatever_else_happens() {
+fn backoff_ends_with_any_other_event() {
     let day = task("", "(have book)");
     let seen = vec![
         (Rational::from(7), fact(&day, "(power)", false)),
@@ -128,7 +128,7 @@ fn patience_ends_with_whatever_else_happens() {
         (Rational::from(8), Event::Asked(Request::Resume)),
     ];
     for (script, is_soon) in [(seen, true), (asked, true), (paused, false)] {
-        let (starts, notes, _) = told(65, script, true, true);
+        let (starts, notes, _) = run_with_refusals(65, script, true, true);
         let first = starts.iter().find(|it| **it > 6.5).expect("it goes on");
         // Plans are requested after 6.3 seconds, and then after 12.7.
         assert_eq!(*first < 7.5, is_soon, "{starts:?} {notes:#?}");

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use elbowroom::execute::Analyst;
+use elbowroom::execute::PlanPreparer;
 use elbowroom::execution::run::{Report, RunningRule, Verdict};
 use elbowroom::execution::{
-    Cause, Command, Ending, Event, NoRecord, Observation, Passage, Ticket, World, WorldError,
+    ActionHandle, Cause, Command, Ending, Event, NoRecord, Observation, TimeAdvance, World,
+    WorldError,
 };
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -24,10 +25,10 @@ impl World for Tampered<'_> {
         self.inner.command(now, command)
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let passage = self.inner.wait(until)?;
         let observations = passage.observations.into_iter();
-        Ok(Passage {
+        Ok(TimeAdvance {
             now: passage.now,
             observations: observations.flat_map(&mut *self.tamper).collect(),
         })
@@ -51,7 +52,7 @@ fn run(
 ) -> Report {
     let inner = SimWorld::new(Arc::clone(&scene.task), model, 1);
     let mut world = Tampered { inner, tamper };
-    let mut analyst = Analyst::new(scene.flow.clone());
+    let mut analyst = PlanPreparer::new(scene.flow.clone());
     let report = scene.run_in(executor, &mut world, &mut analyst, &mut NoRecord);
     if report.verdict == Verdict::GoalReached {
         assert_eq!(world.inner.truth().is_goal(), Ok(true), "{report:#?}");
@@ -59,7 +60,7 @@ fn run(
     report
 }
 
-fn ended(observation: &Observation) -> Option<(Ticket, &Ending)> {
+fn ended(observation: &Observation) -> Option<(ActionHandle, &Ending)> {
     match &observation.event {
         Event::Ended { ticket, ending, .. } => Some((*ticket, ending)),
         _ => None,
@@ -81,7 +82,7 @@ fn endings(report: &Report, action: &str) -> Vec<Option<Ending>> {
 fn a_report_that_comes_twice_counts_once() {
     let scene = Scene::case("delivery");
     for executor in EXECUTORS.iter() {
-        let model = WorldModel::as_planned();
+        let model = WorldModel::without_deviations();
         let once = run(&scene, executor, &model, &mut |it| vec![it]);
         let twice = run(&scene, executor, &model, &mut |it| vec![it.clone(), it]);
         assert_eq!(once.verdict, Verdict::GoalReached);
@@ -115,7 +116,7 @@ fn a_success_after_a_cancel_counts() {
 #[test]
 fn an_end_after_another_end_is_a_contradiction() {
     let scene = Scene::case("delivery");
-    let model = WorldModel::as_planned();
+    let model = WorldModel::without_deviations();
     let report = run(&scene, "guarded", &model, &mut |it| {
         let mut all = vec![it.clone()];
         if let (
@@ -147,15 +148,20 @@ fn end_that_is_never_reported_times_out() {
     scene.settings.timeout = "2x,30".parse().expect("a correct test");
     for executor in ["fixed:1000", "live"] {
         let mut lost = None;
-        let report = run(&scene, executor, &WorldModel::as_planned(), &mut |it| {
-            // The first end of any action.
-            if let Some((ticket, _)) = ended(&it)
-                && *lost.get_or_insert(ticket) == ticket
-            {
-                return Vec::new();
-            }
-            vec![it]
-        });
+        let report = run(
+            &scene,
+            executor,
+            &WorldModel::without_deviations(),
+            &mut |it| {
+                // The first end of any action.
+                if let Some((ticket, _)) = ended(&it)
+                    && *lost.get_or_insert(ticket) == ticket
+                {
+                    return Vec::new();
+                }
+                vec![it]
+            },
+        );
         assert!(lost.is_some());
         // Either the action times out, or the plan that waits for it is abandoned before.
         let cause = causes(&report)[0];
@@ -177,12 +183,17 @@ fn end_that_is_never_reported_times_out() {
 fn a_start_that_is_never_reported_is_known_from_its_end() {
     let scene = Scene::case("delivery");
     for executor in EXECUTORS.iter() {
-        let report = run(&scene, executor, &WorldModel::as_planned(), &mut |it| {
-            if matches!(it.event, Event::Started { .. }) {
-                return Vec::new();
-            }
-            vec![it]
-        });
+        let report = run(
+            &scene,
+            executor,
+            &WorldModel::without_deviations(),
+            &mut |it| {
+                if matches!(it.event, Event::Started { .. }) {
+                    return Vec::new();
+                }
+                vec![it]
+            },
+        );
         assert_eq!(
             report.verdict,
             Verdict::GoalReached,
@@ -196,13 +207,13 @@ fn a_start_that_is_never_reported_is_known_from_its_end() {
 fn a_report_on_something_never_started_changes_nothing() {
     let scene = Scene::case("delivery");
     for executor in EXECUTORS.iter() {
-        let model = WorldModel::as_planned();
+        let model = WorldModel::without_deviations();
         let clean = run(&scene, executor, &model, &mut |it| vec![it]);
         let report = run(&scene, executor, &model, &mut |it| {
             let ghost = Observation {
                 time: it.time.clone(),
                 event: Event::Ended {
-                    ticket: Ticket(9999),
+                    ticket: ActionHandle(9999),
                     ending: Ending::Succeeded,
                     measured: Vec::new(),
                 },
@@ -220,7 +231,7 @@ fn a_report_with_an_impossible_time_is_taken_as_the_nearest_possible() {
         let report = run(
             &scene,
             executor,
-            &WorldModel::as_planned(),
+            &WorldModel::without_deviations(),
             &mut |mut it| {
                 it.time += Rational::from(shift);
                 vec![it]

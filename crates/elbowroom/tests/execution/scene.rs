@@ -3,18 +3,20 @@
 use std::sync::{Arc, LazyLock};
 
 use elbowroom::answers::envelope::Search;
-use elbowroom::execute::{Analyst, Embedded, Execution, Likeliest, SharedLikeliest, Validated};
+use elbowroom::execute::{
+    Embedded, Execution, MostProbablePlanner, PlanPreparer, SharedMostProbablePlanner, Validated,
+};
 use elbowroom::execution::executors::{self, ExecutorSpec};
 use elbowroom::execution::run::{PlanningTime, Report, RunSettings, Verdict};
-use elbowroom::execution::{NoRecord, Planner, Prepared, Preparer, Recorder, World};
-use elbowroom::flow;
+use elbowroom::execution::{NoRecord, Planner, PreparationResult, Preparer, Recorder, World};
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
+use elbowroom::pipeline;
 use elbowroom::planner::embedded;
 use elbowroom::probability::{Likelihoods, likelihoods};
-use elbowroom::sim::{Reports, SimWorld, Unreliable, WorldModel};
+use elbowroom::sim::{FaultInjector, ReportReliability, SimWorld, WorldModel};
 
 /// One of each executor in the registry, so that new ones are tested automatically.
 pub(crate) static EXECUTORS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
@@ -23,10 +25,10 @@ pub(crate) static EXECUTORS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
 });
 
 /// Returns settings with IRR's boxes.
-pub(crate) fn irr() -> flow::Settings {
-    flow::Settings {
+pub(crate) fn irr() -> pipeline::Settings {
+    pipeline::Settings {
         search: Search::irr(),
-        ..flow::Settings::default()
+        ..pipeline::Settings::default()
     }
 }
 
@@ -34,7 +36,7 @@ pub(crate) fn irr() -> flow::Settings {
 pub(crate) struct Scene {
     pub(crate) task: Arc<Task>,
     pub(crate) plan: TimeTriggeredPlan,
-    pub(crate) flow: flow::Settings,
+    pub(crate) flow: pipeline::Settings,
     pub(crate) settings: RunSettings,
     pub(crate) states: u64,
     pub(crate) likelihoods: Arc<Likelihoods>,
@@ -110,16 +112,16 @@ impl Scene {
         let PlanningTime::Seconds(time) = self.settings.planning_time.clone() else {
             panic!("a correct test");
         };
-        let likeliest = Likeliest::new(model.clone(), self.planner(), time);
-        let likeliest = SharedLikeliest::new(likeliest);
+        let likeliest = MostProbablePlanner::new(model.clone(), self.planner(), time);
+        let likeliest = SharedMostProbablePlanner::new(likeliest);
         let mut world = SimWorld::new(Arc::clone(&self.task), model, seed);
         let report = Execution::of(&self.task)
             .beginning_with(self.plan.clone())
             .by(spec)
             .with_settings(self.settings.clone())
             .with_envelopes(self.flow.clone())
-            .with_odds(Some(Box::new(likeliest.clone())))
-            .planned_by(likeliest)
+            .with_plan_comparator(Some(Box::new(likeliest.clone())))
+            .with_planner(likeliest)
             .run_in(&mut world);
         if report.verdict == Verdict::GoalReached {
             assert_eq!(world.truth().is_goal(), Ok(true), "a wrong goal reached");
@@ -137,9 +139,9 @@ impl Scene {
     }
 
     /// Prepares the first plan.
-    pub(crate) fn prepared(&self, executor: &str) -> Prepared {
+    pub(crate) fn prepared(&self, executor: &str) -> PreparationResult {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
-        let mut analyst = Analyst::new(self.flow.clone());
+        let mut analyst = PlanPreparer::new(self.flow.clone());
         analyst
             .prepare(&self.task, &self.plan, spec.registered.need)
             .expect("a correct test")
@@ -156,10 +158,10 @@ impl Scene {
         let (recorder, validation) = Validated::new(recorder, &self.task, None);
         let report = self
             .execution(executor)
-            .prepared_by(preparer)
+            .with_preparer(preparer)
             .recorded_by(recorder)
             .run_in(world);
-        assert_eq!(validation.found(), [], "{executor}: {report:#?}");
+        assert_eq!(validation.findings(), [], "{executor}: {report:#?}");
         report
     }
 
@@ -171,13 +173,13 @@ impl Scene {
             .with_settings(self.settings.clone())
             .with_envelopes(self.flow.clone())
             .with_likelihoods(Arc::clone(&self.likelihoods))
-            .planned_by(self.planner())
+            .with_planner(self.planner())
     }
 
     /// Runs in a simulated world, and validates successful executions.
     pub(crate) fn run(&self, executor: &str, model: &WorldModel, seed: u64) -> Report {
         let mut world = SimWorld::new(Arc::clone(&self.task), model, seed);
-        let mut analyst = Analyst::new(self.flow.clone());
+        let mut analyst = PlanPreparer::new(self.flow.clone());
         let report = self.run_in(executor, &mut world, &mut analyst, &mut NoRecord);
         if report.verdict == Verdict::GoalReached {
             assert_eq!(world.truth().is_goal(), Ok(true), "a wrong goal reached");
@@ -191,13 +193,13 @@ impl Scene {
         &self,
         executor: &str,
         model: &WorldModel,
-        reports: &Reports,
+        reports: &ReportReliability,
         seed: u64,
         preparer: &mut dyn Preparer,
     ) -> (Report, bool) {
         let sim = SimWorld::new(Arc::clone(&self.task), model, seed);
         let resolution = model.resolution.clone();
-        let mut world = Unreliable::new(sim, reports.clone(), seed, resolution);
+        let mut world = FaultInjector::new(sim, reports.clone(), seed, resolution);
         let report = self.run_in(executor, &mut world, preparer, &mut NoRecord);
         let is_goal = world.inner().truth().is_goal() == Ok(true);
         (report, is_goal)

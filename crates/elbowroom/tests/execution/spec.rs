@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use elbowroom::answers::run::simulate;
-use elbowroom::answers::{RunAnswer, RunRequest, Unwatched};
-use elbowroom::execute::{NamedText, RunSpec, SpecError, Spoiler};
+use elbowroom::answers::{NoObserver, RunAnswer, RunRequest};
+use elbowroom::execute::{AdversarySettings, NamedText, RunSpec, SpecError};
 use elbowroom::execution::run::Verdict;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -39,7 +39,7 @@ fn unusual() -> RunSpec {
     RunSpec {
         world: Some("a world".to_owned()),
         world_process: Some("./robot".to_owned()),
-        spoiler: Some(Spoiler {
+        spoiler: Some(AdversarySettings {
             inside: Some("dur_0=[8,14]".to_owned()),
         }),
         planner: "popf".to_owned(),
@@ -67,14 +67,14 @@ fn unusual() -> RunSpec {
 }
 
 #[test]
-fn a_specification_is_read_as_it_was_written() {
+fn specification_round_trips() {
     for spec in [spec(), unusual()] {
         assert_eq!(read_back(value(&spec)), Ok(spec));
     }
 }
 
 #[test]
-fn a_member_that_is_missing_or_unknown_is_a_mistake() {
+fn missing_or_unknown_member_is_an_error() {
     let whole = value(&unusual());
     let members: Vec<String> = whole
         .as_object()
@@ -118,7 +118,7 @@ fn a_member_that_is_missing_or_unknown_is_a_mistake() {
 }
 
 #[test]
-fn a_value_that_means_nothing_is_a_mistake() {
+fn meaningless_value_is_an_error() {
     for (member, wrong) in [
         ("executor", json!("gaurded")),
         ("executor", json!(3)),
@@ -170,7 +170,7 @@ fn headers_of_older_traces_are_read() {
 /// The number of threads only concerns the planner. It is not part of traces, and a trace with it
 /// is invalid.
 #[test]
-fn the_planner_has_the_threads_that_no_trace_tells_of() {
+fn number_of_threads_is_not_in_the_trace() {
     let mut spec = spec();
     assert_eq!(spec.embedded().settings.threads, 1);
     spec.threads = 3;
@@ -183,7 +183,7 @@ fn the_planner_has_the_threads_that_no_trace_tells_of() {
 }
 
 #[test]
-fn what_does_not_go_together_is_said_before_the_run() {
+fn inconsistent_settings_are_rejected_before_the_run() {
     let task = Arc::new(Task::new(elbowroom::model::Problem::default()));
     let check = |change: &dyn Fn(&mut RunSpec)| {
         let mut spec = spec();
@@ -215,7 +215,7 @@ fn what_does_not_go_together_is_said_before_the_run() {
 /// The answer and the lines of the trace can be deserialized, and serialized again to the same
 /// bytes.
 #[test]
-fn the_answer_and_each_line_of_the_trace_are_read_as_they_were_written() {
+fn answer_and_trace_lines_round_trip() {
     let world = "format = \"elbowroom-world\"\nversion = 1\n\
         [[duration]]\naction = \"*\"\nnormal = { mean = 1.2, deviation = 0.4, minimum = 0.2 }\n\
         relative = true\n[[failure]]\naction = \"*\"\nprobability = 0.2\n\
@@ -237,7 +237,7 @@ fn the_answer_and_each_line_of_the_trace_are_read_as_they_were_written() {
         let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
         writer.header(&spec).expect("texts and numbers");
         let request = RunRequest::new(&spec, &task).recorded_by(&mut writer);
-        let answer = simulate(request, &mut Unwatched).expect("a world").answer;
+        let answer = simulate(request, &mut NoObserver).expect("a world").answer;
 
         let written = serde_json::to_string(&answer).expect("texts and numbers");
         let read: RunAnswer = serde_json::from_str(&written).expect("what was written");
@@ -270,12 +270,12 @@ fn answer_of_policy(world: &str, budget: &str) -> RunAnswer {
     let (problem, _) = problem.expect("a correct test");
     let task = Arc::new(Task::new(problem));
     let request = RunRequest::new(&spec, &task);
-    let outcome = simulate(request, &mut Unwatched).expect("a correct test");
+    let outcome = simulate(request, &mut NoObserver).expect("a correct test");
     outcome.answer
 }
 
 #[test]
-fn policy_says_why_it_has_no_table() {
+fn policy_reports_reason_for_missing_table() {
     let varied =
         "[[duration]]\naction = \"*\"\nuniform = { from = 0.9, to = 1.1 }\nrelative = true\n";
     let delayed = "[[delay]]\naction = \"*\"\nconstant = 1\n";
@@ -315,7 +315,7 @@ fn policy_does_not_start_a_refused_action_without_end() {
             read_problem(&spec.domain.source(), &spec.problem.source()).expect("a correct test");
         let task = Arc::new(Task::new(problem));
         let request = RunRequest::new(&spec, &task);
-        let report = simulate(request, &mut Unwatched).expect("a world").report;
+        let report = simulate(request, &mut NoObserver).expect("a world").report;
         limits += usize::from(report.verdict == Verdict::ReplanLimit);
         assert_ne!(report.verdict, Verdict::TimeLimit, "{seed}");
         assert!(report.starts < 300, "{seed}: {}", report.starts);

@@ -3,35 +3,40 @@
 use std::sync::Arc;
 
 use elbowroom::execute::{
-    Analyst, Embedded, Execution, External, Likeliest, RememberingPlanner, RememberingPreparer,
-    SharedLikeliest, WholeRegion,
+    CachingPlanner, CachingPreparer, Embedded, ExactRegion, Execution, External,
+    MostProbablePlanner, PlanPreparer, SharedMostProbablePlanner,
 };
-use elbowroom::execution::run::{Next, NotAsked, Report, Run, Verdict};
+use elbowroom::execution::run::{Next, Report, Run, UnexpectedAnswer, Verdict};
 use elbowroom::execution::{
-    Answer, Command, Executor, Passage, PlanAnswer, PlannerAnswer, RequestId, Urgency, Workers,
+    Answer, Command, Executor, PlanAnswer, PlannerAnswer, RequestId, TimeAdvance, Urgency, Workers,
     World, WorldError,
 };
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};
-use elbowroom::sim::{SimWorld, Unreliable};
+use elbowroom::sim::{FaultInjector, SimWorld};
 
 use crate::scene::{EXECUTORS, Scene};
 
 /// An event loop keeps these between steps, and may move them to another thread.
 #[test]
-fn everything_that_is_assembled_can_be_sent_to_another_thread() {
+fn assembled_parts_are_send() {
     fn is_send<T: Send + ?Sized>() {}
     is_send::<Run<'static>>();
     is_send::<Execution<'static>>();
     is_send::<Box<dyn Executor>>();
     is_send::<Box<dyn World>>();
-    is_send::<(Analyst, WholeRegion, Embedded<'static>, External<'static>)>();
-    is_send::<(Likeliest<'static>, SharedLikeliest)>();
     is_send::<(
-        RememberingPlanner<Embedded<'static>>,
-        RememberingPreparer<Analyst>,
+        PlanPreparer,
+        ExactRegion,
+        Embedded<'static>,
+        External<'static>,
     )>();
-    is_send::<(SimWorld<'static>, Unreliable<SimWorld<'static>>)>();
+    is_send::<(MostProbablePlanner<'static>, SharedMostProbablePlanner)>();
+    is_send::<(
+        CachingPlanner<Embedded<'static>>,
+        CachingPreparer<PlanPreparer>,
+    )>();
+    is_send::<(SimWorld<'static>, FaultInjector<SimWorld<'static>>)>();
     is_send::<(TraceWriter<'static>, Replay, ReplayWorld, ReplayPlanner)>();
     is_send::<(elbowroom::envelope::Oracle, elbowroom::model::Task)>();
 }
@@ -64,13 +69,16 @@ fn driven(mut run: Run<'_>, world: &mut dyn World, workers: &mut dyn Workers) ->
         let answer = match next {
             Next::Command(command) => world.command(&run.now().clone(), &command),
             Next::Wait { until } => world.wait(&until).map(|passage| {
-                assert!(run.see(Vec::new()).is_err(), "a wait is no look");
+                assert!(
+                    run.observe_requested(Vec::new()).is_err(),
+                    "a wait is no look"
+                );
                 run.observe(passage).expect("it was asked for");
             }),
             Next::Look { facts, fluents } => world.look(&facts, &fluents).map(|seen| {
                 let (now, observations) = (run.now().clone(), Vec::new());
-                assert!(run.observe(Passage { now, observations }).is_err());
-                run.see(seen).expect("it was asked for");
+                assert!(run.observe(TimeAdvance { now, observations }).is_err());
+                run.observe_requested(seen).expect("it was asked for");
             }),
             Next::Over(report) => return report,
             request => {
@@ -85,7 +93,7 @@ fn driven(mut run: Run<'_>, world: &mut dyn World, workers: &mut dyn Workers) ->
 }
 
 #[test]
-fn an_event_loop_comes_to_the_same_decisions_as_a_world_that_blocks() {
+fn event_loop_and_blocking_world_lead_to_same_decisions() {
     let scene = Scene::case("delivery");
     let mut model = scene.world(
         "[[duration]]\naction = \"*\"\nnormal = { mean = 1.1, deviation = 0.4, minimum = 0.2 }\n\
@@ -106,14 +114,14 @@ fn an_event_loop_comes_to_the_same_decisions_as_a_world_that_blocks() {
                 drop(workers);
                 (report, text)
             };
-            let blocking = traced(&|run, world, workers| run.go(world, workers));
+            let blocking = traced(&|run, world, workers| run.run_to_end(world, workers));
             assert_eq!(traced(&driven), blocking, "{executor}, {seed}");
         }
     }
 }
 
 #[test]
-fn a_run_that_is_over_stays_over() {
+fn finished_run_stays_finished() {
     let scene = Scene::case("delivery");
     let (mut run, mut workers) = scene.execution("stn").run();
     let Next::Command(_) = next_of_the_world(&mut run, &mut *workers) else {
@@ -133,18 +141,18 @@ fn a_run_that_is_over_stays_over() {
 struct Stumbling<'w> {
     inner: Box<dyn World + 'w>,
     /// Number of calls before the failure.
-    left: Option<usize>,
+    calls_before_failure: Option<usize>,
 }
 
 impl Stumbling<'_> {
     fn pass_call(&mut self) -> Result<(), WorldError> {
-        match self.left {
+        match self.calls_before_failure {
             Some(0) => {
-                self.left = None;
+                self.calls_before_failure = None;
                 Err(WorldError::new("it stumbled").reachable())
             }
             left => {
-                self.left = left.map(|left| left - 1);
+                self.calls_before_failure = left.map(|left| left - 1);
                 Ok(())
             }
         }
@@ -157,7 +165,7 @@ impl World for Stumbling<'_> {
         self.inner.command(now, command)
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         self.pass_call()?;
         self.inner.wait(until)
     }
@@ -176,7 +184,7 @@ fn reachable_world_that_failed_is_cancelled_and_replayed() {
             let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
             let mut world = Stumbling {
                 inner: model.world(&scene.task, 0),
-                left: Some(left),
+                calls_before_failure: Some(left),
             };
             let execution = scene.execution(executor).recorded_by(&mut writer);
             let report = execution.run_in(&mut world);
@@ -194,7 +202,7 @@ fn reachable_world_that_failed_is_cancelled_and_replayed() {
             let mut replay = Replay::new(&stored, Arc::clone(&scene.task));
             let execution = scene.execution(executor);
             execution
-                .planned_by(ReplayPlanner::new(&stored))
+                .with_planner(ReplayPlanner::new(&stored))
                 .recorded_by(&mut replay)
                 .run_in(&mut ReplayWorld::new(&stored, &scene.task));
             let (agreed, difference) = replay.outcome();
@@ -206,14 +214,14 @@ fn reachable_world_that_failed_is_cancelled_and_replayed() {
 }
 
 #[test]
-fn what_was_not_asked_for_is_refused_and_changes_nothing() {
+fn unrequested_input_is_rejected_without_effect() {
     let scene = Scene::case("delivery");
     let ((mut run, mut workers), mut world) = (scene.execution("stn").run(), Vec::new());
-    let early = Passage {
+    let early = TimeAdvance {
         now: Rational::from(1_000_000),
         observations: Vec::new(),
     };
-    let refused: Result<(), NotAsked> = run.observe(early);
+    let refused: Result<(), UnexpectedAnswer> = run.observe(early);
     let words = refused.expect_err("nothing was asked").to_string();
     assert!(words.contains("has not asked for time to pass"), "{words}");
     while let Next::Command(command) = next_of_the_world(&mut run, &mut *workers) {

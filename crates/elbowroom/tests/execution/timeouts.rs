@@ -3,9 +3,9 @@
 
 use std::sync::{Arc, Mutex};
 
-use elbowroom::answers::Unwatched;
-use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Failing, envelope};
-use elbowroom::execute::Analyst;
+use elbowroom::answers::NoObserver;
+use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, NominalFailure, envelope};
+use elbowroom::execute::PlanPreparer;
 use elbowroom::execution::run::{Report, TimeoutRule, Verdict};
 use elbowroom::execution::{Cause, Command, Entry, Recorder, WarningCause};
 use elbowroom::num::Rational;
@@ -74,7 +74,7 @@ fn scene(timeout: &str) -> Scene {
     let mut scene = Scene::new(DOMAIN, PROBLEM, Some(PLAN));
     let rule: TimeoutRule = timeout.parse().expect("a correct test");
     scene.settings.timeout = rule.clone();
-    scene.settings.most_replans = 0;
+    scene.settings.max_replans = 0;
     scene.flow.timeout = rule;
     scene
 }
@@ -86,7 +86,7 @@ fn run(scene: &Scene, executor: &str, takes: &str) -> (Report, Noted) {
     ));
     let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 0);
     let mut noted = Noted::default();
-    let mut analyst = Analyst::new(scene.flow.clone());
+    let mut analyst = PlanPreparer::new(scene.flow.clone());
     let report = scene.run_in(executor, &mut world, &mut analyst, &mut noted);
     (report, noted)
 }
@@ -96,7 +96,7 @@ fn number(text: &str) -> Rational {
 }
 
 #[test]
-fn action_that_ends_by_its_time_out_is_not_cancelled() {
+fn action_ending_before_time_out_is_not_cancelled() {
     // The warning comes after three quarters of the time between the planned end and the time-out.
     for (timeout, takes, limit, warned) in [
         ("10x,600", "600", "600", "450.5"),
@@ -120,7 +120,7 @@ fn action_that_ends_by_its_time_out_is_not_cancelled() {
 }
 
 #[test]
-fn action_that_outlives_its_time_out_is_warned_of_and_cancelled() {
+fn action_exceeding_time_out_is_cancelled_after_warning() {
     let scene = scene("60");
     for executor in ["guarded", "live"] {
         let (report, noted) = run(&scene, executor, "61");
@@ -138,7 +138,7 @@ fn action_that_outlives_its_time_out_is_warned_of_and_cancelled() {
 }
 
 #[test]
-fn without_time_outs_an_action_may_take_a_thousand_times_as_long() {
+fn action_without_time_out_may_take_very_long() {
     let scene = scene("none");
     for executor in ["guarded", "live"] {
         let (report, noted) = run(&scene, executor, "2000");
@@ -158,7 +158,7 @@ fn finite_interval_does_not_extend_the_time_out() {
     let problem = "(define (problem p) (:domain two)
         (:init (open) (at 5000 (not (open)))) (:goal (and (a) (b))))";
     let mut scene = Scene::new(&domain, problem, Some(PLAN));
-    scene.settings.most_replans = 0;
+    scene.settings.max_replans = 0;
     let (report, noted) = run(&scene, "guarded", "599");
     assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
     assert_eq!(noted.cancelled(), []);
@@ -173,7 +173,7 @@ fn finding(scene: &Scene, contains: Option<&str>) -> EnvelopeFinding {
         contains: contains.map(str::to_owned),
         ..request.with_settings(&scene.flow)
     };
-    let outcome = envelope(&request, &mut Unwatched).expect("within exact analysis");
+    let outcome = envelope(&request, &mut NoObserver).expect("within exact analysis");
     outcome.answer.finding
 }
 
@@ -194,7 +194,7 @@ fn answer_has_the_time_out_of_each_action() {
 }
 
 #[test]
-fn box_beyond_a_time_out_is_refused() {
+fn box_beyond_a_time_out_is_rejected() {
     let is_inside = |timeout: &str, contains: &str| {
         let finding = finding(&scene(timeout), Some(contains));
         match finding {
@@ -219,7 +219,7 @@ fn box_beyond_a_time_out_is_refused() {
 fn plan_that_takes_longer_than_a_time_out_has_no_envelope_and_no_run() {
     let scene = scene("4");
     let failing = match finding(&scene, None) {
-        EnvelopeFinding::Fails(Failing::AsPlanned { counterexample, .. }) => counterexample,
+        EnvelopeFinding::Fails(NominalFailure::AsPlanned { counterexample, .. }) => counterexample,
         other => panic!("{other:?}"),
     };
     assert!(
@@ -237,7 +237,7 @@ fn plan_that_takes_longer_than_a_time_out_has_no_envelope_and_no_run() {
 }
 
 #[test]
-fn an_action_with_a_rule_of_its_own_times_out_by_that() {
+fn action_specific_rule_sets_its_time_out() {
     for (timeout, limit) in [
         ("10x,600; first=30; second=7", "30"),
         ("none;(FIRST)=40; first=30", "40"),
@@ -274,13 +274,13 @@ fn rule_for_an_unknown_action_is_refused() {
         let scene = scene(timeout);
         let request = EnvelopeRequest::new(&scene.task, scene.plan.clone());
         let request = request.with_settings(&scene.flow);
-        let refused = envelope(&request, &mut Unwatched).expect_err(timeout);
+        let refused = envelope(&request, &mut NoObserver).expect_err(timeout);
         assert!(refused.to_string().contains(unknown), "{refused}");
     }
 }
 
 #[test]
-fn rule_is_read_as_it_is_written() {
+fn time_out_rule_round_trips() {
     for text in [
         "none",
         "600",

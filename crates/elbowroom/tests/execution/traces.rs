@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use elbowroom::execute::Analyst;
-use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::execute::PlanPreparer;
+use elbowroom::execution::{Command, Observation, TimeAdvance, World, WorldError};
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};
@@ -29,7 +29,7 @@ fn traced_on_a_grid(scene: &Scene, executor: &str, seed: u64, grid: &Rational) -
     let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
     writer.header(&json!({})).expect("an object");
     let mut world = SimWorld::new(Arc::clone(&scene.task), &model, seed);
-    let mut analyst = Analyst::new(scene.flow.clone());
+    let mut analyst = PlanPreparer::new(scene.flow.clone());
     scene.run_in(executor, &mut world, &mut analyst, &mut writer);
     text
 }
@@ -40,7 +40,7 @@ fn replayed(scene: &Scene, executor: &str, text: &str) -> usize {
     let mut replay = Replay::new(&stored, Arc::clone(&scene.task));
     scene
         .execution(executor)
-        .planned_by(ReplayPlanner::new(&stored))
+        .with_planner(ReplayPlanner::new(&stored))
         .recorded_by(&mut replay)
         .run_in(&mut ReplayWorld::new(&stored, &scene.task));
     let (agreed, difference) = replay.outcome();
@@ -49,7 +49,7 @@ fn replayed(scene: &Scene, executor: &str, text: &str) -> usize {
 }
 
 #[test]
-fn a_run_can_be_played_back_from_its_trace_alone() {
+fn run_is_replayed_from_its_trace_alone() {
     let mut records = Vec::new();
     for scene in [Scene::case("delivery"), Scene::case("match")] {
         for executor in EXECUTORS.iter() {
@@ -66,7 +66,7 @@ fn a_run_can_be_played_back_from_its_trace_alone() {
 }
 
 #[test]
-fn a_trace_that_was_cut_off_anywhere_can_be_read_and_played_back() {
+fn truncated_trace_is_replayed() {
     let scene = Scene::case("delivery");
     let text = traced(&scene, "guarded", 1);
     let first = text.find('\n').expect("a correct test") + 1;
@@ -77,7 +77,7 @@ fn a_trace_that_was_cut_off_anywhere_can_be_read_and_played_back() {
 
 /// Clocks of real worlds use floats. Each is read exactly as written.
 #[test]
-fn times_with_seventeen_digits_are_played_back_without_differences() {
+fn times_with_seventeen_digits_are_replayed_exactly() {
     let scene = Scene::case("delivery");
     let mut longest = 0;
     for (seed, grid) in (0..20).zip([7_654_321, 3_000_017, 999_983].into_iter().cycle()) {
@@ -92,29 +92,29 @@ fn times_with_seventeen_digits_are_played_back_without_differences() {
 }
 
 /// World that fails at its nth call, including commands.
-struct Mortal<W> {
+struct FailingWorld<W> {
     inner: W,
-    left: usize,
+    remaining_calls: usize,
 }
 
-impl<W> Mortal<W> {
-    fn lives(&mut self) -> Result<(), WorldError> {
-        self.left = self
-            .left
+impl<W> FailingWorld<W> {
+    fn count_call(&mut self) -> Result<(), WorldError> {
+        self.remaining_calls = self
+            .remaining_calls
             .checked_sub(1)
             .ok_or_else(|| WorldError::new("it has fallen off the table"))?;
         Ok(())
     }
 }
 
-impl<W: World> World for Mortal<W> {
+impl<W: World> World for FailingWorld<W> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-        self.lives()?;
+        self.count_call()?;
         self.inner.command(now, command)
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        self.lives()?;
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
+        self.count_call()?;
         self.inner.wait(until)
     }
 
@@ -123,14 +123,14 @@ impl<W: World> World for Mortal<W> {
         facts: &[FactId],
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
-        self.lives()?;
+        self.count_call()?;
         self.inner.look(facts, fluents)
     }
 }
 
 /// If a world fails, the trace replays to the same end with the same message.
 #[test]
-fn a_run_whose_world_failed_plays_back_to_the_same_end() {
+fn run_with_failed_world_replays_to_same_end() {
     for scene in [Scene::case("delivery"), Scene::case("match")] {
         let mut failed = 0;
         for lives in 0..60 {
@@ -139,11 +139,11 @@ fn a_run_whose_world_failed_plays_back_to_the_same_end() {
             let mut sink = |line: &str| text.push_str(line);
             let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
             writer.header(&json!({})).expect("an object");
-            let mut world = Mortal {
+            let mut world = FailingWorld {
                 inner: SimWorld::new(Arc::clone(&scene.task), &model, 1),
-                left: lives,
+                remaining_calls: lives,
             };
-            let mut analyst = Analyst::new(scene.flow.clone());
+            let mut analyst = PlanPreparer::new(scene.flow.clone());
             scene.run_in("guarded", &mut world, &mut analyst, &mut writer);
             let last = text.lines().last().expect("it is over");
             failed += usize::from(last.contains("it has fallen off the table"));

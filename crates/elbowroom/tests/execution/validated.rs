@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use elbowroom::execute::{Execution, Validated};
 use elbowroom::execution::{
-    Cause, Decided, Decision, Executor, Mission, Moment, Need, NoRecord, Order, Planned, Reason,
-    StepId,
+    Cause, Decided, Decision, DecisionContext, Executor, NoRecord, Order, PlanForm, Planned,
+    PreparedPlan, Reason, StepId,
 };
 use elbowroom::num::Rational;
 use elbowroom::report::validation::Invalid;
@@ -24,22 +24,22 @@ const DOMAIN: &str = "
 /// Executor that starts the steps of its plan in order, each with its own time and duration, in any
 /// state.
 struct Reckless {
-    mission: Option<Mission>,
+    mission: Option<PreparedPlan>,
     orders: Vec<(Rational, i64)>,
     next: usize,
 }
 
 impl Executor for Reckless {
-    fn need(&self) -> Need {
-        Need::Network
+    fn need(&self) -> PlanForm {
+        PlanForm::Network
     }
 
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {
         self.mission = Some(mission.clone());
         Ok(())
     }
 
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided {
         let mission = self.mission.as_ref().expect("a plan was adopted");
         let decided = |decision| Decided {
             decision,
@@ -84,19 +84,20 @@ fn objections(orders: &[(i64, i64)], world: &str) -> Vec<String> {
     };
     let told = Mutex::new(Vec::new());
     let (recorder, validation) = Validated::new(NoRecord, &scene.task, None);
-    let recorder = recorder.told_to(|invalid| told.lock().expect("no panic").push(invalid.clone()));
+    let recorder =
+        recorder.on_finding(|invalid| told.lock().expect("no panic").push(invalid.clone()));
     let model = scene.world(world);
     let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 1);
     let mut settings = scene.settings.clone();
-    settings.most_replans = 0;
+    settings.max_replans = 0;
     let _ = Execution::of(&scene.task)
         .beginning_with(scene.plan.clone())
-        .decided_by(executor)
+        .with_executor(executor)
         .with_settings(settings)
-        .planned_by(scene.planner())
+        .with_planner(scene.planner())
         .recorded_by(recorder)
         .run_in(&mut world);
-    let found = validation.found();
+    let found = validation.findings();
     assert_eq!(told.into_inner().expect("no panic"), found);
     assert!(
         found.iter().all(|it| matches!(it, Invalid::Start(_))),

@@ -1,7 +1,7 @@
 //! Actions of duration 0: their over-all conditions are vacuous, and they start and end at one
 //! moment.
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::envelope::{EnvelopeRequest, envelope};
 use elbowroom::execution::run::Verdict;
 use elbowroom::sim::WorldModel;
@@ -18,17 +18,17 @@ fn scene(actions: &str, init: &str, goal: &str, plan: &str) -> Scene {
     );
     let problem = format!("(define (problem x) (:domain d) (:init {init}) (:goal (and {goal})))");
     let mut scene = Scene::new(&domain, &problem, Some(plan));
-    scene.settings.most_replans = 0;
+    scene.settings.max_replans = 0;
     scene
 }
 
 /// Checks that the plan has an envelope, and that the runs under it reach the goal and are valid.
 fn assert_works(scene: &Scene) {
     let request = EnvelopeRequest::new(&scene.task, scene.plan.clone());
-    let outcome = envelope(&request, &mut Unwatched).expect("within exact analysis");
+    let outcome = envelope(&request, &mut NoObserver).expect("within exact analysis");
     assert!(outcome.envelope.is_some(), "{:#?}", outcome.answer.finding);
     for executor in EXECUTORS {
-        let report = scene.run(executor, &WorldModel::as_planned(), 0);
+        let report = scene.run(executor, &WorldModel::without_deviations(), 0);
         assert_eq!(
             report.verdict,
             Verdict::GoalReached,

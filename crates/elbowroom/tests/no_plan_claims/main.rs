@@ -10,15 +10,15 @@
 #[path = "../../../stn/tests/game/mod.rs"]
 mod game;
 
-mod amid;
 mod conflicts;
 mod draft;
+mod mid_execution;
 mod situations;
 mod unsolvable;
 
 use std::collections::BTreeSet;
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::plan::{PlanAnswer, PlanFinding, PlanRequest, PlanStop, plan};
 use elbowroom::model::validate::{Settings, validate};
 use elbowroom::model::{Situation, Task};
@@ -82,7 +82,7 @@ fn answer(task: &Task) -> PlanAnswer {
         self_overlap: false,
         threads: 1,
     };
-    plan(&mut request, &mut Unwatched).unwrap().answer
+    plan(&mut request, &mut NoObserver).unwrap().answer
 }
 
 /// Domain, initial state, goal and a valid plan, of kinds that a search has wrongly reported as
@@ -246,7 +246,7 @@ fn solvable_problem_of_each_kind_is_not_denied() {
 }
 
 #[test]
-fn unsolvable_problem_comes_with_a_certificate_that_is_verified() {
+fn unsolvable_problem_has_verified_certificate() {
     let domain =
         "(:predicates (p) (q)) (:durative-action a :parameters () :duration (= ?duration 2)
         :condition (over all (p)) :effect (at end (q)))";
@@ -318,7 +318,7 @@ fn problem_that_needs_self_overlap_is_not_denied() {
         self_overlap: true,
         threads: 1,
     };
-    let with = plan(&mut request, &mut Unwatched).unwrap().plan.unwrap();
+    let with = plan(&mut request, &mut NoObserver).unwrap().plan.unwrap();
     assert!(with.self_overlap().is_some());
 }
 

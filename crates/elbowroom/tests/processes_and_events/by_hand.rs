@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, envelope};
 use elbowroom_envelope::{Guarantee, Oracle, irr, sharpen};
 use elbowroom_model::Task;
@@ -41,7 +41,7 @@ fn largest(task: &Arc<Task>, text: impl Into<Source>) -> DecoupledEnvelope {
 
 /// The box is computed by hand in the problem file.
 #[test]
-fn the_kettle_boils_before_the_tea_is_poured() {
+fn kettle_boils_before_tea_is_poured() {
     let (task, text) = kettle("tea.stn");
     let found = largest(&task, &text);
     let number = |text: &str| text.parse::<Rational>().expect("a number");
@@ -91,7 +91,7 @@ fn a_plan_with_fixed_times_leaves_durations_open() {
     let (task, text) = kettle("tea.plan");
     let (plan, _) = read_plan(&text, &task).expect("a readable plan");
     let request = EnvelopeRequest::new(&task, plan);
-    let outcome = envelope(&request, &mut Unwatched).expect("within reach");
+    let outcome = envelope(&request, &mut NoObserver).expect("within reach");
     let plan = outcome.plan.expect("a network");
     let found = outcome.envelope.expect("it works as planned");
     let has_room = |own: &Interval| own.width().is_none_or(|width| width.is_positive());
@@ -102,7 +102,7 @@ fn a_plan_with_fixed_times_leaves_durations_open() {
 
 /// The lower end is limited by the order of the happenings, not by a longer action.
 #[test]
-fn an_action_is_not_said_to_fit_into_itself() {
+fn explanation_does_not_fit_action_into_itself() {
     let domain = "(define (domain d) (:predicates (boiled) (fetched)) (:functions (heat))
         (:process heats :effect (increase (heat) (* #t 1)))
         (:event boils :precondition (and (not (boiled)) (>= (heat) 10)) :effect (boiled))
@@ -111,7 +111,7 @@ fn an_action_is_not_said_to_fit_into_itself() {
     let problem = "(define (problem p) (:domain d) (:init (= (heat) 0)) (:goal (fetched)))";
     let task = Arc::new(task_of(domain, problem));
     let (plan, _) = read_plan(&Source::new("plan", "0: (fetch) [5]"), &task).expect("a plan");
-    let outcome = envelope(&EnvelopeRequest::new(&task, plan), &mut Unwatched);
+    let outcome = envelope(&EnvelopeRequest::new(&task, plan), &mut NoObserver);
     let answer = outcome.expect("within reach").answer;
     let EnvelopeFinding::Envelope { parameters, .. } = answer.finding else {
         panic!("{:?}", answer.finding);

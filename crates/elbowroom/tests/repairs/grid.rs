@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom::answers::Unwatched;
+use elbowroom::answers::NoObserver;
 use elbowroom::answers::repair::{Orders, RepairFinding, RepairRequest, repair};
 use elbowroom::model::{Footprint, Step, Task, TimeTriggeredPlan, validate};
 use elbowroom::num::Rational;
@@ -207,7 +207,7 @@ pub(crate) fn compare() {
             .map(|(name, weight)| format!("{name} weight {weight} in [0, {most}]"))
             .map(|spec| spec.parse().expect("a quantity"))
             .collect();
-        let outcome = repair(&request, &mut Unwatched)
+        let outcome = repair(&request, &mut NoObserver)
             .unwrap_or_else(|error| panic!("round {round}: {error}\n{}", small.domain));
         let (cost, orders) = match outcome.answer.finding {
             RepairFinding::Repaired {

@@ -6,20 +6,20 @@
 use std::ops::ControlFlow;
 
 /// All bounds are loosened by this, so that there is an interior point.
-const LOOSE: f64 = 1e-10;
+const LOOSENING: f64 = 1e-10;
 /// Total error from the barriers of all bounds at the end.
-const GAP: f64 = 2e-8;
+const BARRIER_ERROR: f64 = 2e-8;
 /// Factor by which the barriers become weaker in each round.
-const SHARPER: f64 = 20.0;
+const SHARPENING_FACTOR: f64 = 20.0;
 /// Expected gain of a Newton step below which full steps are taken without a line search.
-const NEAR: f64 = 0.05;
+const FULL_STEP_GAIN: f64 = 0.05;
 /// The limit on Newton steps in one round.
-const MOST_IN_ROUND: usize = 60;
+const MAX_STEPS_PER_ROUND: usize = 60;
 /// The limit on Newton steps in all rounds together.
-const MOST_STEPS: usize = 600;
+const MAX_STEPS: usize = 600;
 
 /// Number of multiplications, about ten milliseconds, after which `flow` is polled.
-const ASKED_AFTER: usize = 10_000_000;
+const POLL_INTERVAL: usize = 10_000_000;
 
 /// Concave function that is a sum of functions of few variables each.
 pub(super) trait Concave {
@@ -42,12 +42,12 @@ impl Polytope {
     fn slacks(&self, at: &[f64]) -> Vec<f64> {
         let rows = self.rows.iter().map(|(factors, bound)| {
             let sum: f64 = factors.iter().map(|(index, f)| f * at[*index]).sum();
-            bound + LOOSE - sum
+            bound + LOOSENING - sum
         });
         let own = at.iter().zip(self.least.iter().zip(&self.most));
-        rows.chain(
-            own.flat_map(|(value, (least, most))| [value + LOOSE - least, most + LOOSE - value]),
-        )
+        rows.chain(own.flat_map(|(value, (least, most))| {
+            [value + LOOSENING - least, most + LOOSENING - value]
+        }))
         .collect()
     }
 
@@ -71,26 +71,26 @@ impl Polytope {
         let mut at = start.clone();
         let count = self.rows.len() + 2 * at.len();
         #[allow(clippy::cast_precision_loss, reason = "a count of bounds")]
-        let last = count as f64 / GAP;
+        let last = count as f64 / BARRIER_ERROR;
         let in_rows = self.rows.iter().map(|(factors, _)| factors.len().pow(2));
         let work = at.len().pow(3) / 6 + in_rows.sum::<usize>();
         let (mut sharpness, mut steps, mut worked) = (1.0_f64, 0, 0_usize);
         loop {
-            let most = MOST_STEPS.min(steps + MOST_IN_ROUND);
+            let most = MAX_STEPS.min(steps + MAX_STEPS_PER_ROUND);
             while steps < most && self.newton(function, sharpness, &mut at) {
                 steps += 1;
                 worked += work;
-                if worked > ASKED_AFTER {
+                if worked > POLL_INTERVAL {
                     worked = 0;
                     if flow().is_break() {
                         return None;
                     }
                 }
             }
-            if sharpness >= last || steps >= MOST_STEPS {
+            if sharpness >= last || steps >= MAX_STEPS {
                 return Some(at);
             }
-            sharpness = (sharpness * SHARPER).min(last);
+            sharpness = (sharpness * SHARPENING_FACTOR).min(last);
         }
     }
 
@@ -141,7 +141,7 @@ impl Polytope {
             let moved = at.iter().zip(&direction);
             moved.map(|(value, step)| value + length * step).collect()
         };
-        if promise < NEAR {
+        if promise < FULL_STEP_GAIN {
             // This close to the optimum, full steps converge, and their gains are too small to be
             // measured.
             let full = moved(1.0);
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn the_greatest_product_shares_a_budget_by_prices() {
+    fn product_maximum_splits_budget_by_price() {
         // x + 2 y + 4 z <= 12 and z <= 1/2: z is at its upper bound, the others share the rest
         // equally.
         let polytope = Polytope {
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn who_does_not_want_to_wait_is_asked_in_time() {
+    fn long_computation_polls_flow() {
         let polytope = Polytope {
             rows: vec![((0..500).map(|index| (index, 1.0)).collect(), 1.0)],
             least: vec![0.0; 500],
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_variable_that_cannot_move_does_not_keep_the_others_from_moving() {
+    fn fixed_variable_does_not_block_others() {
         let polytope = Polytope {
             rows: vec![(vec![(0, 1.0)], 0.0), (vec![(1, 1.0), (2, 1.0)], 1.0)],
             least: vec![0.0; 3],

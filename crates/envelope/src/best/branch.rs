@@ -6,22 +6,22 @@ use std::ops::ControlFlow;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
-use super::approach::InCase;
-use super::goal::{Goal, Outcome};
+use super::concave_maximum::CaseContext;
 use super::master::{Master, Span};
-use super::{BestProof, BestRun, BestStep, Case, Reasons, Touch, Variables};
+use super::objective::{ObjectiveFunction, Outcome};
+use super::{BestProof, BestRun, BestStep, OptimalityProof, ProofCase, TangentPoint, Variables};
 use crate::cut::{Cut, Ground};
-use crate::learn::Learnt;
+use crate::cut_generation::CheckOutcome;
+use crate::line_search::{LineSearch, end_index};
 use crate::linear::Terms;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
-use crate::ray::{Ray, place};
 use crate::row::Row;
 
 /// Number of halvings of each end when a refused box is shrunk because no linear cut is known.
 const HALVINGS: usize = 16;
 /// Limit on boxes that are shrunk before the search stops with its current result.
-const MOST_SHRUNK: usize = 24;
+const MAX_SHRUNK: usize = 24;
 
 /// Case that has not been split.
 struct Leaf {
@@ -37,17 +37,17 @@ struct Leaf {
     is_fresh: bool,
     values: Vec<Rational>,
     /// For a probability, the points of contact of its bound.
-    touches: Vec<Touch>,
+    touches: Vec<TangentPoint>,
 }
 
 struct Search<'a> {
     oracle: &'a mut Oracle,
     plan: &'a ParametrizedPlan,
     variables: &'a Variables,
-    goal: Goal,
+    goal: ObjectiveFunction,
     master: Master,
     cuts: Vec<Cut>,
-    tree: Vec<Case>,
+    tree: Vec<ProofCase>,
     leaves: Vec<Leaf>,
     best: (Rational, Vec<Rational>),
     shrunk: usize,
@@ -60,7 +60,7 @@ pub(super) fn branch(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,
     variables: &Variables,
-    goal: Goal,
+    goal: ObjectiveFunction,
     start: Option<&DecoupledEnvelope>,
     on_step: &mut dyn FnMut(&BestStep<'_>) -> ControlFlow<()>,
 ) -> Result<BestRun, Refusal> {
@@ -71,7 +71,7 @@ pub(super) fn branch(
         oracle,
         plan,
         variables,
-        best: (goal.worth(&nothing), nothing),
+        best: (goal.lower_bound(&nothing), nothing),
         goal,
         cuts: Vec::new(),
         tree: Vec::new(),
@@ -81,10 +81,10 @@ pub(super) fn branch(
         is_cancelled: false,
     };
     if let Some(start) = start {
-        search.take(search.values_in(start));
+        search.record_if_better(search.values_in(start));
     }
     let spans = search.goal.spans(variables);
-    search.open((Vec::new(), spans), search.goal.most(variables));
+    search.add_case((Vec::new(), spans), search.goal.upper_bound(variables));
     let mut steps = 0_u64;
     // Greatest bound of the cases that were closed undecided.
     let mut left: Option<Rational> = None;
@@ -93,36 +93,36 @@ pub(super) fn branch(
             break;
         }
         if !search.leaves[at].is_fresh {
-            search.work_out(at);
+            search.solve_case(at);
             continue;
         }
         if search.split(at) {
             continue;
         }
-        if search.goes_on().is_break() {
+        if search.report_step().is_break() {
             break;
         }
         steps += 1;
         let values = search.leaves[at].values.clone();
         let candidate = variables.envelope(plan, &values);
-        match search.oracle.learn(&candidate, 1)? {
-            Learnt::Nothing => {
-                search.take(values);
-                if search.leaves[at].bound > &search.best.0 + &tolerance && !search.divide(at) {
+        match search.oracle.check_with_cuts(&candidate, 1)? {
+            CheckOutcome::Accepted => {
+                search.record_if_better(values);
+                if search.leaves[at].bound > &search.best.0 + &tolerance && !search.bisect(at) {
                     // The bound of this case cannot be approached any closer.
                     let leaf = search.leaves.remove(at);
                     left = left.max(Some(leaf.bound));
                 }
                 continue;
             }
-            Learnt::Cuts(cuts) if !search.is_known(&cuts[0], &values) => {
+            CheckOutcome::Cuts(cuts) if !search.is_implied(&cuts[0], &values) => {
                 for cut in cuts {
-                    search.learn(cut);
+                    search.add_cut(cut);
                 }
             }
             _ => {
                 if let Some(cut) = search.shrink(&candidate)? {
-                    search.learn(cut);
+                    search.add_cut(cut);
                 } else {
                     let leaf = search.leaves.remove(at);
                     left = left.max(Some(leaf.bound));
@@ -147,7 +147,7 @@ pub(super) fn branch(
         is_cancelled: search.is_cancelled,
         proof: BestProof {
             cuts: search.cuts,
-            reasons: Reasons::Tree(search.tree),
+            reasons: OptimalityProof::Tree(search.tree),
             variables: Vec::new(),
         },
     })
@@ -155,7 +155,7 @@ pub(super) fn branch(
 
 impl Search<'_> {
     /// Reports the best box so far, and returns the caller's answer.
-    fn goes_on(&mut self) -> ControlFlow<()> {
+    fn report_step(&mut self) -> ControlFlow<()> {
         let step = BestStep {
             envelope: &self.variables.envelope(self.plan, &self.best.1),
             checks: self.oracle.checks(),
@@ -167,8 +167,8 @@ impl Search<'_> {
 
     /// Replaces the best box by the one with these values, which is inside the envelope, if it is
     /// better.
-    fn take(&mut self, values: Vec<Rational>) {
-        let worth = self.goal.worth(&values);
+    fn record_if_better(&mut self, values: Vec<Rational>) {
+        let worth = self.goal.lower_bound(&values);
         if worth > self.best.0 {
             self.best = (worth, values);
         }
@@ -177,7 +177,11 @@ impl Search<'_> {
     /// Returns values of the variables whose box lies inside another one.
     fn values_in(&self, envelope: &DecoupledEnvelope) -> Vec<Rational> {
         let point = DecoupledEnvelope::point(&self.plan.nominal());
-        let variables = self.variables.ends.iter().zip(&self.variables.most);
+        let variables = self
+            .variables
+            .ends
+            .iter()
+            .zip(&self.variables.max_distances);
         let values = variables.map(|(ends, most)| {
             let moved = ends.iter().map(|end| {
                 let far = end.reach(envelope);
@@ -190,13 +194,13 @@ impl Search<'_> {
     }
 
     /// Adds a case, with the bound of its parent until it is solved.
-    fn open(
+    fn add_case(
         &mut self,
         (chosen, spans): (Vec<(usize, usize)>, Vec<Span>),
         bound: Rational,
     ) -> usize {
         let case = self.tree.len();
-        self.tree.push(Case::Bounded {
+        self.tree.push(ProofCase::Bounded {
             multipliers: Vec::new(),
             slopes: Vec::new(),
             touches: Vec::new(),
@@ -212,7 +216,7 @@ impl Search<'_> {
             touches: Vec::new(),
         });
         let last = self.leaves.len() - 1;
-        self.work_out(last);
+        self.solve_case(last);
         case
     }
 
@@ -228,7 +232,7 @@ impl Search<'_> {
     }
 
     /// Solves a case with all known cuts.
-    fn work_out(&mut self, at: usize) {
+    fn solve_case(&mut self, at: usize) {
         let leaf = &mut self.leaves[at];
         let known = &self.best.1;
         let (master, variables) = (&mut self.master, self.variables);
@@ -238,7 +242,7 @@ impl Search<'_> {
             checks: self.oracle.checks(),
         };
         let mut flow = || (self.on_step)(&step);
-        let case = InCase {
+        let case = CaseContext {
             chosen: &leaf.chosen,
             spans: &leaf.spans,
             known,
@@ -256,7 +260,7 @@ impl Search<'_> {
                 leaf.values = values;
                 leaf.touches.clone_from(&touches);
                 leaf.is_fresh = true;
-                self.tree[leaf.case] = Case::Bounded {
+                self.tree[leaf.case] = ProofCase::Bounded {
                     multipliers: proof,
                     slopes,
                     touches,
@@ -264,7 +268,7 @@ impl Search<'_> {
                 };
             }
             Outcome::Impossible(proof) => {
-                self.tree[leaf.case] = Case::Bounded {
+                self.tree[leaf.case] = ProofCase::Bounded {
                     multipliers: proof,
                     slopes: Vec::new(),
                     touches: Vec::new(),
@@ -295,29 +299,29 @@ impl Search<'_> {
         for row in 0..self.cuts[cut].rows.len() {
             let mut chosen = leaf.chosen.clone();
             chosen.push((cut, row));
-            cases.push(self.open((chosen, leaf.spans.clone()), leaf.bound.clone()));
+            cases.push(self.add_case((chosen, leaf.spans.clone()), leaf.bound.clone()));
         }
-        self.tree[leaf.case] = Case::Either { cut, cases };
+        self.tree[leaf.case] = ProofCase::AnyRow { cut, cases };
         true
     }
 
     /// Splits a case into two parts with tighter bounds on the objective. Returns `false` if that
     /// is not possible.
-    fn divide(&mut self, at: usize) -> bool {
+    fn bisect(&mut self, at: usize) -> bool {
         let leaf = &self.leaves[at];
-        let Some((variable, place)) = self.goal.divide(&leaf.spans, &leaf.touches) else {
+        let Some((variable, place)) = self.goal.split_point(&leaf.spans, &leaf.touches) else {
             return false;
         };
         let leaf = self.leaves.remove(at);
         let (mut nearer, mut farther) = (leaf.spans.clone(), leaf.spans);
         let own = &mut nearer[variable];
         own.most = own.most.clone().min(place.clone());
-        own.far.clone_from(&place);
+        own.objective_max.clone_from(&place);
         nearer[variable].is_open = true;
         farther[variable].least.clone_from(&place);
         let cases = [nearer, farther]
-            .map(|spans| self.open((leaf.chosen.clone(), spans), leaf.bound.clone()));
-        self.tree[leaf.case] = Case::Split {
+            .map(|spans| self.add_case((leaf.chosen.clone(), spans), leaf.bound.clone()));
+        self.tree[leaf.case] = ProofCase::Split {
             variable,
             at: place,
             cases,
@@ -325,7 +329,7 @@ impl Search<'_> {
         true
     }
 
-    fn learn(&mut self, cut: Cut) {
+    fn add_cut(&mut self, cut: Cut) {
         let index = self.cuts.len();
         self.master.add(self.plan, self.variables, &cut, index);
         self.cuts.push(cut);
@@ -336,7 +340,7 @@ impl Search<'_> {
 
     /// Returns `true` if the master already contains the cut: the cut holds, except for being
     /// strict.
-    fn is_known(&self, cut: &Cut, values: &[Rational]) -> bool {
+    fn is_implied(&self, cut: &Cut, values: &[Rational]) -> bool {
         let candidate = self.variables.envelope(self.plan, values);
         let holds = |row: &Row| {
             row.value(&candidate)
@@ -347,21 +351,26 @@ impl Search<'_> {
 
     /// Searches for a better box between the nominal values and one that was refused.
     fn improve(&mut self, values: &[Rational]) -> Result<(), Refusal> {
-        let mut ray = Ray::new(self.plan);
+        let mut ray = LineSearch::new(self.plan);
         for (ends, value) in self.variables.ends.iter().zip(values) {
             for end in ends {
-                ray.step[place(*end)] = value.clone();
+                ray.step[end_index(*end)] = value.clone();
             }
         }
         let mut cuts = self.cuts.clone();
         let known = cuts.len();
         let (zero, one) = (Rational::ZERO, Rational::ONE);
-        let reached = ray.shoot(self.oracle, &zero, &one, &mut cuts, &mut |_, _| {
+        let reached = ray.search(self.oracle, &zero, &one, &mut cuts, &mut |_, _| {
             ControlFlow::Continue(())
         })?;
-        self.take(values.iter().map(|value| value * &reached.inside).collect());
+        self.record_if_better(
+            values
+                .iter()
+                .map(|value| value * &reached.lower_bound)
+                .collect(),
+        );
         for cut in cuts.into_iter().skip(known) {
-            self.learn(cut);
+            self.add_cut(cut);
         }
         Ok(())
     }
@@ -370,7 +379,7 @@ impl Search<'_> {
     /// nearer. Used if no linear cut is known. `None` after too many of them.
     fn shrink(&mut self, refused: &DecoupledEnvelope) -> Result<Option<Cut>, Refusal> {
         self.shrunk += 1;
-        if self.shrunk > MOST_SHRUNK {
+        if self.shrunk > MAX_SHRUNK {
             return Ok(None);
         }
         let point = DecoupledEnvelope::point(&self.plan.nominal());

@@ -6,8 +6,8 @@ use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
 use elbowroom_plan::{ParametrizedPlan, Side};
 
-use super::approach::InCase;
-use super::{Source, Variables};
+use super::concave_maximum::CaseContext;
+use super::{BoundSource, Variables};
 use crate::cut::Cut;
 
 /// Range of a variable.
@@ -17,7 +17,7 @@ pub(super) struct Span {
     pub(super) most: Rational,
     /// Like `most`, but for the values that the objective distinguishes, whatever the range of the
     /// parameter.
-    pub(super) far: Rational,
+    pub(super) objective_max: Rational,
     /// `true` if the variable is strictly less than `far`; linear programs allow it to be `most`.
     pub(super) is_open: bool,
 }
@@ -28,13 +28,13 @@ pub(super) enum Solved {
     Best {
         values: Vec<Rational>,
         worth: Rational,
-        proof: Vec<(Source, Rational)>,
+        proof: Vec<(BoundSource, Rational)>,
     },
-    Impossible(Vec<(Source, Rational)>),
+    Impossible(Vec<(BoundSource, Rational)>),
 }
 
 /// `Σ factor · variable <= bound`.
-pub(super) struct Known {
+pub(super) struct CutRow {
     pub(super) factors: Vec<(usize, Rational)>,
     pub(super) bound: Rational,
     is_strict: bool,
@@ -42,7 +42,7 @@ pub(super) struct Known {
     sum: Option<VariableId>,
 }
 
-impl Known {
+impl CutRow {
     /// Returns `true` if the row holds, strictly if it is strict.
     pub(super) fn holds(&self, values: &[Rational]) -> bool {
         let terms = self
@@ -60,33 +60,33 @@ pub(super) struct Master {
     simplex: Simplex,
     variables: Vec<VariableId>,
     /// The sources of the bounds, by the tags of the linear program.
-    sources: Vec<Source>,
-    rows: BTreeMap<(usize, usize), Known>,
+    sources: Vec<BoundSource>,
+    rows: BTreeMap<(usize, usize), CutRow>,
     /// The rows that hold in all cases.
-    everywhere: Vec<(usize, usize)>,
+    global_rows: Vec<(usize, usize)>,
 }
 
 impl Master {
     pub(super) fn new(variables: &Variables) -> Self {
         let mut simplex = Simplex::new();
         let ids: Vec<VariableId> = variables
-            .most
+            .max_distances
             .iter()
             .map(|_| simplex.add_variable())
             .collect();
         let mut sources = Vec::new();
-        for (index, (id, most)) in ids.iter().zip(&variables.most).enumerate() {
+        for (index, (id, most)) in ids.iter().zip(&variables.max_distances).enumerate() {
             simplex.assert_lower(*id, Delta::ZERO, sources.len());
-            sources.push(Source::Least(index));
+            sources.push(BoundSource::Least(index));
             simplex.assert_upper(*id, Delta::from(most.clone()), sources.len());
-            sources.push(Source::Most(index));
+            sources.push(BoundSource::Most(index));
         }
         Self {
             simplex,
             variables: ids,
             sources,
             rows: BTreeMap::new(),
-            everywhere: Vec::new(),
+            global_rows: Vec::new(),
         }
     }
 
@@ -105,7 +105,7 @@ impl Master {
                 .map(|(variable, factor)| (self.variables[*variable], factor.clone()))
                 .collect();
             let sum = (!terms.is_empty()).then(|| self.simplex.define(&terms));
-            let known = Known {
+            let known = CutRow {
                 factors,
                 bound,
                 is_strict: row.is_strict,
@@ -116,7 +116,7 @@ impl Master {
         if cut.rows.len() == 1 {
             // Every box inside the envelope satisfies the row, including the nominal values.
             self.assert(index, 0);
-            self.everywhere.push((index, 0));
+            self.global_rows.push((index, 0));
         }
     }
 
@@ -124,8 +124,8 @@ impl Master {
     pub(super) fn rows<'a>(
         &'a self,
         chosen: &'a [(usize, usize)],
-    ) -> impl Iterator<Item = &'a Known> {
-        let all = self.everywhere.iter().chain(chosen);
+    ) -> impl Iterator<Item = &'a CutRow> {
+        let all = self.global_rows.iter().chain(chosen);
         all.filter_map(|place| self.rows.get(place))
     }
 
@@ -138,7 +138,7 @@ impl Master {
             self.simplex
                 .assert_upper(*id, Delta::from(span.most.clone()), tag + 1);
             self.sources
-                .extend([Source::Least(index), Source::Most(index)]);
+                .extend([BoundSource::Least(index), BoundSource::Most(index)]);
         }
     }
 
@@ -151,7 +151,7 @@ impl Master {
             return !known.bound.is_negative();
         };
         let tag = self.sources.len();
-        self.sources.push(Source::Row(cut, row));
+        self.sources.push(BoundSource::Row(cut, row));
         self.simplex
             .assert_upper(sum, Delta::from(known.bound.clone()), tag);
         true
@@ -172,7 +172,7 @@ impl Master {
         for &(cut, row) in chosen {
             if !self.assert(cut, row) {
                 solved = Some(Solved::Impossible(vec![(
-                    Source::Row(cut, row),
+                    BoundSource::Row(cut, row),
                     Rational::ONE,
                 )]));
                 break;
@@ -186,9 +186,9 @@ impl Master {
 
     /// Returns the best values in that case that are at most, or at least, these. Strict rows are
     /// satisfied with a small margin. `None` if there are none.
-    pub(super) fn beside(
+    pub(super) fn best_within(
         &mut self,
-        case: InCase<'_>,
+        case: CaseContext<'_>,
         (side, limits): (Side, &[Rational]),
         worths: &[Rational],
     ) -> Option<Vec<Rational>> {
@@ -219,7 +219,7 @@ impl Master {
                 .assert_upper(sum, Delta::from(bound), self.sources.len());
         }
         // No proof is needed here, so all these bounds may share one source.
-        self.sources.push(Source::Most(0));
+        self.sources.push(BoundSource::Most(0));
         let found = is_possible.then(|| self.optimum(worths));
         self.simplex.pop();
         self.sources.truncate(tags);
@@ -230,7 +230,7 @@ impl Master {
     }
 
     fn optimum(&mut self, worths: &[Rational]) -> Solved {
-        let named = |sources: &[Source], proof: Vec<(usize, Rational)>| {
+        let named = |sources: &[BoundSource], proof: Vec<(usize, Rational)>| {
             let named = proof
                 .into_iter()
                 .map(|(tag, factor)| (sources[tag], factor));

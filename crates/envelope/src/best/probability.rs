@@ -9,15 +9,17 @@
 
 use std::ops::ControlFlow;
 
-use elbowroom_num::chance::{Cell, Chance, Cut, Dense, Reach, Steps, Touch};
-use elbowroom_num::{Rational, Side, enclosed};
+use elbowroom_num::log_concave::{
+    Cell, CutPosition, Dense, LogConcaveDistribution, Reach, Steps, TangentPoint,
+};
+use elbowroom_num::{Rational, Side, enclosures};
 use elbowroom_plan::ParametrizedPlan;
 
-use super::approach::{InCase, guess, power_of_ten, tidied};
-use super::goal::Outcome;
+use super::concave_maximum::{CaseContext, approximate_optimum, power_of_ten, shorten_digits};
+use super::log_probability::LogProbability;
 use super::master::{Master, Solved, Span};
-use super::soft::Soft;
-use super::{BestSettings, NEVER, Source, Variables};
+use super::objective::Outcome;
+use super::{BestSettings, BoundSource, LOG_OF_ZERO, Variables};
 
 /// One parameter.
 struct Term {
@@ -25,26 +27,26 @@ struct Term {
     scale: Rational,
     /// The variables that move its lower and its upper end.
     ends: [usize; 2],
-    chance: Option<Chance>,
+    chance: Option<LogConcaveDistribution>,
 }
 
 /// Bound that follows from tangents at one point.
-struct Bounded {
+struct TangentBound {
     bound: Rational,
     /// Point with the greatest sum of the tangents.
     corner: Vec<Rational>,
-    proof: Vec<(Source, Rational)>,
+    proof: Vec<(BoundSource, Rational)>,
     slopes: Vec<Rational>,
-    touches: Vec<Touch>,
+    touches: Vec<TangentPoint>,
 }
 
 /// `Σ ln P(the duration is inside its interval)`.
 pub(super) struct Probability {
     terms: Vec<Term>,
     /// Weights of the variables when ends are moved out that do not change the probability.
-    even: Vec<Rational>,
+    tie_weights: Vec<Rational>,
     /// Greatest value of each variable that counts, whatever its parameter's range.
-    counted: Vec<Rational>,
+    max_counted: Vec<Rational>,
 }
 
 impl Probability {
@@ -53,7 +55,7 @@ impl Probability {
         variables: &Variables,
         settings: &BestSettings,
     ) -> Self {
-        let chances = &settings.chances;
+        let chances = &settings.distributions;
         let mut terms: Vec<Term> = plan
             .parameters
             .iter()
@@ -73,11 +75,14 @@ impl Probability {
             }
         }
         let even = variables.scales.iter().map(Rational::reciprocal);
-        let counted = variables.scales.iter().map(|scale| scale * &settings.most);
+        let counted = variables
+            .scales
+            .iter()
+            .map(|scale| scale * &settings.max_deviation);
         Self {
             terms,
-            counted: counted.collect(),
-            even: even.map(Option::unwrap_or_default).collect(),
+            max_counted: counted.collect(),
+            tie_weights: even.map(Option::unwrap_or_default).collect(),
         }
     }
 
@@ -101,13 +106,16 @@ impl Probability {
                 });
             }
         }
-        let spans = limits.into_iter().zip(&variables.most).zip(&self.counted);
+        let spans = limits
+            .into_iter()
+            .zip(&variables.max_distances)
+            .zip(&self.max_counted);
         spans
             .map(|(((least, most), limit), counted)| {
                 let gains = most.flatten().unwrap_or_else(|| counted.clone());
                 Span {
                     most: gains.clone().min(limit.clone()),
-                    far: gains.min(counted.clone()),
+                    objective_max: gains.min(counted.clone()),
                     least,
                     is_open: false,
                 }
@@ -120,24 +128,24 @@ impl Probability {
     }
 
     /// Returns the value of a box, rounded down to a billionth.
-    pub(super) fn worth(&self, values: &[Rational]) -> Rational {
+    pub(super) fn value(&self, values: &[Rational]) -> Rational {
         let mut sum = Rational::ZERO;
         for term in &self.terms {
             let Some(chance) = &term.chance else { continue };
-            let [mass, _] = chance.mass(&term.nominal, &Self::reach(term, values));
-            match enclosed::ln(&mass) {
+            let [mass, _] = chance.probability_bounds(&term.nominal, &Self::reach(term, values));
+            match enclosures::ln(&mass) {
                 Some([below, _]) => sum += below,
-                None => return Rational::from(NEVER),
+                None => return Rational::from(LOG_OF_ZERO),
             }
         }
-        enclosed::billionths_below(&sum).max(Rational::from(NEVER))
+        enclosures::floor_to_billionth(&sum).max(Rational::from(LOG_OF_ZERO))
     }
 
     pub(super) fn solve(
         &self,
         master: &mut Master,
         variables: &Variables,
-        case: InCase<'_>,
+        case: CaseContext<'_>,
         flow: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Outcome {
         let mut is_over = false;
@@ -149,26 +157,26 @@ impl Probability {
         let softs = self.terms.iter().filter_map(|term| {
             let chance = term.chance.as_ref()?;
             let cell = cell(term, case.spans);
-            Some(Soft::new(
+            Some(LogProbability::new(
                 chance,
                 (&term.nominal, &term.scale),
                 &cell,
                 term.ends,
             ))
         });
-        let function: Vec<Soft> = softs.collect();
-        let guess = guess(&function, master, variables, case, &mut goes_on);
+        let function: Vec<LogProbability> = softs.collect();
+        let guess = approximate_optimum(&function, master, variables, case, &mut goes_on);
         if is_over {
             return Outcome::Unknown;
         }
         let near = guess.clone().and_then(|guess| {
             let (_, slopes) = self.tangents(case.spans, &guess);
-            let worths = self.worths(variables, &slopes);
-            let values = master.beside(case, (Side::Upper, &guess), &worths)?;
-            let tidy = tidied(values, master, variables, case, &|own| self.worth(own));
+            let worths = self.coefficients(variables, &slopes);
+            let values = master.best_within(case, (Side::Upper, &guess), &worths)?;
+            let tidy = shorten_digits(values, master, variables, case, &|own| self.value(own));
             Some(
                 master
-                    .beside(case, (Side::Lower, &tidy), &worths)
+                    .best_within(case, (Side::Lower, &tidy), &worths)
                     .unwrap_or(tidy),
             )
         });
@@ -179,21 +187,25 @@ impl Probability {
                 .collect()
         });
         // Rounding makes boxes simpler, but unrounded values give better slopes.
-        let mut best: Option<Bounded> = None;
+        let mut best: Option<TangentBound> = None;
         for at in guess.iter().chain([&at]) {
             let (touches, slopes) = self.tangents(case.spans, at);
-            match master.solve(case.chosen, case.spans, &self.worths(variables, &slopes)) {
+            match master.solve(
+                case.chosen,
+                case.spans,
+                &self.coefficients(variables, &slopes),
+            ) {
                 Solved::Impossible(proof) => return Outcome::Impossible(proof),
                 Solved::Best {
                     values: corner,
                     worth,
                     proof,
                 } => {
-                    let heights = self.heights(case.spans, (&slopes, &touches));
+                    let heights = self.gap_bounds(case.spans, (&slopes, &touches));
                     let bound = heights.into_iter().sum::<Rational>() + worth;
-                    let bound = enclosed::billionths_above(&bound);
+                    let bound = enclosures::ceil_to_billionth(&bound);
                     if best.as_ref().is_none_or(|known| bound < known.bound) {
-                        best = Some(Bounded {
+                        best = Some(TangentBound {
                             bound,
                             corner,
                             proof,
@@ -209,8 +221,8 @@ impl Probability {
         };
         let values = near.unwrap_or(best.corner);
         // Ends that do not change the probability also move out, beyond this case if possible.
-        let free = InCase { spans: &[], ..case };
-        let filled = master.beside(free, (Side::Lower, &values), &self.even);
+        let free = CaseContext { spans: &[], ..case };
+        let filled = master.best_within(free, (Side::Lower, &values), &self.tie_weights);
         Outcome::Best {
             values: filled.unwrap_or(values),
             bound: best.bound,
@@ -222,7 +234,7 @@ impl Probability {
 
     /// Returns tangents at these values (approximately): the points where they touch, and their
     /// slopes, two for each parameter.
-    fn tangents(&self, spans: &[Span], values: &[Rational]) -> (Vec<Touch>, Vec<Rational>) {
+    fn tangents(&self, spans: &[Span], values: &[Rational]) -> (Vec<TangentPoint>, Vec<Rational>) {
         let mut touches = Vec::new();
         let mut slopes = Vec::new();
         for term in &self.terms {
@@ -230,8 +242,8 @@ impl Probability {
                 let cell = cell(term, spans);
                 let mut at = Self::reach(term, values);
                 match chance {
-                    Chance::Dense(dense) => {
-                        let seen = dense.seen(&term.nominal, &cell)?;
+                    LogConcaveDistribution::Dense(dense) => {
+                        let seen = dense.cut_positions(&term.nominal, &cell)?;
                         let (_, rises) = dense.tangent(&term.nominal, &seen, &at)?;
                         // If nothing increases any more, the point of contact does not matter.
                         let nothing = Rational::new(1, 1_000_000_000_000_000);
@@ -245,21 +257,32 @@ impl Probability {
                         let half = Rational::new(1, 2);
                         let mut slopes = rises.map(|[low, high]| (low + high) * &half);
                         for (slope, seen) in slopes.iter_mut().zip(&seen) {
-                            if let Cut::Open { place, gain } = seen {
+                            if let CutPosition::Open { place, gain } = seen {
                                 *slope += gain.checked_div(place)?;
                             }
                         }
-                        Some((Touch::At(at), slopes.map(|slope| short(&slope))))
+                        Some((
+                            TangentPoint::At(at),
+                            slopes.map(|slope| round_slope(&slope)),
+                        ))
                     }
-                    Chance::Values(_) => {
-                        let soft =
-                            Soft::new(chance, (&term.nominal, &term.scale), &cell, term.ends);
+                    LogConcaveDistribution::Values(_) => {
+                        let soft = LogProbability::new(
+                            chance,
+                            (&term.nominal, &term.scale),
+                            &cell,
+                            term.ends,
+                        );
                         let (mass, slopes) = soft.hull_at(&at)?;
-                        Some((Touch::Mass(mass), slopes.map(|slope| short(&slope))))
+                        Some((
+                            TangentPoint::Mass(mass),
+                            slopes.map(|slope| round_slope(&slope)),
+                        ))
                     }
                 }
             });
-            let (touch, own) = own.unwrap_or((Touch::Nowhere, [Rational::ZERO, Rational::ZERO]));
+            let (touch, own) =
+                own.unwrap_or((TangentPoint::NoContact, [Rational::ZERO, Rational::ZERO]));
             touches.push(touch);
             slopes.extend(own);
         }
@@ -267,7 +290,7 @@ impl Probability {
     }
 
     /// Returns the coefficient of each variable in the tangents.
-    fn worths(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
+    fn coefficients(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
         let mut worths = vec![Rational::ZERO; variables.count()];
         for (term, slopes) in self.terms.iter().zip(slopes.chunks(2)) {
             for (variable, slope) in term.ends.into_iter().zip(slopes) {
@@ -279,7 +302,11 @@ impl Probability {
 
     /// Returns, for each parameter, an upper bound on the difference of the logarithm of its
     /// interval's probability and the linear function with these slopes.
-    fn heights(&self, spans: &[Span], (slopes, touches): (&[Rational], &[Touch])) -> Vec<Rational> {
+    fn gap_bounds(
+        &self,
+        spans: &[Span],
+        (slopes, touches): (&[Rational], &[TangentPoint]),
+    ) -> Vec<Rational> {
         let terms = self.terms.iter().zip(slopes.chunks(2)).zip(touches);
         terms
             .map(|((term, slopes), touch)| {
@@ -288,9 +315,10 @@ impl Probability {
                 };
                 let cell = cell(term, spans);
                 let slopes = [slopes[0].clone(), slopes[1].clone()];
-                let height = chance.height(&term.nominal, &cell, touch, &slopes);
+                let height = chance.gap(&term.nominal, &cell, touch, &slopes);
                 height.unwrap_or_else(|| {
-                    let nowhere = chance.height(&term.nominal, &cell, &Touch::Nowhere, &slopes);
+                    let nowhere =
+                        chance.gap(&term.nominal, &cell, &TangentPoint::NoContact, &slopes);
                     nowhere.unwrap_or_default()
                 })
             })
@@ -299,14 +327,20 @@ impl Probability {
 
     /// Returns the variable and the value to split a case at: the jump with the largest gap between
     /// its partial count and its probability.
-    pub(super) fn divide(&self, spans: &[Span], touches: &[Touch]) -> Option<(usize, Rational)> {
+    pub(super) fn split_point(
+        &self,
+        spans: &[Span],
+        touches: &[TangentPoint],
+    ) -> Option<(usize, Rational)> {
         let mut widest: Option<(f64, usize, Rational)> = None;
         for (term, touch) in self.terms.iter().zip(touches) {
             let Some(chance) = &term.chance else { continue };
             let own = cell(term, spans);
             let place = match chance {
-                Chance::Dense(dense) => open_cut(term, dense, &own, touch),
-                Chance::Values(values) => middle_jump(term, chance, values, &own),
+                LogConcaveDistribution::Dense(dense) => {
+                    largest_partial_cut(term, dense, &own, touch)
+                }
+                LogConcaveDistribution::Values(values) => median_jump(term, chance, values, &own),
             };
             if let Some((gap, side, place)) = place
                 && widest.as_ref().is_none_or(|(known, _, _)| gap > *known)
@@ -320,26 +354,26 @@ impl Probability {
 
 /// Returns the partially counted cut that adds most at the point of contact: the amount, the side,
 /// and the distance.
-fn open_cut(
+fn largest_partial_cut(
     term: &Term,
     dense: &Dense,
     cell: &Cell,
-    touch: &Touch,
+    touch: &TangentPoint,
 ) -> Option<(f64, usize, Rational)> {
     /// Amount that does not prevent the proof that a box is the best.
-    const LITTLE: f64 = 1e-9;
-    let seen = dense.seen(&term.nominal, cell)?;
+    const NEGLIGIBLE_GAIN: f64 = 1e-9;
+    let seen = dense.cut_positions(&term.nominal, cell)?;
     let cuts = seen.into_iter().enumerate().filter_map(|(side, seen)| {
-        let Cut::Open { place, gain } = seen else {
+        let CutPosition::Open { place, gain } = seen else {
             return None;
         };
         let share = match touch {
-            Touch::At(at) => at[side].to_f64() / place.to_f64(),
-            Touch::Mass(_) | Touch::Nowhere => 1.0,
+            TangentPoint::At(at) => at[side].to_f64() / place.to_f64(),
+            TangentPoint::Mass(_) | TangentPoint::NoContact => 1.0,
         };
         let gap = gain.to_f64() * share;
         let near = [&cell.below[0], &cell.above[0]][side];
-        (gap > LITTLE && place > *near).then_some((gap, side, place))
+        (gap > NEGLIGIBLE_GAIN && place > *near).then_some((gap, side, place))
     });
     cuts.max_by(|one, other| one.0.total_cmp(&other.0))
 }
@@ -347,9 +381,9 @@ fn open_cut(
 /// Returns the middle one of the values that only some intervals of a case contain, on the side
 /// with more of them: the range of the logarithm of the probability in the case, the side, and the
 /// distance.
-fn middle_jump(
+fn median_jump(
     term: &Term,
-    chance: &Chance,
+    chance: &LogConcaveDistribution,
     values: &[Rational],
     cell: &Cell,
 ) -> Option<(f64, usize, Rational)> {
@@ -362,7 +396,7 @@ fn middle_jump(
     };
     let (place, _) = longer.get(longer.len() / 2)?;
     let far = [cell.below[1].clone(), cell.above[1].clone()];
-    let [_, most] = chance.mass(&term.nominal, &far);
+    let [_, most] = chance.probability_bounds(&term.nominal, &far);
     // Lower bound for cases with intervals that contain no value.
     let least = steps.center.to_f64().max(1e-12);
     Some(((most.to_f64() / least).ln(), side, place.clone()))
@@ -372,14 +406,14 @@ fn middle_jump(
 fn cell(term: &Term, spans: &[Span]) -> Cell {
     let [below, above] = term.ends.map(|variable| &spans[variable]);
     Cell {
-        below: [below.least.clone(), below.far.clone()],
-        above: [above.least.clone(), above.far.clone()],
+        below: [below.least.clone(), below.objective_max.clone()],
+        above: [above.least.clone(), above.objective_max.clone()],
         is_open: [below.is_open, above.is_open],
     }
 }
 
 /// Rounds a slope to some fourteen digits.
-fn short(slope: &Rational) -> Rational {
+fn round_slope(slope: &Rational) -> Rational {
     let grid = power_of_ten(&(slope * &Rational::new(1, 10_000_000_000_000)));
     if slope.is_positive() {
         (slope / &grid).ceil() * grid

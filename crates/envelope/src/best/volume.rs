@@ -10,14 +10,14 @@
 
 use std::ops::ControlFlow;
 
-use elbowroom_num::{Rational, enclosed};
+use elbowroom_num::{Rational, enclosures};
 use elbowroom_plan::{ParametrizedPlan, Side};
 
-use super::approach::{InCase, guess, power_of_ten, tidied};
 use super::barrier::Concave;
-use super::goal::Outcome;
+use super::concave_maximum::{CaseContext, approximate_optimum, power_of_ten, shorten_digits};
 use super::master::{Master, Solved};
-use super::{Source, Variables};
+use super::objective::Outcome;
+use super::{BoundSource, Variables};
 
 /// One parameter.
 struct Width {
@@ -28,7 +28,7 @@ struct Width {
 }
 
 /// Sources of bounds, each with its multiplier.
-type Proof = Vec<(Source, Rational)>;
+type Proof = Vec<(BoundSource, Rational)>;
 
 /// `Σ weight · ln(width / scale + foot)`.
 pub(super) struct Volume {
@@ -39,7 +39,7 @@ pub(super) struct Volume {
 
 /// Returns the constant added to each width, relative to its scale, before the product is computed:
 /// a millionth. It makes boxes with an interval of width 0 comparable.
-pub fn foot() -> Rational {
+pub fn width_offset() -> Rational {
     Rational::new(1, 1_000_000)
 }
 
@@ -72,21 +72,21 @@ impl Volume {
     }
 
     /// Returns the widths relative to their scales, each with the constant [`foot`] added.
-    fn footed<'a>(&'a self, values: &'a [Rational]) -> impl Iterator<Item = Rational> + 'a {
+    fn offset_widths<'a>(&'a self, values: &'a [Rational]) -> impl Iterator<Item = Rational> + 'a {
         self.widths.iter().map(|width| {
             let own = width.variables.iter();
             let sum: Rational = own
                 .map(|(v, count)| &values[*v] * &Rational::from(*count))
                 .sum();
-            sum / &width.scale + foot()
+            sum / &width.scale + width_offset()
         })
     }
 
     /// Returns bounds on the value of a box.
-    fn enclosed(&self, values: &[Rational]) -> [Rational; 2] {
+    fn value_bounds(&self, values: &[Rational]) -> [Rational; 2] {
         let mut sums = [Rational::ZERO, Rational::ZERO];
-        for (width, footed) in self.widths.iter().zip(self.footed(values)) {
-            let bounds = enclosed::ln(&footed).expect("a width that is not negative, and a foot");
+        for (width, footed) in self.widths.iter().zip(self.offset_widths(values)) {
+            let bounds = enclosures::ln(&footed).expect("a width that is not negative, and a foot");
             for (sum, bound) in sums.iter_mut().zip(bounds) {
                 *sum += bound * &width.weight;
             }
@@ -95,49 +95,51 @@ impl Volume {
     }
 
     /// Returns the value of a box, rounded down to a billionth.
-    pub(super) fn worth(&self, values: &[Rational]) -> Rational {
-        enclosed::billionths_below(&self.enclosed(values)[0])
+    pub(super) fn lower_value(&self, values: &[Rational]) -> Rational {
+        enclosures::floor_to_billionth(&self.value_bounds(values)[0])
     }
 
     /// Returns the value of a box, rounded up to a billionth.
-    pub(super) fn most(&self, values: &[Rational]) -> Rational {
-        enclosed::billionths_above(&self.enclosed(values)[1])
+    pub(super) fn upper_value(&self, values: &[Rational]) -> Rational {
+        enclosures::ceil_to_billionth(&self.value_bounds(values)[1])
     }
 
     pub(super) fn solve(
         &self,
         master: &mut Master,
         variables: &Variables,
-        case: InCase<'_>,
+        case: CaseContext<'_>,
         flow: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Outcome {
-        let InCase { chosen, known, .. } = case;
+        let CaseContext { chosen, known, .. } = case;
         let mut is_over = false;
         let mut goes_on = || {
             let flow = flow();
             is_over |= flow.is_break();
             flow
         };
-        let guess = guess(&InScale(self), master, variables, case, &mut goes_on);
+        let guess = approximate_optimum(&ScaledVolume(self), master, variables, case, &mut goes_on);
         if is_over {
             return Outcome::Unknown;
         }
         let guess = guess.unwrap_or_else(|| known.to_vec());
         let near = self.slopes(&guess);
-        let worths = self.worths(variables, &near);
-        let values = master.beside(case, (Side::Upper, &guess), &worths);
+        let worths = self.coefficients(variables, &near);
+        let values = master.best_within(case, (Side::Upper, &guess), &worths);
         let values = values.map(|values| {
-            let values = tidied(values, master, variables, case, &|own| self.worth(own));
+            let values = shorten_digits(values, master, variables, case, &|own| {
+                self.lower_value(own)
+            });
             // Fills the room that rounding has left, and moves variables that do not change the
             // objective.
-            let filled = master.beside(case, (Side::Lower, &values), &worths);
+            let filled = master.best_within(case, (Side::Lower, &values), &worths);
             filled.unwrap_or(values)
         });
         // Rounding makes boxes simpler, but unrounded values give better slopes.
         let rounded = values.as_ref().map(|values| self.slopes(values));
         let mut best: Option<(Rational, Vec<Rational>, Proof, Vec<Rational>)> = None;
         for slopes in std::iter::once(near).chain(rounded) {
-            match master.solve(chosen, &[], &self.worths(variables, &slopes)) {
+            match master.solve(chosen, &[], &self.coefficients(variables, &slopes)) {
                 Solved::Impossible(proof) => return Outcome::Impossible(proof),
                 Solved::Best {
                     values: corner,
@@ -168,16 +170,20 @@ impl Volume {
     fn bound(&self, slopes: &[Rational], sum: Rational) -> Rational {
         let heights = self.widths.iter().zip(slopes).filter_map(|(width, slope)| {
             let touches = width.weight.checked_div(&(slope * &width.scale))?;
-            let [_, above] = enclosed::ln(&touches)?;
-            let foot = foot() * &width.scale * slope;
+            let [_, above] = enclosures::ln(&touches)?;
+            let foot = width_offset() * &width.scale * slope;
             Some((above - Rational::ONE) * &width.weight + foot)
         });
-        enclosed::billionths_above(&(heights.sum::<Rational>() + sum))
+        enclosures::ceil_to_billionth(&(heights.sum::<Rational>() + sum))
     }
 
     /// Returns the slope of each parameter's tangent at these values.
     fn slopes(&self, values: &[Rational]) -> Vec<Rational> {
-        let all = self.widths.iter().zip(&self.grids).zip(self.footed(values));
+        let all = self
+            .widths
+            .iter()
+            .zip(&self.grids)
+            .zip(self.offset_widths(values));
         all.map(|((width, grid), footed)| {
             let slope = width.weight.checked_div(&(footed * &width.scale));
             let steps = slope.and_then(|slope| slope.checked_div(grid));
@@ -187,7 +193,7 @@ impl Volume {
     }
 
     /// Returns the coefficient of each variable in the tangents.
-    fn worths(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
+    fn coefficients(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
         let mut worths = vec![Rational::ZERO; variables.count()];
         for (width, slope) in self.widths.iter().zip(slopes) {
             for (variable, count) in &width.variables {
@@ -199,16 +205,16 @@ impl Volume {
 }
 
 /// The same objective for values relative to their scales, in floating-point numbers.
-struct InScale<'a>(&'a Volume);
+struct ScaledVolume<'a>(&'a Volume);
 
-impl InScale<'_> {
+impl ScaledVolume<'_> {
     fn terms<'a>(&'a self, at: &'a [f64]) -> impl Iterator<Item = (&'a Width, f64, f64)> + 'a {
         self.0.widths.iter().map(|width| {
             let own = width.variables.iter();
             let sum: f64 = own
                 .map(|(variable, count)| at[*variable] * ends(*count))
                 .sum();
-            (width, width.weight.to_f64(), sum + foot().to_f64())
+            (width, width.weight.to_f64(), sum + width_offset().to_f64())
         })
     }
 }
@@ -217,7 +223,7 @@ fn ends(count: i64) -> f64 {
     if count == 1 { 1.0 } else { 2.0 }
 }
 
-impl Concave for InScale<'_> {
+impl Concave for ScaledVolume<'_> {
     fn derive(&self, at: &[f64], gradient: &mut [f64], curvature: &mut [Vec<f64>]) -> f64 {
         let mut value = 0.0;
         for (width, weight, footed) in self.terms(at) {

@@ -12,7 +12,7 @@ use super::{ExactError, RegionSource};
 /// Number of half-spaces above which redundant ones are removed during elimination.
 const MANY_ROWS: usize = 64;
 /// The limit on half-spaces.
-const MOST_ROWS: usize = 512;
+const MAX_ROWS: usize = 512;
 
 /// `Σ factor · coordinate <= bound`, or `<` when strict.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,7 +96,7 @@ pub(super) struct Polyhedron {
     /// For each row, `true` if it is known to be irredundant.
     is_needed: Vec<bool>,
     /// `true` if some row without coordinates cannot hold.
-    is_absurd: bool,
+    is_empty: bool,
 }
 
 impl Polyhedron {
@@ -113,7 +113,7 @@ impl Polyhedron {
     /// Adds a row. The caller guarantees that the rows marked as needed stay needed.
     fn add(&mut self, row: Halfspace) {
         if row.factors.is_empty() {
-            self.is_absurd |= row.bound.is_negative() || (row.bound.is_zero() && row.is_strict);
+            self.is_empty |= row.bound.is_negative() || (row.bound.is_zero() && row.is_strict);
             return;
         }
         let row = row.normalized();
@@ -151,7 +151,7 @@ impl Polyhedron {
 
     /// Returns `true` if the polyhedron is not empty.
     pub(super) fn is_feasible(&self) -> bool {
-        !self.is_absurd && Program::new(&self.rows).is_feasible(|_| Some(false))
+        !self.is_empty && Program::new(&self.rows).is_feasible(|_| Some(false))
     }
 
     /// Eliminates the coordinates below `count`.
@@ -162,14 +162,14 @@ impl Polyhedron {
     ) -> Result<Self, ExactError> {
         while let Some(coordinate) = self.cheapest(count) {
             if flow().is_break() {
-                return Err(ExactError::Ended);
+                return Err(ExactError::Stopped);
             }
             self.eliminate(coordinate);
             if self.rows.len() > MANY_ROWS {
                 self.reduce(flow)?;
             }
-            if self.rows.len() > MOST_ROWS {
-                return Err(ExactError::TooManyRows { limit: MOST_ROWS });
+            if self.rows.len() > MAX_ROWS {
+                return Err(ExactError::TooManyRows { limit: MAX_ROWS });
             }
         }
         Ok(self)
@@ -254,7 +254,7 @@ impl Polyhedron {
         &mut self,
         flow: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<(), ExactError> {
-        if self.is_absurd {
+        if self.is_empty {
             return Ok(());
         }
         let mut program = Program::new(&self.rows);
@@ -266,7 +266,7 @@ impl Polyhedron {
         order.sort_by_key(|&index| std::cmp::Reverse(self.rows[index].sources.len()));
         for candidate in order {
             if flow().is_break() {
-                return Err(ExactError::Ended);
+                return Err(ExactError::Stopped);
             }
             let needed = program.is_feasible(|index| {
                 if index == candidate {
@@ -283,12 +283,12 @@ impl Polyhedron {
     }
 
     /// Returns the difference of this polyhedron and another one, in disjoint parts.
-    pub(super) fn minus(self, other: &Self) -> Vec<Self> {
+    pub(super) fn subtract(self, other: &Self) -> Vec<Self> {
         let mut common = self.clone();
         for row in &other.rows {
             common.push(row.clone());
         }
-        if other.is_absurd || !common.is_feasible() {
+        if other.is_empty || !common.is_feasible() {
             return vec![self];
         }
         let mut parts = Vec::new();

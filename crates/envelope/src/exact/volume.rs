@@ -15,7 +15,7 @@ use super::{Piece, Region, RegionRow};
 
 /// Part of a region inside a box, as products of components with few parameters each.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Body {
+pub struct BoundedRegion {
     /// The components of each piece; its volume is the product of theirs.
     pub pieces: Vec<Vec<Component>>,
 }
@@ -34,12 +34,12 @@ impl Region {
     pub fn extent(&self, parameters: usize) -> Vec<Interval> {
         let mut extent: Vec<Option<Interval>> = vec![None; parameters];
         for piece in &self.pieces {
-            let mut program = Extremes::new(piece, parameters);
+            let mut program = ParameterRanges::new(piece, parameters);
             for (index, own) in extent.iter_mut().enumerate() {
-                let found = program.of(index);
+                let found = program.range_of(index);
                 *own = Some(match own.take() {
                     None => found,
-                    Some(before) => around(&before, &found),
+                    Some(before) => hull(&before, &found),
                 });
             }
         }
@@ -49,16 +49,16 @@ impl Region {
 
     /// Returns the part of the region inside a frame, `[lower, upper]` of each parameter. The
     /// distinction of open and closed sides does not matter for volumes, and is dropped.
-    pub fn body(&self, frame: &[(Rational, Rational)]) -> Body {
+    pub fn body(&self, frame: &[(Rational, Rational)]) -> BoundedRegion {
         let pieces = self.pieces.iter().map(|piece| components(piece, frame));
-        Body {
+        BoundedRegion {
             pieces: pieces.collect(),
         }
     }
 }
 
 /// Returns the smallest interval around two.
-fn around(one: &Interval, two: &Interval) -> Interval {
+fn hull(one: &Interval, two: &Interval) -> Interval {
     let lower = match (one.lower.value(), two.lower.value()) {
         (Some(a), Some(b)) => End::Closed(a.min(b).clone()),
         _ => End::Infinite,
@@ -71,12 +71,12 @@ fn around(one: &Interval, two: &Interval) -> Interval {
 }
 
 /// Linear program for the range of each parameter in a piece.
-struct Extremes {
+struct ParameterRanges {
     simplex: Simplex,
     variables: Vec<VariableId>,
 }
 
-impl Extremes {
+impl ParameterRanges {
     fn new(piece: &Piece, parameters: usize) -> Self {
         let mut simplex = Simplex::new();
         let variables: Vec<VariableId> = (0..parameters).map(|_| simplex.add_variable()).collect();
@@ -91,7 +91,7 @@ impl Extremes {
         Self { simplex, variables }
     }
 
-    fn of(&mut self, index: usize) -> Interval {
+    fn range_of(&mut self, index: usize) -> Interval {
         let mut furthest = |sign: i64| {
             let sign = Rational::from(sign);
             let objective = [(self.variables[index], sign.clone())];
@@ -218,7 +218,7 @@ type Rows = Vec<(Vec<Rational>, Rational)>;
 
 fn volume(dimension: usize, rows: Rows, go_on: &mut dyn FnMut() -> Option<()>) -> Option<Rational> {
     go_on()?;
-    let Some(rows) = needed(dimension, rows) else {
+    let Some(rows) = irredundant_rows(dimension, rows) else {
         return Some(Rational::ZERO);
     };
     if dimension == 1 {
@@ -266,7 +266,7 @@ fn substituted(rows: &Rows, side: usize, pivot: usize) -> Rows {
 
 /// Returns the rows that the bounds of single coordinates do not imply, each direction once; `None`
 /// if nothing satisfies them.
-fn needed(dimension: usize, rows: Rows) -> Option<Rows> {
+fn irredundant_rows(dimension: usize, rows: Rows) -> Option<Rows> {
     let mut kept: Rows = Vec::with_capacity(rows.len());
     for (mut factors, mut bound) in rows {
         let Some(first) = factors.iter().find(|factor| !factor.is_zero()) else {
@@ -352,7 +352,7 @@ mod tests {
         || ControlFlow::Continue(())
     }
 
-    fn whole(numbers: &[i64]) -> Vec<Rational> {
+    fn integers(numbers: &[i64]) -> Vec<Rational> {
         numbers
             .iter()
             .map(|number| Rational::from(*number))
@@ -364,12 +364,12 @@ mod tests {
         for place in 0..dimension {
             let mut unit = vec![0; dimension];
             unit[place] = -1;
-            all.push((whole(&unit), Rational::ZERO));
+            all.push((integers(&unit), Rational::ZERO));
             unit[place] = 1;
-            all.push((whole(&unit), Rational::from(most)));
+            all.push((integers(&unit), Rational::from(most)));
         }
         for (factors, bound) in rows {
-            all.push((whole(factors), Rational::from(*bound)));
+            all.push((integers(factors), Rational::from(*bound)));
         }
         Component {
             parameters: (0..dimension).map(ParameterId::from).collect(),
@@ -378,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_simplices_and_their_differences_have_the_volume_that_one_knows() {
+    fn volumes_of_boxes_and_simplices_are_exact() {
         let on = &mut unlimited();
         let mut volume = |component: Component| component.volume(1_000_000, on).expect("few sides");
         assert_eq!(volume(component(5, 3, &[])), Rational::from(243));
@@ -418,7 +418,7 @@ mod tests {
         /// The volume of a body is the sum of the volumes of its two parts along a line, and lies
         /// between the counts of the small cubes inside it and around it.
         #[test]
-        fn the_volume_is_that_of_its_parts_and_between_counts_of_cubes(
+        fn volume_is_additive_and_between_cube_counts(
             rows in prop::collection::vec((prop::array::uniform3(-2_i64..3), -2_i64..9), 0..4),
             cut in (prop::array::uniform3(-2_i64..3), -3_i64..9),
         ) {

@@ -16,11 +16,11 @@ use elbowroom_stn::{ConsistentNetwork, Constraint, Network, NodeId as ClassId};
 
 use super::Feasibility;
 use crate::cycles::Role;
-use crate::proved::{ScheduleCase, TimeRule};
+use crate::proof::{ScheduleCase, TimeRule};
 use crate::reduction::{Edge, Reduction};
 
 /// Limit on parameters with both ends examined.
-const MOST_SPLITS: usize = 6;
+const MAX_SPLITS: usize = 6;
 
 impl Feasibility {
     /// Returns rules for all values in a box with a schedule for each value; `None` if there are
@@ -33,7 +33,7 @@ impl Feasibility {
         let all = (0..self.roles.len()).map(ParameterId::from);
         let role = |id: &ParameterId| self.roles[id.index()];
         let splits: Vec<ParameterId> = all.filter(|id| role(id) == Role::Both).collect();
-        if splits.len() > MOST_SPLITS {
+        if splits.len() > MAX_SPLITS {
             return None;
         }
         let mut cases = Vec::new();
@@ -124,7 +124,7 @@ impl Feasibility {
             })
             .collect();
         for (parameter, side) in moving {
-            let moves = self.moved_by(parameter, side);
+            let moves = self.moves_with(parameter, side);
             for (class, rule) in classes.iter_mut().enumerate() {
                 // Times are relative to time zero.
                 let factor = i64::from(moves[class]) - i64::from(moves[0]);
@@ -136,7 +136,7 @@ impl Feasibility {
             }
         }
         let rules = (0..reduction.node_count()).map(|node| {
-            let (class, offset) = reduction.place(NodeId::from(node));
+            let (class, offset) = reduction.class_of(NodeId::from(node));
             let mut rule = classes[class.index()].clone();
             rule.constant += &offset;
             rule
@@ -146,7 +146,7 @@ impl Feasibility {
 
     /// Returns, for each class, `true` if it moves with a parameter that is a difference of times,
     /// as its value moves away from that end.
-    fn moved_by(&self, parameter: ParameterId, side: Side) -> Vec<bool> {
+    fn moves_with(&self, parameter: ParameterId, side: Side) -> Vec<bool> {
         let mut moves = vec![false; self.class_count];
         let is_own = |edge: &&Edge| edge.end.is_some_and(|end| end.parameter == parameter);
         let own = |wanted: Side| {

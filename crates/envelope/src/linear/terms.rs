@@ -35,7 +35,7 @@ impl<K: Copy + Ord> Terms<K> {
 
     /// Returns the coefficient, if there is one.
     pub fn get(&self, key: K) -> Option<&Rational> {
-        self.place(key).ok().map(|place| &self.0[place].1)
+        self.position_of(key).ok().map(|place| &self.0[place].1)
     }
 
     /// Returns the keys, in order.
@@ -53,7 +53,7 @@ impl<K: Copy + Ord> Terms<K> {
         if coefficient.is_zero() {
             return;
         }
-        match self.place(key) {
+        match self.position_of(key) {
             Ok(place) => {
                 let own = &mut self.0[place].1;
                 *own += coefficient;
@@ -72,7 +72,7 @@ impl<K: Copy + Ord> Terms<K> {
 
     /// Removes a coefficient and returns it.
     pub(crate) fn remove(&mut self, key: K) -> Option<Rational> {
-        let place = self.place(key).ok()?;
+        let place = self.position_of(key).ok()?;
         Some(self.0.remove(place).1)
     }
 
@@ -83,7 +83,7 @@ impl<K: Copy + Ord> Terms<K> {
 
     /// Returns the position of a key, or the position to insert it at. Most keys are appended at
     /// the end.
-    fn place(&self, key: K) -> Result<usize, usize> {
+    fn position_of(&self, key: K) -> Result<usize, usize> {
         if self.0.last().is_none_or(|(last, _)| *last < key) {
             return Err(self.0.len());
         }

@@ -1,8 +1,8 @@
 //! Symbolic execution of a plan.
 
+mod autonomous;
 mod changes;
 mod guards;
-mod nature;
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,11 +11,11 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Body, Condition, Expression, SnapAction};
 
+use autonomous::{AutonomousModel, Occurrence};
 use changes::record;
 use guards::{GuardId, GuardPart, effects};
-use nature::{Nature, Occurrence};
 
-use super::dnf::{Alternatives, Wanted, compared};
+use super::dnf::{Alternatives, WantedTruth, compared};
 use super::goal::goal_cases;
 use super::over_all::{Happenings, literal_cases};
 use super::precedence::Precedence;
@@ -30,7 +30,7 @@ use elbowroom_plan::{
 };
 
 /// Limit on combinations of outcomes of conditional effects.
-const MOST_RUNS: usize = 256;
+const MAX_RUNS: usize = 256;
 
 impl Obligations {
     /// Compiles all obligations of a plan.
@@ -64,7 +64,7 @@ impl Obligations {
             order,
             open: open.collect(),
             substitution,
-            nature: Nature::of(task, plan, (nominal, around))?,
+            autonomous: AutonomousModel::collect(task, plan, (nominal, around))?,
         };
         let mut runs = vec![Run {
             position: 0,
@@ -74,14 +74,14 @@ impl Obligations {
         }];
         let mut finished = 0;
         while let Some(run) = runs.pop() {
-            match compiler.follow(run, &mut obligations)? {
+            match compiler.simulate(run, &mut obligations)? {
                 Progress::Finished => finished += 1,
                 Progress::Split(more) => runs.extend(more),
             }
-            if finished + runs.len() > MOST_RUNS {
+            if finished + runs.len() > MAX_RUNS {
                 return Err(Refusal::TooManyCases {
                     place: "conditional effects".to_owned(),
-                    limit: MOST_RUNS,
+                    limit: MAX_RUNS,
                 });
             }
         }
@@ -118,21 +118,21 @@ struct Compiler<'a> {
     open: BTreeSet<InstanceId>,
     substitution: Arc<Substitution>,
     /// Processes, events and constraints on all states, if there are any.
-    nature: Option<Nature>,
+    autonomous: Option<AutonomousModel>,
 }
 
 impl Compiler<'_> {
-    fn follow(&self, mut run: Run, obligations: &mut Obligations) -> Result<Progress, Refusal> {
+    fn simulate(&self, mut run: Run, obligations: &mut Obligations) -> Result<Progress, Refusal> {
         while let Some(&node) = self.order.get(run.position) {
             if let Some(split) = self.decide_guards(&mut run, node, obligations)? {
-                if self.nature.is_some() {
+                if self.autonomous.is_some() {
                     return Err(self.guard_depends(node));
                 }
                 return Ok(Progress::Split(split));
             }
-            self.happen(&mut run, node, obligations)?;
-            if let Some(nature) = &self.nature {
-                self.pass(nature, &mut run, obligations)?;
+            self.apply_happening(&mut run, node, obligations)?;
+            if let Some(nature) = &self.autonomous {
+                self.advance(nature, &mut run, obligations)?;
             }
             run.position += 1;
         }
@@ -141,7 +141,7 @@ impl Compiler<'_> {
     }
 
     /// Adds the requirements of the happening at a node, and applies its changes.
-    fn happen(
+    fn apply_happening(
         &self,
         run: &mut Run,
         node: NodeId,
@@ -217,12 +217,12 @@ impl Compiler<'_> {
         for condition in snap.condition.conjuncts() {
             let broken = self
                 .reading(&run.timeline, node)
-                .alternatives(condition, Wanted::NotTrue)?;
+                .alternatives(condition, WantedTruth::NotTrue)?;
             let requirement = Requirement::Condition {
                 node,
                 condition: condition.clone(),
             };
-            oblige(obligations, requirement, &run.timeline, broken);
+            add_obligation(obligations, requirement, &run.timeline, broken);
         }
         Ok(())
     }
@@ -271,7 +271,7 @@ impl Compiler<'_> {
                 instance,
                 constraint: Some(index),
             };
-            oblige(obligations, requirement, &run.timeline, broken);
+            add_obligation(obligations, requirement, &run.timeline, broken);
         }
         Ok(())
     }
@@ -293,7 +293,7 @@ impl Compiler<'_> {
             for condition in body.over_all.conjuncts() {
                 // Conditions that depend on nature were compiled during the symbolic run.
                 if self
-                    .nature
+                    .autonomous
                     .as_ref()
                     .is_some_and(|nature| nature.changes(self.task, condition))
                 {
@@ -355,14 +355,14 @@ impl Compiler<'_> {
             moment: node,
             action,
             substitution: &self.substitution,
-            place,
+            location: place,
             derived: OnceCell::new(),
         }
     }
 }
 
 /// Adds an obligation unless it cannot be violated.
-fn oblige(
+fn add_obligation(
     obligations: &mut Obligations,
     requirement: Requirement,
     timeline: &Timeline,

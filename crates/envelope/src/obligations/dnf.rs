@@ -11,14 +11,14 @@ use crate::linear::Linear;
 pub(crate) type Alternatives = Vec<Vec<Inequality>>;
 
 /// Limit on the alternatives of a condition.
-const MOST_ALTERNATIVES: usize = 4096;
+const MAX_ALTERNATIVES: usize = 4096;
 
 /// Wanted truth value of a condition.
 ///
 /// A comparison with an undefined number is neither true nor false (silent), and so are the
 /// conditions around it, unless their other parts decide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wanted {
+pub(crate) enum WantedTruth {
     /// It is true.
     True,
     /// It is false.
@@ -29,7 +29,7 @@ pub(crate) enum Wanted {
     NotFalse,
 }
 
-impl Wanted {
+impl WantedTruth {
     fn negated(self) -> Self {
         match self {
             Self::True => Self::False,
@@ -49,7 +49,7 @@ impl Reading<'_> {
     pub(crate) fn alternatives(
         &self,
         condition: &Condition,
-        wanted: Wanted,
+        wanted: WantedTruth,
     ) -> Result<Alternatives, Refusal> {
         let is_positive = wanted.is_positive();
         match condition {
@@ -65,19 +65,19 @@ impl Reading<'_> {
     }
 
     /// Returns the alternatives that make the condition neither true nor false.
-    pub(crate) fn silent(&self, condition: &Condition) -> Result<Alternatives, Refusal> {
+    pub(crate) fn undefined_cases(&self, condition: &Condition) -> Result<Alternatives, Refusal> {
         let mut expressions = Vec::new();
         condition.visit_expressions(&mut |expression| expressions.push(expression.clone()));
         for expression in &expressions {
             if self.linear(expression)?.is_none() {
                 let opposite = Condition::Not(Box::new(condition.clone()));
-                return self.all(&[condition.clone(), opposite], Wanted::NotTrue);
+                return self.all(&[condition.clone(), opposite], WantedTruth::NotTrue);
             }
         }
         Ok(Vec::new())
     }
 
-    fn any(&self, parts: &[Condition], wanted: Wanted) -> Result<Alternatives, Refusal> {
+    fn any(&self, parts: &[Condition], wanted: WantedTruth) -> Result<Alternatives, Refusal> {
         let mut alternatives = Vec::new();
         for part in parts {
             alternatives.extend(self.alternatives(part, wanted)?);
@@ -89,7 +89,7 @@ impl Reading<'_> {
         Ok(alternatives)
     }
 
-    fn all(&self, parts: &[Condition], wanted: Wanted) -> Result<Alternatives, Refusal> {
+    fn all(&self, parts: &[Condition], wanted: WantedTruth) -> Result<Alternatives, Refusal> {
         let mut product: Alternatives = vec![Vec::new()];
         for part in parts {
             let alternatives = self.alternatives(part, wanted)?;
@@ -110,10 +110,10 @@ impl Reading<'_> {
     }
 
     fn check_size(&self, alternatives: &Alternatives) -> Result<(), Refusal> {
-        if alternatives.len() > MOST_ALTERNATIVES {
+        if alternatives.len() > MAX_ALTERNATIVES {
             return Err(Refusal::TooManyCases {
-                place: self.place.to_owned(),
-                limit: MOST_ALTERNATIVES,
+                place: self.location.to_owned(),
+                limit: MAX_ALTERNATIVES,
             });
         }
         Ok(())
@@ -124,12 +124,12 @@ impl Reading<'_> {
         comparison: Comparison,
         left: &Expression,
         right: &Expression,
-        wanted: Wanted,
+        wanted: WantedTruth,
     ) -> Result<Alternatives, Refusal> {
         let (Some(left), Some(right)) = (self.linear(left)?, self.linear(right)?) else {
             return Ok(always_if(matches!(
                 wanted,
-                Wanted::NotTrue | Wanted::NotFalse
+                WantedTruth::NotTrue | WantedTruth::NotFalse
             )));
         };
         Ok(compared(comparison, &left, &right, wanted.is_positive()))
@@ -163,11 +163,14 @@ pub(crate) fn compared(
         (Comparison::Equal, true) => vec![[below(false), above(false)].concat()],
         (Comparison::Equal, false) => vec![below(true), above(true)],
     };
-    alternatives.into_iter().filter_map(settled).collect()
+    alternatives
+        .into_iter()
+        .filter_map(drop_constants)
+        .collect()
 }
 
 /// Drops inequalities between constants that hold. Returns `None` if one does not.
-pub(crate) fn settled(mut conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
+pub(crate) fn drop_constants(mut conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
     let is_broken = |inequality: &Inequality| {
         let value = inequality.expression.as_constant();
         value.is_some_and(|value| value.is_positive() || (value.is_zero() && inequality.is_strict))

@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use elbowroom_model::Task;
 use elbowroom_model::ground::Condition;
 
-use super::dnf::Wanted;
+use super::dnf::WantedTruth;
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Refusal, Substitution};
 use elbowroom_plan::NodeId;
@@ -29,10 +29,10 @@ pub(super) fn goal_cases(
         moment: NodeId::ZERO,
         action: None,
         substitution,
-        place: "goal",
+        location: "goal",
         derived: OnceCell::new(),
     };
-    let broken = reading.alternatives(condition, Wanted::NotTrue)?;
+    let broken = reading.alternatives(condition, WantedTruth::NotTrue)?;
     let cases = broken.into_iter().map(|inequalities| BadCase {
         differences: Vec::new(),
         inequalities: [&timeline.assumptions[..], &inequalities].concat(),

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, FactId, FluentId};
 
-use super::dnf::{Alternatives, Wanted};
+use super::dnf::{Alternatives, WantedTruth};
 use super::precedence::Precedence;
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Inequality, Refusal, Substitution};
@@ -37,14 +37,14 @@ pub struct OverAll {
     /// Facts that the condition reads.
     facts: Vec<FactId>,
     fluents: Vec<FluentId>,
-    near: Near,
+    near: NearbyEvents,
     all: Arc<Happenings>,
 }
 
 /// Possible places of a moment among the events, provided that the parameters' values are in their
 /// ranges, and all interfering happenings keep their order.
 #[derive(Clone, Debug)]
-struct Near {
+struct NearbyEvents {
     /// The events that can be on either side of it, in nominal order.
     events: Vec<NodeId>,
     /// The changes by these events, and by past ones.
@@ -77,7 +77,7 @@ impl OverAll {
         let (facts, fluents) = (Vec::from_iter(facts), Vec::from_iter(fluents));
         let (start, end) = (plan.start(instance), plan.end(instance));
         let mut around = all.precedence.around(start, end);
-        let (timeline, open) = all.timeline.near((&facts, &fluents), &mut around);
+        let (timeline, open) = all.timeline.relevant_part((&facts, &fluents), &mut around);
         Self {
             instance,
             start,
@@ -87,7 +87,7 @@ impl OverAll {
             moment: NodeId::from(plan.nodes.len()),
             facts,
             fluents,
-            near: Near {
+            near: NearbyEvents {
                 events: all.precedence.in_order(open),
                 timeline,
             },
@@ -140,10 +140,10 @@ impl OverAll {
             moment: self.moment,
             action: Some((self.start, self.end)),
             substitution: &self.all.substitution,
-            place: &plan.instance(self.instance).action.name,
+            location: &plan.instance(self.instance).action.name,
             derived: OnceCell::new(),
         };
-        reading.alternatives(&self.condition, Wanted::NotTrue)
+        reading.alternatives(&self.condition, WantedTruth::NotTrue)
     }
 }
 

@@ -99,7 +99,7 @@ impl Around<'_> {
     pub(super) fn side(&mut self, node: NodeId) -> Option<Side> {
         let ranks = self.ranks;
         let rank = ranks[node.index()];
-        if self.is_early(node) {
+        if self.is_not_after_start(node) {
             let happened = &mut self.happened;
             while let Some(&(own, next)) = happened.open.last()
                 && own >= rank
@@ -122,7 +122,7 @@ impl Around<'_> {
     }
 
     /// Returns `true` if the node comes no later than the action's start in the reference schedule.
-    pub(super) fn is_early(&self, node: NodeId) -> bool {
+    pub(super) fn is_not_after_start(&self, node: NodeId) -> bool {
         self.ranks[node.index()] <= self.ranks[self.start.index()]
     }
 }

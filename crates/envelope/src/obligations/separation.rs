@@ -98,7 +98,7 @@ fn nearest(candidates: &BTreeSet<usize>, links: &[Vec<usize>]) -> Vec<usize> {
 
 /// Kind of access of a happening to a fact or fluent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Use {
+enum Access {
     Read,
     /// A fact becomes true; a fluent is shifted.
     Add,
@@ -114,19 +114,19 @@ enum Use {
 /// all other pairs interfere. So users form blocks. Each user interferes with all users of the
 /// previous block, and transitively with all earlier ones that are not of its own kind.
 #[derive(Clone, Debug, Default)]
-struct Blocks {
+struct AccessBlocks {
     previous: Vec<usize>,
     last: Vec<usize>,
     /// The common kind of access in the last block, if its users are compatible.
-    together: Option<Use>,
+    together: Option<Access>,
 }
 
-impl Blocks {
+impl AccessBlocks {
     /// Adds a user. Returns the earlier users that it interferes with, except those that precede
     /// these transitively.
-    fn add(&mut self, position: usize, uses: &[Use]) -> &[usize] {
+    fn add(&mut self, position: usize, uses: &[Access]) -> &[usize] {
         let together = match uses {
-            [Use::Assign] => None,
+            [Access::Assign] => None,
             [only] => Some(*only),
             _ => None,
         };
@@ -142,30 +142,30 @@ impl Blocks {
 /// Finds interfering happenings through an index of the facts and fluents they use.
 #[derive(Default)]
 struct Neighbours {
-    facts: BTreeMap<FactId, Blocks>,
-    fluents: BTreeMap<FluentId, Blocks>,
+    facts: BTreeMap<FactId, AccessBlocks>,
+    fluents: BTreeMap<FluentId, AccessBlocks>,
 }
 
 impl Neighbours {
     /// Returns the earlier positions that this one interferes with, except those connected through
     /// others.
     fn before(&mut self, position: usize, footprint: &Footprint) -> BTreeSet<usize> {
-        let mut facts: BTreeMap<FactId, Vec<Use>> = BTreeMap::new();
+        let mut facts: BTreeMap<FactId, Vec<Access>> = BTreeMap::new();
         let of_facts = [
-            (&footprint.reads, Use::Read),
-            (&footprint.adds, Use::Add),
-            (&footprint.deletes, Use::Delete),
+            (&footprint.reads, Access::Read),
+            (&footprint.adds, Access::Add),
+            (&footprint.deletes, Access::Delete),
         ];
         for (used, own) in of_facts {
             for &fact in used {
                 facts.entry(fact).or_default().push(own);
             }
         }
-        let mut fluents: BTreeMap<FluentId, Vec<Use>> = BTreeMap::new();
+        let mut fluents: BTreeMap<FluentId, Vec<Access>> = BTreeMap::new();
         let of_fluents = [
-            (&footprint.reads_fluents, Use::Read),
-            (&footprint.shifts, Use::Add),
-            (&footprint.assigns, Use::Assign),
+            (&footprint.reads_fluents, Access::Read),
+            (&footprint.shifts, Access::Add),
+            (&footprint.assigns, Access::Assign),
         ];
         for (used, own) in of_fluents {
             for &fluent in used {

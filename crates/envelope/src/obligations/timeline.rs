@@ -55,7 +55,7 @@ pub(crate) struct Reading<'a> {
     /// Parameters that are differences of times.
     pub(crate) substitution: &'a Substitution,
     /// Location, for messages.
-    pub(crate) place: &'a str,
+    pub(crate) location: &'a str,
     /// The derived facts at the cut, computed on first use.
     pub(crate) derived: OnceCell<Derived<Refusal>>,
 }
@@ -117,7 +117,7 @@ impl Timeline {
 
     /// Sets the initial value of a fluent.
     pub(crate) fn put_value(&mut self, fluent: FluentId, value: Option<Linear>) {
-        self.fluents.entry(fluent).or_default().put(value);
+        self.fluents.entry(fluent).or_default().set_initial(value);
     }
 
     /// Returns the active continuous changes.
@@ -131,7 +131,7 @@ impl Timeline {
 
     /// Returns the part of the timeline that is relevant to a condition on these facts and fluents
     /// inside an action. Also returns the events that may be on either side of the moment.
-    pub(super) fn near(
+    pub(super) fn relevant_part(
         &self,
         (facts, fluents): (&[FactId], &[FluentId]),
         around: &mut Around<'_>,
@@ -140,13 +140,14 @@ impl Timeline {
         let mut open = BTreeSet::new();
         for fact in facts {
             if let Some(history) = self.facts.get(fact) {
-                near.facts.insert(*fact, history.near(around, &mut open));
+                near.facts
+                    .insert(*fact, history.relevant_part_of_history(around, &mut open));
             }
         }
         for fluent in fluents {
             if let Some(history) = self.fluents.get(fluent) {
                 near.fluents
-                    .insert(*fluent, Box::new(history.near(around, &mut open)));
+                    .insert(*fluent, Box::new(history.relevant_part(around, &mut open)));
             }
         }
         (near, open)
@@ -188,7 +189,7 @@ impl Timeline {
     fn value(&self, fluent: FluentId, cut: Cut<'_>, moment: NodeId) -> Option<Linear> {
         let history = self.fluents.get(&fluent)?;
         match cut {
-            Some(cut) => history.standing(cut).value(moment),
+            Some(cut) => history.state_at(cut).value(moment),
             None => history.last().value(moment),
         }
     }
@@ -200,10 +201,14 @@ impl FactHistory {
     ///
     /// Events that make a fact true and events that make it false interfere. So if an event of each
     /// kind is known to come after the moment, so are all later ones.
-    fn near(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
+    fn relevant_part_of_history(
+        &self,
+        around: &mut Around<'_>,
+        open: &mut BTreeSet<NodeId>,
+    ) -> Self {
         let here = self
             .events
-            .partition_point(|(node, _)| around.is_early(*node));
+            .partition_point(|(node, _)| around.is_not_after_start(*node));
         let (mut initially, mut kept) = (self.initially, Vec::new());
         for &(node, becomes) in self.events[..here].iter().rev() {
             if around.side(node) == Some(Side::Before) {
@@ -250,11 +255,11 @@ impl Reading<'_> {
             .task
             .derivation()
             .ok_or_else(|| Refusal::Unstratified {
-                place: self.place.to_owned(),
+                place: self.location.to_owned(),
             })?;
-        let basic = Basic(self);
+        let basic = BasicFacts(self);
         let derived = self.derived.get_or_init(|| derivation.derive(&basic));
-        derivation.on_top_of(&basic, derived).fact(fact)
+        derivation.with_derived_facts(&basic, derived).fact(fact)
     }
 
     /// Returns the expression's value at the cut and moment; `None` if it is undefined.
@@ -273,7 +278,7 @@ impl Reading<'_> {
             }
             Expression::Unknown(_) => {
                 return Err(Refusal::OpenNumber {
-                    place: self.place.to_owned(),
+                    place: self.location.to_owned(),
                 });
             }
             Expression::Add(parts) => {
@@ -319,16 +324,16 @@ impl Reading<'_> {
 
     fn not_linear(&self, expression: &Expression) -> Refusal {
         Refusal::NotLinear {
-            place: self.place.to_owned(),
+            place: self.location.to_owned(),
             expression: self.task.describe_expression(expression),
         }
     }
 }
 
 /// Context for evaluating rules: basic facts, and comparisons of constants.
-struct Basic<'a>(&'a Reading<'a>);
+struct BasicFacts<'a>(&'a Reading<'a>);
 
-impl Moment<Refusal> for Basic<'_> {
+impl Moment<Refusal> for BasicFacts<'_> {
     fn fact(&self, fact: FactId) -> Result<bool, Refusal> {
         Ok(self.0.timeline.is_true(fact, self.0.cut))
     }
@@ -345,7 +350,7 @@ impl Moment<Refusal> for Basic<'_> {
         };
         let (Some(left), Some(right)) = (left.as_constant(), right.as_constant()) else {
             return Err(Refusal::NotLinear {
-                place: self.0.place.to_owned(),
+                place: self.0.location.to_owned(),
                 expression: "a derived predicate over numbers that vary".to_owned(),
             });
         };

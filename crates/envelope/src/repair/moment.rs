@@ -18,7 +18,7 @@ use crate::obligations::{Inequality, OverAll, Refusal};
 ///
 /// # Errors
 /// If a value is not linear, or if the violation has several parts.
-pub(super) fn broken(
+pub(super) fn avoiding_alternatives(
     task: &Task,
     plan: &StnPlan,
     over_all: &OverAll,

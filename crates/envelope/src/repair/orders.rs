@@ -12,7 +12,7 @@ use crate::obligations::interfering_in_order;
 /// Order of a plan's happenings, as far as the plan fixes it.
 pub(super) struct Orders {
     /// Interfering actions, the earlier first, that keep their order.
-    pub(super) kept: Vec<(NodeId, NodeId)>,
+    pub(super) fixed_pairs: Vec<(NodeId, NodeId)>,
     /// The footprints, by node.
     pub(super) footprints: Vec<Footprint>,
     /// For each node, the nodes that always come before it, or with it.
@@ -65,7 +65,7 @@ impl Orders {
             }
         }
         Self {
-            kept,
+            fixed_pairs: kept,
             footprints: nodes()
                 .map(|node| plan.plan.footprint(task, node))
                 .collect(),

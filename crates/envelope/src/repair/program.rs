@@ -8,7 +8,7 @@ use elbowroom_plan::{
     Bound, Node, NodeId, ParameterId, ParametrizedPlan, Schedule, Side, Valuation,
 };
 
-use super::{Changeable, Hindrance};
+use super::{BindingConstraint, Changeable};
 use crate::linear::Linear;
 use crate::obligations::Refusal;
 
@@ -18,7 +18,7 @@ pub(super) struct Solved {
     pub(super) cost: Delta,
     pub(super) values: Valuation,
     pub(super) schedule: Schedule,
-    pub(super) because: Vec<(Hindrance, Rational)>,
+    pub(super) because: Vec<(BindingConstraint, Rational)>,
 }
 
 /// Parameter as `base + Σ term`.
@@ -31,7 +31,7 @@ struct Value {
 struct CaseRow {
     sum: Option<VariableId>,
     bound: Delta,
-    hindrance: Hindrance,
+    hindrance: BindingConstraint,
 }
 
 pub(super) struct Program<'a> {
@@ -45,12 +45,12 @@ pub(super) struct Program<'a> {
     fixed: BTreeMap<ParameterId, Rational>,
     /// The negated cost, which is maximised. `earliness`, the negated sum of all times of actions,
     /// is maximised after that.
-    gain: Vec<(VariableId, Rational)>,
+    negated_cost: Vec<(VariableId, Rational)>,
     /// The negated cost as a variable, to fix it at its optimum.
-    gained: VariableId,
+    negated_cost_variable: VariableId,
     earliness: Vec<(VariableId, Rational)>,
     /// By tag, the origin of a bound.
-    hindrances: Vec<Hindrance>,
+    hindrances: Vec<BindingConstraint>,
     rows: Vec<CaseRow>,
 }
 
@@ -68,19 +68,19 @@ impl<'a> Program<'a> {
         let mut program = Self {
             plan,
             changeable,
-            gained: times[0],
+            negated_cost_variable: times[0],
             simplex,
             times,
             parameters: BTreeMap::new(),
             fixed: BTreeMap::new(),
-            gain: Vec::new(),
+            negated_cost: Vec::new(),
             earliness: Vec::new(),
             hindrances: Vec::new(),
             rows: Vec::new(),
         };
         for (node, what) in plan.plan.nodes().skip(1) {
             let variable = program.times[node.index()];
-            let tag = program.tag(Hindrance::Beginning);
+            let tag = program.tag(BindingConstraint::TimeZero);
             program.simplex.assert_lower(variable, Delta::ZERO, tag);
             if !matches!(what, Node::Timed(_)) {
                 program.earliness.push((variable, Rational::from(-1)));
@@ -95,7 +95,7 @@ impl<'a> Program<'a> {
                 }
             }
         }
-        program.gained = program.simplex.define(&program.gain);
+        program.negated_cost_variable = program.simplex.define(&program.negated_cost);
         for (index, constraint) in plan.plan.constraints.iter().enumerate() {
             for side in Side::BOTH {
                 let (bound, from, to, sign) = match side {
@@ -113,13 +113,13 @@ impl<'a> Program<'a> {
                         expression.add_scaled(&Linear::parameter(*id), &sign);
                     }
                 }
-                program.always(&expression, Hindrance::Bound(index, side));
+                program.require_always(&expression, BindingConstraint::Bound(index, side));
             }
         }
         for &(first, second) in orders {
             let mut expression = Linear::difference(second, first);
             expression.constant = epsilon.clone();
-            program.always(&expression, Hindrance::Order(first, second));
+            program.require_always(&expression, BindingConstraint::Order(first, second));
         }
         program
     }
@@ -128,10 +128,10 @@ impl<'a> Program<'a> {
     /// Those outside the free values have a cost.
     fn add_changeable(&mut self, own: &Changeable) {
         let range = &self.plan.parameter(own.parameter).range;
-        let tag = self.tag(Hindrance::Range(own.parameter));
+        let tag = self.tag(BindingConstraint::Range(own.parameter));
         let ends = |interval: &Interval| Side::BOTH.map(|side| side.of(interval).value().cloned());
         let [least, most] = ends(range);
-        let [from, to] = ends(&own.free);
+        let [from, to] = ends(&own.free_range);
         let base = from.clone().or_else(|| to.clone()).unwrap_or_default();
         let mut value = Value {
             base,
@@ -150,7 +150,9 @@ impl<'a> Program<'a> {
                         .assert_upper(variable, Delta::from(room), tag);
                 }
                 value.terms.push((variable, Rational::from(sign)));
-                program.gain.extend(cost.map(|cost| (variable, -cost)));
+                program
+                    .negated_cost
+                    .extend(cost.map(|cost| (variable, -cost)));
             };
         let between = |low: Option<&Rational>, high: Option<&Rational>| Some(high? - low?);
         let weight = Some(&own.weight);
@@ -175,7 +177,7 @@ impl<'a> Program<'a> {
         self.parameters.insert(own.parameter, value);
     }
 
-    fn tag(&mut self, hindrance: Hindrance) -> usize {
+    fn tag(&mut self, hindrance: BindingConstraint) -> usize {
         self.hindrances.push(hindrance);
         self.hindrances.len() - 1
     }
@@ -200,7 +202,7 @@ impl<'a> Program<'a> {
     }
 
     /// Adds `expression <= 0`, in all cases.
-    fn always(&mut self, expression: &Linear, hindrance: Hindrance) {
+    fn require_always(&mut self, expression: &Linear, hindrance: BindingConstraint) {
         let (row, constant) = self
             .combination(expression)
             .expect("bounds and orders have no products");
@@ -219,7 +221,7 @@ impl<'a> Program<'a> {
         &mut self,
         expression: &Linear,
         is_strict: bool,
-        hindrance: Hindrance,
+        hindrance: BindingConstraint,
     ) -> Result<usize, Refusal> {
         let Some((row, constant)) = self.combination(expression) else {
             let mut multiplied = expression.with_values(&self.fixed);
@@ -248,7 +250,7 @@ impl<'a> Program<'a> {
     ///
     /// # Errors
     /// The constraints that contradict each other.
-    pub(super) fn solve(&mut self, rows: &[usize]) -> Result<Solved, Vec<Hindrance>> {
+    pub(super) fn solve(&mut self, rows: &[usize]) -> Result<Solved, Vec<BindingConstraint>> {
         self.simplex.push();
         let tags = self.hindrances.len();
         let solved = self.solve_with(rows);
@@ -257,7 +259,7 @@ impl<'a> Program<'a> {
         solved
     }
 
-    fn solve_with(&mut self, rows: &[usize]) -> Result<Solved, Vec<Hindrance>> {
+    fn solve_with(&mut self, rows: &[usize]) -> Result<Solved, Vec<BindingConstraint>> {
         for &row in rows {
             let CaseRow {
                 sum,
@@ -274,25 +276,26 @@ impl<'a> Program<'a> {
             let tag = self.tag(hindrance);
             self.simplex.assert_upper(sum, bound, tag);
         }
-        let named = |hindrances: &[Hindrance], proof: Vec<(usize, Rational)>| {
+        let named = |hindrances: &[BindingConstraint], proof: Vec<(usize, Rational)>| {
             let named = proof.into_iter();
             named
                 .map(|(tag, factor)| (hindrances[tag].clone(), factor))
                 .collect()
         };
-        let (gain, proof) = match self.simplex.maximize_with_proof(&self.gain) {
+        let (gain, proof) = match self.simplex.maximize_with_proof(&self.negated_cost) {
             Ok((Optimum::Value(gain), proof)) => (gain, proof),
             Ok((Optimum::Unbounded, _)) => unreachable!("no cost is negative"),
             Err(impossible) => {
-                let named: Vec<(Hindrance, Rational)> =
+                let named: Vec<(BindingConstraint, Rational)> =
                     named(&self.hindrances, impossible.certificate);
                 return Err(named.into_iter().map(|(hindrance, _)| hindrance).collect());
             }
         };
         let because = named(&self.hindrances, proof);
         // At that cost, everything as early as possible.
-        let tag = self.tag(Hindrance::Beginning);
-        self.simplex.assert_lower(self.gained, gain.clone(), tag);
+        let tag = self.tag(BindingConstraint::TimeZero);
+        self.simplex
+            .assert_lower(self.negated_cost_variable, gain.clone(), tag);
         self.simplex
             .maximize(&self.earliness)
             .expect("the optimum just found is feasible");
@@ -324,8 +327,8 @@ impl<'a> Program<'a> {
     pub(super) fn cost_of(&self, values: &Valuation) -> Rational {
         let costs = self.changeable.iter().map(|own| {
             let value = &values[own.parameter];
-            let below = own.free.lower.value().map(|least| least - value);
-            let above = own.free.upper.value().map(|most| value - most);
+            let below = own.free_range.lower.value().map(|least| least - value);
+            let above = own.free_range.upper.value().map(|most| value - most);
             let outside = below.into_iter().chain(above).max().unwrap_or_default();
             &own.weight * &outside.max(Rational::ZERO)
         });

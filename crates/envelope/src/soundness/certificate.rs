@@ -1,6 +1,6 @@
 //! Proofs that a bad case is impossible, and their dependence on a box.
 
-use elbowroom_num::{Delta, Rational, Total};
+use elbowroom_num::{Accumulator, Delta, Rational};
 
 use crate::reduction::Edge;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
@@ -76,7 +76,7 @@ impl Certificate {
 
     /// Returns the value in the box; `None` for infinity.
     pub(crate) fn value(&self, envelope: &DecoupledEnvelope) -> Option<Delta> {
-        let mut real = Total::default();
+        let mut real = Accumulator::default();
         real.add(&self.base.real);
         for (end, factor) in &self.ends {
             real.add_product(&end.reach(envelope)?, factor);

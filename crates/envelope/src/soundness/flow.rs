@@ -39,10 +39,10 @@ pub(crate) fn cheapest<W: Weight>(
         flow: Flow::new(),
         workspace,
     };
-    if search.is_endless(&demand) {
+    if search.is_known_unsatisfiable(&demand) {
         return None;
     }
-    let is_met = search.meet(&mut demand);
+    let is_met = search.satisfy_demand(&mut demand);
     let flow = search.flow;
     let moved = workspace.take_moved();
     // No constraint is cheaper than the difference of its nodes' potentials.
@@ -136,14 +136,14 @@ impl<W: Weight> Workspace<W> {
 impl<W: Weight> Search<'_, '_, W> {
     /// Returns `true` if [no flow](is_endless) meets the demand, as far as that is known without a
     /// search.
-    fn is_endless(&self, demand: &Demand) -> bool {
+    fn is_known_unsatisfiable(&self, demand: &Demand) -> bool {
         let assumed = &self.network.network().constraints()[self.lasting..];
         let mut left = assumed.iter().map(|constraint| constraint.from);
-        is_endless(demand, &self.workspace.components, &mut left)
+        is_unsatisfiable(demand, &self.workspace.components, &mut left)
     }
 
     /// Meets the demand along one cheapest path after the other. Returns `false` if there is none.
-    fn meet(&mut self, demand: &mut Demand) -> bool {
+    fn satisfy_demand(&mut self, demand: &mut Demand) -> bool {
         let sources = demand.iter().filter(|(_, amount)| amount.is_negative());
         let sources: Vec<NodeId> = sources.map(|(node, _)| *node).collect();
         // A source whose demand is met stays met.
@@ -301,7 +301,7 @@ fn components(
 ///
 /// The sets considered are a component and all greater ones, provided that none of the nodes in
 /// `left`, where other constraints begin, belongs to them.
-fn is_endless(
+fn is_unsatisfiable(
     demand: &Demand,
     components: &[NodeId],
     left: &mut dyn Iterator<Item = NodeId>,
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn where_demand_is_endless_no_search_finds_a_flow() {
+    fn unsatisfiable_demand_has_no_flow() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let (mut endless, mut unmet) = (0, 0);
         for _ in 0..20_000 {
@@ -365,8 +365,8 @@ mod tests {
                 flow: Flow::new(),
                 workspace: &mut workspace,
             };
-            let is_endless = search.is_endless(&demand);
-            let is_met = search.meet(&mut demand.clone());
+            let is_endless = search.is_known_unsatisfiable(&demand);
+            let is_met = search.satisfy_demand(&mut demand.clone());
             assert!(!(is_endless && is_met), "{own:?} {lasting} {demand:?}");
             endless += usize::from(is_endless);
             unmet += usize::from(!is_met);

@@ -14,7 +14,7 @@ use elbowroom_num::{Delta, Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Side};
 use elbowroom_stn::ConsistentNetwork;
 
-use super::bad_case::spread;
+use super::violation_case::add_times;
 use super::{Broken, Soundness};
 use crate::linear::Linear;
 use crate::obligations::{BadCase, Difference};
@@ -23,7 +23,7 @@ use crate::row::Row;
 
 /// Time as a function of the parameters: `time of a root + offset + Σ factor · parameter`.
 #[derive(Clone, Debug)]
-struct Place {
+struct AffineTime {
     root: usize,
     factors: BTreeMap<ParameterId, Rational>,
     offset: Rational,
@@ -38,7 +38,7 @@ impl Soundness {
         broken: &[Broken],
         envelope: &DecoupledEnvelope,
     ) -> Vec<Option<Row>> {
-        let places = places(&self.reduction);
+        let places = affine_times(&self.reduction);
         let widest = self.schedules_in(&DecoupledEnvelope::ranges(plan));
         let cases = broken.iter().map(|broken| &broken.case);
         cases
@@ -51,7 +51,7 @@ impl Soundness {
         plan: &ParametrizedPlan,
         case: &BadCase,
         envelope: &DecoupledEnvelope,
-        (places, widest): (&[Place], Option<&ConsistentNetwork<Delta>>),
+        (places, widest): (&[AffineTime], Option<&ConsistentNetwork<Delta>>),
     ) -> Option<Row> {
         let row = |expression: &Linear, is_strict: bool| {
             let row = half_space(&self.reduction, places, expression, is_strict)?;
@@ -78,9 +78,9 @@ impl Soundness {
                     // The moment is only close to the event, so the bound itself need not be
                     // reached.
                     let row = row(&expression, true)?;
-                    let is_possible = widest
-                        .is_some_and(|network| self.is_there(network, case, moment, event))
-                        || self.is_possible(plan, case, &row, moment, event);
+                    let is_possible = widest.is_some_and(|network| {
+                        self.can_be_near_event(network, case, moment, event)
+                    }) || self.is_possible(plan, case, &row, moment, event);
                     is_possible.then_some(row)
                 })
             }
@@ -109,7 +109,7 @@ impl Soundness {
             corner = corner.with_interval(end.parameter, interval);
         }
         self.schedules_in(&corner)
-            .is_some_and(|network| self.is_there(&network, case, moment, event))
+            .is_some_and(|network| self.can_be_near_event(&network, case, moment, event))
     }
 
     /// Returns the network of all schedules for values in a box, if there are any.
@@ -120,14 +120,14 @@ impl Soundness {
         let times = self.reduction.class_times(&self.schedule).into_iter();
         let known = elbowroom_stn::Schedule::new(times.map(Delta::from).collect());
         if known.holds_in(&network) {
-            return ConsistentNetwork::by(network, known);
+            return ConsistentNetwork::with_schedule(network, known);
         }
         ConsistentNetwork::try_from(network).ok()
     }
 
     /// Returns `true` if the moment can be arbitrarily close to the event in all schedules of a
     /// network. The result also holds for every network with fewer schedules.
-    fn is_there(
+    fn can_be_near_event(
         &self,
         network: &ConsistentNetwork<Delta>,
         case: &BadCase,
@@ -169,8 +169,8 @@ fn entails(
     let greatest = if from == to {
         Delta::ZERO
     } else {
-        let (from_class, from_offset) = reduction.place(from);
-        let (to_class, to_offset) = reduction.place(to);
+        let (from_class, from_offset) = reduction.class_of(from);
+        let (to_class, to_offset) = reduction.class_of(to);
         let between = if from_class == to_class {
             Some(Delta::ZERO)
         } else {
@@ -203,7 +203,7 @@ fn at(expression: &Linear, moment: NodeId, event: NodeId) -> Option<Linear> {
 /// Returns the row that `expression <= 0`, or `< 0` when strict, does not hold at the worst corner.
 fn half_space(
     reduction: &Reduction,
-    places: &[Place],
+    places: &[AffineTime],
     expression: &Linear,
     is_strict: bool,
 ) -> Option<Row> {
@@ -215,7 +215,7 @@ fn half_space(
     let mut factors: BTreeMap<ParameterId, Rational> = parameters.collect();
     let mut offset = Rational::ZERO;
     let mut is_placed = true;
-    let constant = spread(reduction, expression, |class, coefficient| {
+    let constant = add_times(reduction, expression, |class, coefficient| {
         let Some(place) = places.get(class.index()) else {
             is_placed = false;
             return;
@@ -252,25 +252,25 @@ fn half_space(
 
 /// Returns each class's time as a function of the parameters, as far as differences that are
 /// parameters connect the classes; the first class has time zero.
-fn places(reduction: &Reduction) -> Vec<Place> {
+fn affine_times(reduction: &Reduction) -> Vec<AffineTime> {
     let count = reduction.class_count();
     let mut neighbours: Vec<Vec<(usize, ParameterId, Rational, Rational)>> =
         vec![Vec::new(); count];
     for (&parameter, &(from, to)) in &reduction.substitution {
-        let (from, from_offset) = reduction.place(from);
-        let (to, to_offset) = reduction.place(to);
+        let (from, from_offset) = reduction.class_of(from);
+        let (to, to_offset) = reduction.class_of(to);
         // class of `to` + its offset - class of `from` - its offset = parameter
         let offset = &from_offset - &to_offset;
         let sign = Rational::ONE;
         neighbours[from.index()].push((to.index(), parameter, sign.clone(), offset.clone()));
         neighbours[to.index()].push((from.index(), parameter, -&sign, -&offset));
     }
-    let mut places: Vec<Option<Place>> = vec![None; count];
+    let mut places: Vec<Option<AffineTime>> = vec![None; count];
     for root in 0..count {
         if places[root].is_some() {
             continue;
         }
-        places[root] = Some(Place {
+        places[root] = Some(AffineTime {
             root,
             factors: BTreeMap::new(),
             offset: Rational::ZERO,

@@ -6,8 +6,8 @@ use elbowroom_num::simplex::{Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
 use elbowroom_stn::Constraint;
 
-use super::bad_case::spread;
 use super::certificate::{Certificate, Term};
+use super::violation_case::add_times;
 use crate::linear::Linear;
 use crate::obligations::Inequality;
 use crate::reduction::Reduction;
@@ -195,7 +195,7 @@ impl<'a> Program<'a> {
     /// Returns the expression as a combination of variables, and its constant.
     fn row(&self, expression: &Linear) -> (Vec<(VariableId, Rational)>, Rational) {
         let mut row: BTreeMap<VariableId, Rational> = BTreeMap::new();
-        let constant = spread(self.reduction, expression, |class, coefficient| {
+        let constant = add_times(self.reduction, expression, |class, coefficient| {
             *row.entry(self.classes[class.index()]).or_default() += coefficient;
         });
         for (id, coefficient) in &expression.parameters {

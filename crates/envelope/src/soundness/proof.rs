@@ -4,14 +4,14 @@ use std::borrow::Cow;
 
 use elbowroom_model::Task;
 
-use super::bad_case::{Outcome, Schedules};
 use super::certificate::Certificate;
 use super::scale::Scale;
+use super::violation_case::{Outcome, Schedules};
 use crate::obligations::{BadCase, Difference, OverAll, Refusal};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan};
 
 /// Limit on the places of the moment that are distinguished in one over-all condition.
-const MOST_PLACES: usize = 100_000;
+const MAX_PLACES: usize = 100_000;
 
 /// Proof that there is no moment at which the condition is false.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ pub(crate) struct Prover<'a, 'b, S: Scale> {
 }
 
 /// Proof, or a way for the condition to be false.
-pub(crate) type Attempt = Result<Proof, BadCase>;
+pub(crate) type ProofResult = Result<Proof, BadCase>;
 
 impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
     pub(crate) fn new(
@@ -80,8 +80,8 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
         &mut self,
         old: Option<&Proof>,
         moved: Option<BoxEnd>,
-    ) -> Result<Attempt, Refusal> {
-        let before = self.schedules.before();
+    ) -> Result<ProofResult, Refusal> {
+        let before = self.schedules.save();
         self.schedules.add_moment(self.over_all.end);
         let inside = [
             Difference::before(self.over_all.start, self.over_all.moment),
@@ -99,37 +99,37 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
         }
         let attempt = match attempt {
             Some(attempt) => attempt,
-            None => self.place(0, &mut Vec::new(), old, moved)?,
+            None => self.place_moment(0, &mut Vec::new(), old, moved)?,
         };
         self.schedules.undo_to(&before);
         Ok(attempt)
     }
 
     /// Places the moment relative to the events from `index` on; `happened` come before it.
-    fn place(
+    fn place_moment(
         &mut self,
         index: usize,
         happened: &mut Vec<NodeId>,
         old: Option<&Proof>,
         moved: Option<BoxEnd>,
-    ) -> Result<Attempt, Refusal> {
+    ) -> Result<ProofResult, Refusal> {
         if let Some(old) = old
             && old.holds_in(self.schedules.envelope, moved)
         {
             return Ok(Ok(old.clone()));
         }
         self.places += 1;
-        if self.places > MOST_PLACES {
+        if self.places > MAX_PLACES {
             return Err(Refusal::TooManyCases {
                 place: format!(
                     "over-all condition of {}",
                     self.plan.plan.instance(self.over_all.instance).action.name
                 ),
-                limit: MOST_PLACES,
+                limit: MAX_PLACES,
             });
         }
         let Some(&event) = self.events.get(index) else {
-            return self.settle(happened);
+            return self.decide_condition(happened);
         };
         let (old_after, old_before) = match old {
             Some(Proof::Either(after, before)) => (Some(&**after), Some(&**before)),
@@ -163,13 +163,13 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
         happened: &mut Vec<NodeId>,
         old: Option<&Proof>,
         moved: Option<BoxEnd>,
-    ) -> Result<Attempt, Refusal> {
-        let before = self.schedules.before();
+    ) -> Result<ProofResult, Refusal> {
+        let before = self.schedules.save();
         if let Err(certificate) = self.schedules.assume(&difference) {
             return Ok(Ok(Proof::NoMoment(certificate)));
         }
         self.assumed.push(difference);
-        let attempt = self.place(index + 1, happened, old, moved)?;
+        let attempt = self.place_moment(index + 1, happened, old, moved)?;
         if attempt.is_ok() {
             self.assumed.pop();
         }
@@ -184,7 +184,7 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
     }
 
     /// Decides the condition after all events are placed: its value is now an expression.
-    fn settle(&mut self, happened: &[NodeId]) -> Result<Attempt, Refusal> {
+    fn decide_condition(&mut self, happened: &[NodeId]) -> Result<ProofResult, Refusal> {
         let cut = |node: NodeId| happened.contains(&node);
         let mut proofs = Vec::new();
         let cases = (self.over_all).cases(self.task, &self.plan.plan, self.is_in_ranges, &cut)?;

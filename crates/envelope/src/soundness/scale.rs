@@ -25,9 +25,9 @@ pub(crate) trait Scale {
 
 /// Bounds are their own weights.
 #[derive(Clone, Debug)]
-pub(crate) struct Exactly;
+pub(crate) struct ExactScale;
 
-impl Scale for Exactly {
+impl Scale for ExactScale {
     type Weight = Delta;
 
     fn weight(&self, bound: &Delta) -> Delta {
@@ -41,7 +41,7 @@ impl Scale for Exactly {
 
 /// Whole numbers: multiples of `1 / denominator`, each [`UNIT`] δ.
 #[derive(Clone, Debug)]
-pub(crate) struct Whole {
+pub(crate) struct IntegerScale {
     denominator: i64,
 }
 
@@ -51,7 +51,7 @@ const UNIT: i128 = 1 << 40;
 /// Upper bound on the sum of all weights on a path without repetition, δ aside.
 const LARGEST_PATH: i128 = 1 << 60;
 
-impl Scale for Whole {
+impl Scale for IntegerScale {
     type Weight = i128;
 
     fn weight(&self, bound: &Delta) -> i128 {
@@ -71,7 +71,7 @@ impl Scale for Whole {
     }
 }
 
-impl Whole {
+impl IntegerScale {
     /// Returns the scale for the schedules of a box, for differences with the bounds in `numbers`;
     /// `None` if the numbers are so large that sums might not fit.
     ///
@@ -137,12 +137,12 @@ impl Numbers {
 
 #[cfg(test)]
 mod tests {
-    use super::{Delta, Numbers, Rational, Scale, Whole};
+    use super::{Delta, IntegerScale, Numbers, Rational, Scale};
     use crate::reduction::Reduction;
     use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, StnPlan};
 
     /// Returns the scale for these numbers in a plan without actions.
-    fn fitting(inside: &[Rational], ends: &[Rational]) -> Option<Whole> {
+    fn fitting(inside: &[Rational], ends: &[Rational]) -> Option<IntegerScale> {
         let task = elbowroom_model::Task::new(elbowroom_model::Problem::default());
         let plan = StnPlan::unconstrained(&task, Vec::new());
         let reduction = Reduction::new(&ParametrizedPlan::closed(&task, plan));
@@ -150,7 +150,7 @@ mod tests {
         inside
             .iter()
             .try_for_each(|number| numbers.include(number))?;
-        Whole::fitting(
+        IntegerScale::fitting(
             &reduction,
             &DecoupledEnvelope::point(&ends.iter().cloned().collect()),
             &numbers,

@@ -26,7 +26,7 @@ impl<'a> SoundBox<'a> {
     /// reasoning.
     pub fn new(task: &'a Task, plan: &'a ParametrizedPlan) -> Result<Option<Self>, Refusal> {
         let nominal = plan.nominal();
-        let soundness = Soundness::around(task, plan, &nominal)?;
+        let soundness = Soundness::for_values(task, plan, &nominal)?;
         let mut soundness = soundness.ok_or(Refusal::NoNominalSchedule)?;
         let envelope = DecoupledEnvelope::point(&nominal);
         let broken = soundness.broken(task, plan, &envelope, None)?;

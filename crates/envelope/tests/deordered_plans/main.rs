@@ -11,7 +11,7 @@ use elbowroom_envelope::soundness::{Broken, broken_in};
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder::{
-    Deordered, deorder, keeps_all_that_is_read, pin_until_sound, pinned_to,
+    Deordered, deorder, keeps_all_that_is_read, pin_until_sound, with_fixed_times,
 };
 use elbowroom_plan::{
     DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, StnPlan, Valuation, network_node,
@@ -111,7 +111,7 @@ fn deordered(seed: u64, is_timeless: bool) -> (ChaCha8Rng, Task, Deordered) {
 /// If [`keeps_all_that_is_read`] returns `true`, deordering alone keeps the plan valid. The
 /// validator and the soundness check confirm that.
 #[test]
-fn all_schedules_are_valid_where_deordering_is_said_to_keep_all_that_is_read() {
+fn lossless_deordering_has_only_valid_schedules() {
     let (mut kept, mut with_numbers, mut in_doubt, mut unsound) = (0, 0, 0, 0);
     for seed in 0..1500 {
         let (mut rng, task, Deordered { plan, nominal, .. }) = deordered(seed, seed % 4 > 0);
@@ -138,7 +138,7 @@ fn all_schedules_are_valid_where_deordering_is_said_to_keep_all_that_is_read() {
 }
 
 #[test]
-fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
+fn pinned_time_dependent_plans_have_only_valid_schedules() {
     let (mut pinned, mut untold) = (0, 0);
     for seed in 0..250 {
         let (mut rng, task, Deordered { plan, nominal, .. }) = deordered(seed, false);
@@ -157,7 +157,7 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
         untold += usize::from(!is_told);
         let sound = match sound {
             Some(sound) if is_told => sound,
-            _ => pinned_to(plan.clone(), &nominal),
+            _ => with_fixed_times(plan.clone(), &nominal),
         };
         pinned += usize::from(sound != plan);
         assert_sound(seed, &task, &sound, &mut rng);
@@ -169,7 +169,7 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
 /// For an over-all condition, only events that can be on either side of a moment inside the action
 /// are placed. The result equals that of placing every event, for every moment.
 #[test]
-fn what_is_far_from_an_action_makes_no_difference_to_what_holds_throughout() {
+fn distant_events_do_not_affect_over_all_conditions() {
     let (mut conditions, mut fewer) = (0, 0);
     for seed in 0..400 {
         let (mut rng, task, Deordered { plan, nominal, .. }) = deordered(seed, false);

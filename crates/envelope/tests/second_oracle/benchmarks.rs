@@ -26,7 +26,7 @@ use crate::z3::Z3;
 const MOST_NODES: u64 = 12;
 
 #[test]
-fn our_boxes_are_inside_by_the_authors_encoding_and_cannot_grow() {
+fn boxes_are_inside_and_maximal_by_published_encoding() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     if !data.is_dir() {
         skipped(format_args!("there is no {}", data.display()));

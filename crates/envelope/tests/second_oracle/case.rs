@@ -94,7 +94,7 @@ impl Case {
         let plan = ParametrizedPlan {
             plan,
             parameters: self.parameters.clone(),
-            told: std::collections::BTreeMap::new(),
+            commanded_durations: std::collections::BTreeMap::new(),
             initial: initial.collect(),
             goal: task.goal().map_leaves(&mut parameter_of),
         };
@@ -121,7 +121,7 @@ impl Case {
     }
 
     /// Returns the validator's verdict on a schedule of the plan for these values.
-    pub(crate) fn judge(&self, valuation: &Valuation, schedule: &Schedule) -> Verdict {
+    pub(crate) fn validate(&self, valuation: &Valuation, schedule: &Schedule) -> Verdict {
         let (_, plan) = self.build();
         let scheduled = plan.plan.at(valuation).scheduled(schedule);
         let task = self.task_at(valuation);

@@ -16,9 +16,9 @@ use elbowroom_plan::{
 };
 
 use crate::case::{Case, show};
-use crate::dice::Dice;
 use crate::generate::sample;
 use crate::plain::{self, Answer, GaveUp};
+use crate::random::Random;
 use crate::smt::{Encoding, Places, contained};
 use crate::system::System;
 use crate::z3::{Found, Z3};
@@ -100,7 +100,7 @@ impl Script {
             plan: &plan,
             solver,
             encoding: Encoding::new(&task, &plan, &self.case.epsilon, &Places::any(&plan)).ok(),
-            dice: Dice::new(1),
+            dice: Random::new(1),
             tally: Tally::default(),
         };
         let mut oracle = match Oracle::new(&task, &plan, Guarantee::Weak) {
@@ -154,7 +154,7 @@ fn next_box(
 
 /// Generates random queries around the nominal point: growing boxes as in a search, and some
 /// others.
-pub(crate) fn steps(dice: &mut Dice, parameters: &[Parameter], length: usize) -> Vec<Step> {
+pub(crate) fn steps(dice: &mut Random, parameters: &[Parameter], length: usize) -> Vec<Step> {
     let nominal: Valuation = parameters.iter().map(|p| p.nominal.clone()).collect();
     let mut steps = vec![Step::Jump(DecoupledEnvelope::point(&nominal))];
     if parameters.is_empty() {
@@ -188,7 +188,11 @@ pub(crate) fn steps(dice: &mut Dice, parameters: &[Parameter], length: usize) ->
 }
 
 /// Generates a box near the nominal point, usually one that contains it.
-fn random_box(dice: &mut Dice, nominal: &Valuation, parameters: &[Parameter]) -> DecoupledEnvelope {
+fn random_box(
+    dice: &mut Random,
+    nominal: &Valuation,
+    parameters: &[Parameter],
+) -> DecoupledEnvelope {
     let mut envelope = DecoupledEnvelope::point(nominal);
     let is_around = dice.chance(75);
     for (index, parameter) in parameters.iter().enumerate() {
@@ -220,7 +224,7 @@ struct Contest<'a> {
     plan: &'a ParametrizedPlan,
     solver: Option<&'a mut Z3>,
     encoding: Option<Encoding>,
-    dice: Dice,
+    dice: Random,
     tally: Tally,
 }
 
@@ -280,7 +284,7 @@ impl Contest<'_> {
             let Some((valuation, schedule)) = sample(&mut system, &mut self.dice) else {
                 return Ok(());
             };
-            if let Verdict::Invalid(violation) = self.case.judge(&valuation, &schedule) {
+            if let Verdict::Invalid(violation) = self.case.validate(&valuation, &schedule) {
                 if self.timed_change_places(&schedule) {
                     continue;
                 }
@@ -340,7 +344,7 @@ impl Contest<'_> {
             self.tally.count("timed initials too near");
             return Ok(());
         }
-        match self.case.judge(valuation, schedule) {
+        match self.case.validate(valuation, schedule) {
             Verdict::Valid(_) => self.mismatch("counterexample is valid", envelope, &details),
             Verdict::Invalid(_) => {
                 self.tally.count("counterexamples confirmed");
@@ -414,7 +418,7 @@ impl Contest<'_> {
                     || (!found.is_only_timed
                         && self
                             .case
-                            .judge(&found.valuation, &found.schedule)
+                            .validate(&found.valuation, &found.schedule)
                             .is_valid())
                 {
                     return self.mismatch("plain is wrong", envelope, &details);

@@ -10,7 +10,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, Schedule, Valuation};
 
 use crate::case::Case;
-use crate::dice::Dice;
+use crate::random::Random;
 use crate::system::System;
 use skeleton::skeleton;
 
@@ -43,7 +43,7 @@ impl Theme {
 
 /// Generates the case with that number.
 pub(crate) fn generate(seed: u64) -> Case {
-    let mut dice = Dice::new(seed);
+    let mut dice = Random::new(seed);
     loop {
         if let Some(case) = attempt(&mut dice) {
             return case;
@@ -52,7 +52,7 @@ pub(crate) fn generate(seed: u64) -> Case {
 }
 
 /// Generates a case; `None` if the happenings are in conflict.
-fn attempt(dice: &mut Dice) -> Option<Case> {
+fn attempt(dice: &mut Random) -> Option<Case> {
     let theme = *dice.pick(&Theme::ALL);
     let case = Case {
         problem: skeleton(dice, theme),
@@ -70,7 +70,7 @@ fn attempt(dice: &mut Dice) -> Option<Case> {
     };
     let schedule = (0..8).find_map(|_| {
         let schedule = times(dice, &case);
-        case.judge(&Valuation::default(), &schedule)
+        case.validate(&Valuation::default(), &schedule)
             .is_valid()
             .then_some(schedule)
     })?;
@@ -94,7 +94,7 @@ fn attempt(dice: &mut Dice) -> Option<Case> {
 }
 
 /// Generates times for all nodes, on a grid of halves.
-fn times(dice: &mut Dice, case: &Case) -> Schedule {
+fn times(dice: &mut Random, case: &Case) -> Schedule {
     let mut schedule = vec![Rational::ZERO];
     for schema in &case.problem.schemas {
         let start = dice.half(0, 9);
@@ -119,13 +119,13 @@ struct Nominal<'d> {
     case: Case,
     schedule: Schedule,
     theme: Theme,
-    dice: &'d mut Dice,
+    dice: &'d mut Random,
 }
 
 impl Nominal<'_> {
     fn works(&self, case: &Case) -> bool {
         let valuation = case.parameters.iter().map(|p| p.nominal.clone()).collect();
-        case.judge(&valuation, &self.schedule).is_valid()
+        case.validate(&valuation, &self.schedule).is_valid()
     }
 
     /// Returns durative actions with their nominal durations.
@@ -153,7 +153,7 @@ impl Nominal<'_> {
 
 /// Samples a schedule for some values: extreme in a random direction, or halfway between two such
 /// ones.
-pub(crate) fn sample(system: &mut System, dice: &mut Dice) -> Option<(Valuation, Schedule)> {
+pub(crate) fn sample(system: &mut System, dice: &mut Random) -> Option<(Valuation, Schedule)> {
     let mut weights = || (0..20).map(|_| dice.between(-1, 1)).collect::<Vec<_>>();
     let (first, second) = (weights(), weights());
     let (values, times) = system.extreme(&first, HORIZON)?;

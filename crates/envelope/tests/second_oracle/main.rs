@@ -13,7 +13,6 @@
 mod benchmarks;
 mod case;
 mod contest;
-mod dice;
 mod generate;
 #[path = "../../../elbowroom/tests/shared/instances.rs"]
 #[allow(dead_code, reason = "only some figures are asked about")]
@@ -21,6 +20,7 @@ mod instances;
 mod numbers;
 mod plain;
 mod polynomial;
+mod random;
 mod schedules;
 mod shrink;
 #[path = "../../../../testing/skipped.rs"]
@@ -30,8 +30,8 @@ mod system;
 mod z3;
 
 use contest::{Mismatch, Script, Tally, steps};
-use dice::Dice;
 use generate::generate;
+use random::Random;
 use skipped::skipped;
 use z3::Z3;
 
@@ -44,7 +44,7 @@ fn setting(name: &str, default: u64) -> u64 {
 
 fn script(seed: u64, length: usize) -> Script {
     let case = generate(seed);
-    let mut dice = Dice::new(seed + 1);
+    let mut dice = Random::new(seed + 1);
     let length = if dice.chance(10) { 3 * length } else { length };
     let steps = steps(&mut dice, &case.parameters, length);
     Script { case, steps }
@@ -93,12 +93,12 @@ fn expect_agreement(cases: u64, solver: Option<Z3>) {
 }
 
 #[test]
-fn the_fast_oracle_agrees_with_the_plain_one_and_the_judge() {
+fn fast_oracle_agrees_with_plain_oracle_and_validator() {
     expect_agreement(200, None);
 }
 
 #[test]
-fn the_fast_oracle_agrees_with_the_authors_encoding() {
+fn fast_oracle_agrees_with_published_encoding() {
     match Z3::start() {
         Some(solver) => expect_agreement(20, Some(solver)),
         None => skipped("there is no z3 here"),

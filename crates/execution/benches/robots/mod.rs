@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::{
-    Decision, Ending, Executor, Forms, Mission, Moment, News, Progression, Region, StepId,
+    BeliefState, Decision, DecisionContext, DispatchableCache, Ending, Executor, PlanEvent,
+    PreparedPlan, RegionOracle, StepId,
 };
 use elbowroom_model::ground::{Action, Body, Condition, DurativeBody, SnapAction};
 use elbowroom_model::problem::SchemaId;
@@ -19,9 +20,9 @@ use elbowroom_plan::{
 };
 
 /// Creates an executor that has adopted the plan of `mission`.
-pub(crate) fn ready(spec: &str, mission: &Mission) -> Box<dyn Executor> {
+pub(crate) fn ready(spec: &str, mission: &PreparedPlan) -> Box<dyn Executor> {
     let spec: ExecutorSpec = spec.parse().expect("a known executor");
-    let mut executor = spec.build(Box::new(Everywhere));
+    let mut executor = spec.build(Box::new(UnlimitedRegion));
     executor.adopt(mission).expect("a consistent plan");
     executor
 }
@@ -30,17 +31,17 @@ pub(crate) fn ready(spec: &str, mission: &Mission) -> Box<dyn Executor> {
 pub(crate) struct Events {
     running: BTreeSet<(Rational, StepId)>,
     now: Rational,
-    news: Vec<News>,
-    belief: Progression,
+    news: Vec<PlanEvent>,
+    belief: BeliefState,
 }
 
 impl Events {
-    pub(crate) fn new(mission: &Mission) -> Self {
+    pub(crate) fn new(mission: &PreparedPlan) -> Self {
         Self {
             running: BTreeSet::new(),
             now: Rational::ZERO,
             news: Vec::new(),
-            belief: Progression::new(Arc::clone(&mission.task)),
+            belief: BeliefState::new(Arc::clone(&mission.task)),
         }
     }
 
@@ -48,9 +49,9 @@ impl Events {
     /// Returns `false` if no action is running.
     pub(crate) fn next(&mut self, executor: &mut dyn Executor) -> bool {
         loop {
-            let moment = Moment {
+            let moment = DecisionContext {
                 now: &self.now,
-                news: &std::mem::take(&mut self.news),
+                plan_events: &std::mem::take(&mut self.news),
                 belief: &self.belief,
             };
             match executor.decide(&moment).decision {
@@ -59,7 +60,7 @@ impl Events {
                         let duration = order.duration.expect("all take time");
                         let end = &self.now + duration + Rational::new(1, 2);
                         self.running.insert((end, order.step));
-                        self.news.push(News::Started {
+                        self.news.push(PlanEvent::Started {
                             step: order.step,
                             time: self.now.clone(),
                             measured: Vec::new(),
@@ -77,7 +78,7 @@ impl Events {
                         return false;
                     };
                     self.now.clone_from(&time);
-                    self.news.push(News::Ended {
+                    self.news.push(PlanEvent::Ended {
                         step,
                         time,
                         ending: Ending::Succeeded,
@@ -92,22 +93,27 @@ impl Events {
     }
 }
 
-pub(crate) struct Everywhere;
+pub(crate) struct UnlimitedRegion;
 
-impl Region for Everywhere {
-    fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &Valuation) -> Option<String> {
+impl RegionOracle for UnlimitedRegion {
+    fn find_violation(
+        &mut self,
+        _: &Arc<Task>,
+        _: &ParametrizedPlan,
+        _: &Valuation,
+    ) -> Option<String> {
         None
     }
 }
 
 /// Creates a plan with `count` actions. If `is_open`, each duration may be up to twice the planned
 /// one.
-pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
+pub(crate) fn mission(count: usize, is_open: bool) -> PreparedPlan {
     const ROBOTS: usize = 20;
     let task = Arc::new(Task::new(Problem::default()));
     let instances = (0..count).map(|index| Instance {
         label: format!("n{index}"),
-        action: Arc::new(nothing(index)),
+        action: Arc::new(empty_action(index)),
     });
     let mut plan = StnPlan::unconstrained(&task, instances.collect());
     let start = |index: usize| NodeId::from(1 + 2 * index);
@@ -178,7 +184,7 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
     };
     let intervals = plan.parameters.iter().map(twice).collect();
     let envelope = DecoupledEnvelope::new(&plan, intervals);
-    Mission {
+    PreparedPlan {
         origin: Rational::ZERO,
         begun: std::collections::BTreeMap::new(),
         now: Rational::ZERO,
@@ -187,7 +193,7 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
         instances: Vec::new(),
         nominal,
         envelope,
-        forms: Forms::default(),
+        dispatchable_cache: DispatchableCache::default(),
         order: None,
         running: BTreeMap::new(),
         task,
@@ -215,7 +221,7 @@ fn leave_durations_open(plan: &mut ParametrizedPlan) {
     }
 }
 
-fn nothing(index: usize) -> Action {
+fn empty_action(index: usize) -> Action {
     let nothing = Arc::new(SnapAction {
         condition: Condition::TRUE,
         effects: Vec::new(),
@@ -230,7 +236,7 @@ fn nothing(index: usize) -> Action {
             over_all: Condition::TRUE,
             end: nothing,
             continuous: Vec::new(),
-            is_under_way: false,
+            is_running: false,
         }),
     }
 }

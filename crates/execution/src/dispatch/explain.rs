@@ -6,26 +6,26 @@ use elbowroom_plan::{InstanceId, NodeId, StnPlan, network_node};
 use elbowroom_stn::WindowEnd;
 
 use super::{Bounds, Dispatch};
-use crate::horizon::NetworkLimit;
-use crate::reason::{Behind, Changed};
+use crate::reason::{Evidence, TimedChange};
+use crate::window_propagation::NetworkLimit;
 
 /// Number of constraints of a long chain that are named.
-const MOST_NAMED: usize = 4;
+const MAX_NAMED_CONSTRAINTS: usize = 4;
 
 /// Describes a constraint of a plan; a timed initial without its time.
-pub(super) fn named(task: &Task, plan: &StnPlan, index: usize) -> Behind {
+pub(super) fn describe_constraint(task: &Task, plan: &StnPlan, index: usize) -> Evidence {
     let constraint = &plan.constraints[index];
     if let elbowroom_plan::Reason::Timed(timed) = constraint.reason {
-        return Behind::Timed {
-            changes: Changed::all(task, &task.timed()[timed].changes),
+        return Evidence::Timed {
+            changes: TimedChange::all(task, &task.timed()[timed].changes),
             at: None,
         };
     }
     if let Some(id) = plan.duration_of(constraint) {
-        return Behind::Duration(plan.instance(id).action.name.clone());
+        return Evidence::Duration(plan.instance(id).action.name.clone());
     }
-    let node = |id: NodeId| plan.node_words(task, id);
-    Behind::Order {
+    let node = |id: NodeId| plan.describe_node(task, id);
+    Evidence::Order {
         first: node(constraint.from),
         second: node(constraint.to),
     }
@@ -35,24 +35,24 @@ impl Dispatch {
     /// Returns the plan's constraints that cause one end of a node's window. Of a long chain, only
     /// both ends are returned: the origin, for example a deadline, and the constraints next to the
     /// node.
-    pub(super) fn behind(&self, node: NodeId, end: WindowEnd) -> Vec<Behind> {
-        let limits = self.horizon.grounds(network_node(node), end);
+    pub(super) fn window_evidence(&self, node: NodeId, end: WindowEnd) -> Vec<Evidence> {
+        let limits = self.horizon.window_causes(network_node(node), end);
         let named = |limit: &NetworkLimit| {
             let index = self.sources.of(*limit)?;
-            let mut named = named(&self.task, &self.plan, index);
-            if let (elbowroom_plan::Reason::Timed(timed), Behind::Timed { at, .. }) =
+            let mut named = describe_constraint(&self.task, &self.plan, index);
+            if let (elbowroom_plan::Reason::Timed(timed), Evidence::Timed { at, .. }) =
                 (&self.plan.constraints[index].reason, &mut named)
             {
-                *at = Some(self.world(&self.task.timed()[*timed].time));
+                *at = Some(self.to_world_time(&self.task.timed()[*timed].time));
             }
             Some(named)
         };
-        let mut chain: Vec<Behind> = limits.iter().filter_map(named).collect();
+        let mut chain: Vec<Evidence> = limits.iter().filter_map(named).collect();
         chain.dedup();
-        if chain.len() > MOST_NAMED {
-            let last = chain.split_off(chain.len() - MOST_NAMED / 2);
-            chain.truncate(MOST_NAMED / 2);
-            chain.push(Behind::Others);
+        if chain.len() > MAX_NAMED_CONSTRAINTS {
+            let last = chain.split_off(chain.len() - MAX_NAMED_CONSTRAINTS / 2);
+            chain.truncate(MAX_NAMED_CONSTRAINTS / 2);
+            chain.push(Evidence::Others);
             chain.extend(last);
         }
         chain
@@ -62,7 +62,7 @@ impl Dispatch {
     /// own duration.
     pub(super) fn is_limited_by_duration(&self, id: InstanceId, end: WindowEnd) -> bool {
         let node = network_node(self.ends[id.index()][1]);
-        let behind = self.horizon.grounds(node, end);
+        let behind = self.horizon.window_causes(node, end);
         let index = behind.last().and_then(|behind| self.sources.of(*behind));
         index.is_some_and(|index| self.plan.duration_of(&self.plan.constraints[index]) == Some(id))
     }

@@ -8,9 +8,9 @@ use elbowroom_stn::Network;
 
 /// Execution progress of a plan.
 #[derive(Clone, Debug)]
-pub(super) struct Progress {
+pub(super) struct PlanProgress {
     /// The time at which each node was executed, on the plan's clock.
-    pub(super) happened: Vec<Option<Rational>>,
+    pub(super) executed: Vec<Option<Rational>>,
     /// For each node, the number of its predecessors that have not been executed.
     pub(super) missing: Vec<u32>,
     /// For each node, its successors.
@@ -20,26 +20,26 @@ pub(super) struct Progress {
     /// Instances that were commanded to start and have not ended.
     pub(super) running: BTreeSet<InstanceId>,
     /// Number of instances that have not ended.
-    pub(super) left: usize,
+    pub(super) remaining: usize,
 }
 
-impl Progress {
+impl PlanProgress {
     /// Creates the progress of a plan without any executed node. `constraints` are the plan's,
     /// without parameters.
     pub(super) fn new(plan: &StnPlan, constraints: &[Constraint]) -> Self {
         let count = plan.nodes.len();
         let mut progress = Self {
-            happened: vec![None; count],
+            executed: vec![None; count],
             missing: vec![0; count],
             successors: vec![Vec::new(); count],
             ready: BTreeSet::new(),
             running: BTreeSet::new(),
-            left: plan.instances.len(),
+            remaining: plan.instances.len(),
         };
         let mut before = vec![BTreeSet::new(); count];
-        let together = falling_together(count, constraints);
+        let together = simultaneous_groups(count, constraints);
         let mut order = |earlier: NodeId, later: NodeId, least: &Rational| {
-            let is_end = is_end_to_wait_for(plan, &together, earlier, later);
+            let is_end = is_preceding_end(plan, &together, earlier, later);
             let is_timed = matches!(plan.nodes[earlier.index()], Node::Timed(_));
             // Simultaneous starts do not wait for each other.
             let follows = is_end || together[earlier.index()] != together[later.index()];
@@ -64,7 +64,7 @@ impl Progress {
             if !matches!(what, Node::Start(_) | Node::Instant(_)) {
                 continue;
             }
-            for earlier in with_ends_before(plan, &before, &together, node) {
+            for earlier in required_nodes(plan, &before, &together, node) {
                 progress.successors[earlier.index()].push(node);
                 progress.missing[node.index()] += 1;
             }
@@ -80,15 +80,15 @@ impl Progress {
     }
 
     /// Records the execution of a node.
-    pub(super) fn happen(&mut self, plan: &StnPlan, node: NodeId, time: &Rational) {
-        if self.happened[node.index()].replace(time.clone()).is_some() {
+    pub(super) fn record_execution(&mut self, plan: &StnPlan, node: NodeId, time: &Rational) {
+        if self.executed[node.index()].replace(time.clone()).is_some() {
             return;
         }
         for after in std::mem::take(&mut self.successors[node.index()]) {
             let missing = &mut self.missing[after.index()];
             *missing -= 1;
             let is_start = matches!(plan.nodes[after.index()], Node::Start(_) | Node::Instant(_));
-            if *missing == 0 && is_start && self.happened[after.index()].is_none() {
+            if *missing == 0 && is_start && self.executed[after.index()].is_none() {
                 self.ready.insert(after);
             }
         }
@@ -98,7 +98,7 @@ impl Progress {
 /// Returns `true` if `node` is an end that `later` has to wait for, even if both must happen at the
 /// same time. `later` does not wait for the end of an action without duration at the same moment,
 /// for example its own end.
-fn is_end_to_wait_for(plan: &StnPlan, together: &[usize], node: NodeId, later: NodeId) -> bool {
+fn is_preceding_end(plan: &StnPlan, together: &[usize], node: NodeId, later: NodeId) -> bool {
     match plan.nodes[node.index()] {
         Node::End(id) => together[plan.start(id).index()] != together[later.index()],
         _ => false,
@@ -107,7 +107,7 @@ fn is_end_to_wait_for(plan: &StnPlan, together: &[usize], node: NodeId, later: N
 
 /// Returns, for each node, a number that it shares with the nodes that must happen at the same
 /// time.
-fn falling_together(count: usize, constraints: &[Constraint]) -> Vec<usize> {
+fn simultaneous_groups(count: usize, constraints: &[Constraint]) -> Vec<usize> {
     let mut network = Network::with_nodes(count);
     let node = |id: NodeId| network_node(id);
     let zero = Bound::Finite(Rational::ZERO);
@@ -132,7 +132,7 @@ fn falling_together(count: usize, constraints: &[Constraint]) -> Vec<usize> {
 ///
 /// Ends at the same time are reported one after the other, and the plan may order only one of them
 /// before the start.
-fn with_ends_before(
+fn required_nodes(
     plan: &StnPlan,
     before: &[BTreeSet<NodeId>],
     together: &[usize],
@@ -145,7 +145,7 @@ fn with_ends_before(
             continue;
         }
         for &earlier in &before[node.index()] {
-            if is_end_to_wait_for(plan, together, earlier, start) && all.insert(earlier) {
+            if is_preceding_end(plan, together, earlier, start) && all.insert(earlier) {
                 frontier.push(earlier);
             }
         }

@@ -7,9 +7,9 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::{Dispatch, in_words, is_instantaneous};
-use crate::event::Ticket;
-use crate::executor::Moment;
-use crate::progression::Progression;
+use crate::belief_state::BeliefState;
+use crate::event::ActionHandle;
+use crate::executor::DecisionContext;
 
 /// First failure in the simulation of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,24 +21,27 @@ pub(crate) struct Failure {
 }
 
 /// First ticket of simulated starts.
-const IMAGINED: u64 = 1 << 63;
+const FIRST_SIMULATED_TICKET: u64 = 1 << 63;
 
 /// Simulates the remaining plan without further deviations. Returns the first condition that does
 /// not hold.
-pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failure> {
+pub(crate) fn simulate_remaining_plan(
+    dispatch: &Dispatch,
+    moment: &DecisionContext<'_>,
+) -> Option<Failure> {
     let mut state = moment.belief.clone();
-    let mut running: Vec<(InstanceId, Ticket)> = Vec::new();
-    for (time, node) in expected(dispatch, moment.now) {
+    let mut running: Vec<(InstanceId, ActionHandle)> = Vec::new();
+    for (time, node) in expected_happenings(dispatch, moment.now) {
         // A value that cannot be computed shows up as a condition without a value.
         let _ = state.advance(&time.max(state.time().clone()));
-        if let Some(failure) = broken(&state) {
+        if let Some(failure) = violated_condition(&state) {
             return Some(failure);
         }
         match dispatch.plan().nodes[node.index()] {
             Node::Start(id) | Node::Instant(id) => {
                 let action = dispatch.action(id);
                 let duration = dispatch.nominal_duration(id);
-                if let Some(reason) = dispatch.unmet(id, &duration, &state) {
+                if let Some(reason) = dispatch.unmet_start_condition(id, &duration, &state) {
                     return Some(Failure {
                         action: reason.action,
                         condition: reason
@@ -46,7 +49,7 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
                             .map_or(String::new(), |about| about.to_string()),
                     });
                 }
-                let ticket = Ticket(IMAGINED + u64::from(id.0));
+                let ticket = ActionHandle(FIRST_SIMULATED_TICKET + u64::from(id.0));
                 let _ = state.start(ticket, action, &duration, &[]);
                 if !is_instantaneous(action) {
                     running.push((id, ticket));
@@ -62,7 +65,7 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
             Node::Zero | Node::Timed(_) => {}
         }
     }
-    let unmet = state.unmet_in_the_end();
+    let unmet = state.unmet_finally();
     (!unmet.is_empty()).then(|| Failure {
         action: None,
         condition: in_words(&state, &unmet).join(" and "),
@@ -70,11 +73,11 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
 }
 
 /// Returns the coming happenings with their expected times, in order.
-fn expected(dispatch: &Dispatch, now: &Rational) -> Vec<(Rational, NodeId)> {
+fn expected_happenings(dispatch: &Dispatch, now: &Rational) -> Vec<(Rational, NodeId)> {
     let plan = dispatch.plan();
     let is_open = |node: &NodeId| {
         let happens = !matches!(plan.nodes[node.index()], Node::Zero | Node::Timed(_));
-        happens && dispatch.happened(*node).is_none()
+        happens && dispatch.execution_time(*node).is_none()
     };
     let mut nodes: Vec<NodeId> = plan.nodes().map(|(node, _)| node).filter(is_open).collect();
     nodes.sort_by_key(|node| dispatch.nominal_time(*node));
@@ -82,7 +85,7 @@ fn expected(dispatch: &Dispatch, now: &Rational) -> Vec<(Rational, NodeId)> {
     let mut times = Vec::with_capacity(nodes.len());
     for node in nodes {
         let (earliest, _) = dispatch.window_of(node);
-        let nominal = dispatch.world(dispatch.nominal_time(node));
+        let nominal = dispatch.to_world_time(dispatch.nominal_time(node));
         let earliest = earliest.map_or(nominal.clone(), |earliest| earliest.max(nominal));
         latest = latest.max(earliest);
         times.push((latest.clone(), node));
@@ -91,11 +94,11 @@ fn expected(dispatch: &Dispatch, now: &Rational) -> Vec<(Rational, NodeId)> {
 }
 
 fn ticket_of(
-    state: &Progression,
+    state: &BeliefState,
     action: &Arc<Action>,
-    running: &[(InstanceId, Ticket)],
+    running: &[(InstanceId, ActionHandle)],
     id: InstanceId,
-) -> Option<Ticket> {
+) -> Option<ActionHandle> {
     if let Some((_, ticket)) = running.iter().find(|(instance, _)| *instance == id) {
         return Some(*ticket);
     }
@@ -105,7 +108,7 @@ fn ticket_of(
         .map(|(ticket, _)| *ticket)
 }
 
-fn at_end(state: &Progression, ticket: Ticket) -> Option<Failure> {
+fn at_end(state: &BeliefState, ticket: ActionHandle) -> Option<Failure> {
     let underway = state.running().get(&ticket)?;
     let body = underway.action.durative()?;
     let unmet = state.unmet_on_arrival(&body.end.condition, Some(&underway.planned));
@@ -115,10 +118,10 @@ fn at_end(state: &Progression, ticket: Ticket) -> Option<Failure> {
     })
 }
 
-fn broken(state: &Progression) -> Option<Failure> {
-    let (_, underway) = state.broken()?;
+fn violated_condition(state: &BeliefState) -> Option<Failure> {
+    let (_, underway) = state.violated_action()?;
     Some(Failure {
         action: Some(underway.action.name.clone()),
-        condition: in_words(state, &underway.broken_parts()).join(" and "),
+        condition: in_words(state, &underway.violated_conjuncts()).join(" and "),
     })
 }

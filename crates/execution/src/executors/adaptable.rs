@@ -1,9 +1,9 @@
 //! `adaptable`: Olisipo, on a clock.
 
-mod initial;
-mod orders;
+mod initial_belief;
+mod order_cache;
+mod remaining_order;
 mod repetitions;
-mod rest;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,17 +14,17 @@ use elbowroom_probability::{
     LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, SearchSettings, Semantics,
 };
 
-use super::chooser::Chooser;
-use super::{Foresight, Registered};
+use super::happening_choice::HappeningChooser;
+use super::{ExecutorEntry, PolicyTableCache};
 use crate::dispatch::replan;
-use crate::executor::Need;
-use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
-use crate::reason::{About, Cause, Reason};
-use initial::Initial;
-pub use orders::Orders;
-use rest::Rest;
+use crate::executor::PlanForm;
+use crate::executor::{Decided, DecisionContext, Executor, Planned, PreparedPlan, StepId};
+use crate::reason::{Cause, Reason, Subject};
+use initial_belief::InitialBelief;
+pub use order_cache::OrderCache;
+use remaining_order::RemainingOrder;
 
-pub(super) const REGISTERED: Registered = Registered {
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "adaptable",
     argument: None,
     is_optional: false,
@@ -32,14 +32,14 @@ pub(super) const REGISTERED: Registered = Registered {
               the present state: it skips, repeats and reorders actions where that is \
               likelier and there is time for it, and replans when no order can work.",
     paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
-    need: Need::PartialOrder,
+    need: PlanForm::PartialOrder,
     make: |_, means| {
         Box::new(Adaptable {
-            initial: Initial::of(&means.likelihoods),
+            initial: InitialBelief::of(&means.likelihoods),
             likelihoods: means.likelihoods,
-            orders: means.orders,
-            foresight: None,
-            is_table_circling: false,
+            orders: means.order_cache,
+            policy_tables: None,
+            is_table_cycling: false,
             state: None,
         })
     },
@@ -47,42 +47,47 @@ pub(super) const REGISTERED: Registered = Registered {
 
 /// For `lookahead`: greatest number of happenings of a plan whose orders are searched completely
 /// before each start.
-const SHORT: usize = 20;
+const MAX_EXACT_HAPPENINGS: usize = 20;
 
 /// See [`REGISTERED`]. With foresight it is `lookahead`.
 #[derive(Clone)]
 pub(super) struct Adaptable {
     likelihoods: Arc<Likelihoods>,
     /// Uncertain initial facts. A new plan does not change them.
-    initial: Initial,
+    initial: InitialBelief,
     /// Searches of plans that were adopted earlier.
-    orders: Option<Orders>,
-    foresight: Option<Foresight>,
+    orders: Option<OrderCache>,
+    policy_tables: Option<PolicyTableCache>,
     /// `true` if the table of a small world has led to the same state repeatedly. Orders are
     /// executed then.
-    is_table_circling: bool,
-    state: Option<Rest>,
+    is_table_cycling: bool,
+    state: Option<RemainingOrder>,
 }
 
 impl Executor for Adaptable {
-    fn need(&self) -> Need {
+    fn need(&self) -> PlanForm {
         REGISTERED.need
     }
 
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
-        let (chooser, steps) = match self.tabulated(mission) {
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {
+        let (chooser, steps) = match self.table_policy(mission) {
             Some(tabulated) => tabulated,
-            None => self.orders(mission)?,
+            None => self.order_policy(mission)?,
         };
-        self.state = Some(Rest::new(mission, chooser, steps, &self.likelihoods));
+        self.state = Some(RemainingOrder::new(
+            mission,
+            chooser,
+            steps,
+            &self.likelihoods,
+        ));
         Ok(())
     }
 
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided {
         let Some(rest) = &mut self.state else {
             return super::without_plan();
         };
-        for news in moment.news {
+        for news in moment.plan_events {
             if !self.initial.is_empty() {
                 let task = moment.belief.task();
                 self.initial.learn(news, rest.action_of(news), task);
@@ -92,7 +97,7 @@ impl Executor for Adaptable {
             }
         }
         let decided = rest.next(moment, &self.initial);
-        self.is_table_circling |= rest.is_table_circling();
+        self.is_table_cycling |= rest.is_table_cycling();
         decided
     }
 
@@ -107,23 +112,26 @@ impl Executor for Adaptable {
 
 impl Adaptable {
     /// Creates `lookahead`.
-    pub(super) fn with_foresight(likelihoods: Arc<Likelihoods>, foresight: Foresight) -> Self {
+    pub(super) fn with_policy_tables(
+        likelihoods: Arc<Likelihoods>,
+        foresight: PolicyTableCache,
+    ) -> Self {
         Self {
-            initial: Initial::of(&likelihoods),
+            initial: InitialBelief::of(&likelihoods),
             likelihoods,
             orders: None,
-            foresight: Some(foresight),
-            is_table_circling: false,
+            policy_tables: Some(foresight),
+            is_table_cycling: false,
             state: None,
         }
     }
 
     /// Returns the table of a small world, with its actions. `None` if an action is running or the
     /// state is uncertain.
-    fn tabulated(&self, mission: &Mission) -> Option<(Chooser, Vec<Step>)> {
-        let foresight = self.foresight.as_ref()?;
+    fn table_policy(&self, mission: &PreparedPlan) -> Option<(HappeningChooser, Vec<Step>)> {
+        let foresight = self.policy_tables.as_ref()?;
         // A table requires a fully known state.
-        if !mission.running.is_empty() || !self.initial.is_empty() || self.is_table_circling {
+        if !mission.running.is_empty() || !self.initial.is_empty() || self.is_table_cycling {
             return None;
         }
         let table = foresight.table(&mission.task, &self.likelihoods)?;
@@ -139,7 +147,7 @@ impl Adaptable {
             return None;
         }
         let search = Box::new(table.search());
-        let chooser = Chooser::Table {
+        let chooser = HappeningChooser::Table {
             table,
             search,
             value: 0.0,
@@ -148,10 +156,13 @@ impl Adaptable {
     }
 
     /// Returns the search for orders of a plan, with its steps.
-    fn orders(&self, mission: &Mission) -> Result<(Chooser, Vec<Step>), Box<Reason>> {
-        let looks_ahead = self.foresight.is_some();
+    fn order_policy(
+        &self,
+        mission: &PreparedPlan,
+    ) -> Result<(HappeningChooser, Vec<Step>), Box<Reason>> {
+        let looks_ahead = self.policy_tables.is_some();
         let Some(plan) = mission.order.clone() else {
-            let reason = Reason::new(Cause::NoOrder).about(About::NoPartialOrder);
+            let reason = Reason::new(Cause::NoOrder).about(Subject::NoPartialOrder);
             return Err(Box::new(reason));
         };
         // In both, running actions come first.
@@ -164,7 +175,7 @@ impl Adaptable {
         let steps: Vec<Step> = by_instance.into_values().cloned().collect();
         let known = self.orders.as_ref();
         if let Some(dispatch) = known.and_then(|it| it.get(&mission.task, &plan, &steps)) {
-            return Ok((Chooser::Orders(Box::new(dispatch)), steps));
+            return Ok((HappeningChooser::OrderSearch(Box::new(dispatch)), steps));
         }
         let kept = known.is_some().then(|| plan.clone());
         let task = Arc::clone(&mission.task);
@@ -174,7 +185,7 @@ impl Adaptable {
             Semantics::Paper
         };
         let model = Model::new(task, plan, &self.likelihoods, semantics).map_err(|missing| {
-            let about = About::Said(missing.to_string());
+            let about = Subject::ExternalMessage(missing.to_string());
             Box::new(Reason::new(Cause::NoOrder).about(about))
         })?;
         // On a clock, facts do not change from step to step. An order that relies on such changes
@@ -185,9 +196,9 @@ impl Adaptable {
             model
         };
         let search = OrderSearch::new(model, SearchSettings::default());
-        let as_planned = search.as_timed(&steps);
+        let as_planned = search.timed_sequence(&steps);
         let search = search.beginning_with(as_planned);
-        let is_short = search.model().plan().nodes.len() <= SHORT;
+        let is_short = search.model().plan().nodes.len() <= MAX_EXACT_HAPPENINGS;
         let reconsider = if looks_ahead && is_short {
             Reconsider::Always
         } else {
@@ -197,6 +208,6 @@ impl Adaptable {
         if let (Some(orders), Some(plan)) = (known, kept) {
             orders.put(&mission.task, plan, &steps, &dispatch);
         }
-        Ok((Chooser::Orders(Box::new(dispatch)), steps))
+        Ok((HappeningChooser::OrderSearch(Box::new(dispatch)), steps))
     }
 }

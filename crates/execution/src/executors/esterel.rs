@@ -1,17 +1,19 @@
 //! `esterel`: paper 2's baseline.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::uncertain::Reading;
+use elbowroom_plan::uncertain::ConstraintRole;
 use elbowroom_plan::{Bound, Constraint, Node, NodeId};
 
-use super::Registered;
-use crate::dispatch::{Bounds, Dispatch, Sight, replan};
+use super::ExecutorEntry;
+use crate::dispatch::{Bounds, Dispatch, PropagationReach, replan};
 use crate::event::Ending;
-use crate::executor::Need;
-use crate::executor::{Decided, Executor, Mission, Moment, News, Planned, StepId};
-use crate::reason::{About, Cause, Reason};
+use crate::executor::PlanForm;
+use crate::executor::{
+    Decided, DecisionContext, Executor, PlanEvent, Planned, PreparedPlan, StepId,
+};
+use crate::reason::{Cause, Reason, Subject};
 
-pub(super) const REGISTERED: Registered = Registered {
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "esterel",
     argument: None,
     is_optional: false,
@@ -21,7 +23,7 @@ pub(super) const REGISTERED: Registered = Registered {
               or when the plan is over without reaching the goal. It ignores deadlines and \
               durations.",
     paper: "the Esterel Dispatcher of ROSPlan, the baseline in Ribeiro et al. (2021), section 3",
-    need: Need::Network,
+    need: PlanForm::Network,
     make: |_, _| Box::new(Esterel { dispatch: None }),
 };
 
@@ -33,11 +35,11 @@ struct Esterel {
 }
 
 impl Executor for Esterel {
-    fn need(&self) -> Need {
+    fn need(&self) -> PlanForm {
         REGISTERED.need
     }
 
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {
         let plan = &mission.plan.plan;
         let bounds = |constraint: &Constraint| -> Bounds {
             if plan.duration_of(constraint).is_some() {
@@ -48,24 +50,24 @@ impl Executor for Esterel {
         };
         // The orderings hold for planned durations; real durations may bring an end close to a
         // start.
-        let dispatch =
-            Dispatch::new(mission, Sight::Whole, &bounds)?.keeping_apart(&Rational::ZERO);
+        let dispatch = Dispatch::new(mission, PropagationReach::WholeNetwork, &bounds)?
+            .with_separation(&Rational::ZERO);
         self.dispatch = Some(dispatch);
         Ok(())
     }
 
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided {
         let Some(dispatch) = &mut self.dispatch else {
             return super::without_plan();
         };
         let mut trouble = None;
-        for news in moment.news {
+        for news in moment.plan_events {
             let new = learn(dispatch, news);
             trouble = trouble.or(new);
         }
         match trouble {
             Some(reason) => replan(reason),
-            None => dispatch.go_on(moment),
+            None => dispatch.decide_without_checks(moment),
         }
     }
 
@@ -80,58 +82,65 @@ impl Executor for Esterel {
 
 /// Continues with a plan by its orderings alone. Returns `None` if they contradict each other after
 /// the events so far.
-pub(super) fn carry_on(mut dispatch: Dispatch, now: &Rational) -> Option<Box<dyn Executor>> {
-    let local = dispatch.local(now);
+pub(super) fn continue_by_orderings(
+    mut dispatch: Dispatch,
+    now: &Rational,
+) -> Option<Box<dyn Executor>> {
+    let local = dispatch.to_plan_time(now);
     let plan = dispatch.plan().clone();
     let is_timed = |node: NodeId| matches!(plan.nodes[node.index()], Node::Timed(_));
     let reading = |constraint: &Constraint| {
         let (lower, upper) = orderings(constraint);
         // An ordering before a timed initial is a deadline.
-        Reading::Requirement {
+        ConstraintRole::Requirement {
             lower: lower.filter(|_| !is_timed(constraint.to)),
             upper: upper.filter(|_| !is_timed(constraint.from)),
         }
     };
-    dispatch.rebound(&local, &reading).ok()?;
+    dispatch.with_bounds(&local, &reading).ok()?;
     Some(Box::new(Esterel {
-        dispatch: Some(dispatch.keeping_apart(&local)),
+        dispatch: Some(dispatch.with_separation(&local)),
     }))
 }
 
 /// Processes a news item. Returns the reason if the plan has to be abandoned.
-fn learn(dispatch: &mut Dispatch, news: &News) -> Option<Reason> {
+fn learn(dispatch: &mut Dispatch, news: &PlanEvent) -> Option<Reason> {
     match news {
-        News::Started { step, time, .. } => {
+        PlanEvent::Started { step, time, .. } => {
             dispatch.note_start(step.instance(), time);
             None
         }
-        News::Ended {
+        PlanEvent::Ended {
             step, time, ending, ..
         } => {
             let id = step.instance();
-            let [start, _] = dispatch.nodes_of(id);
+            let [start, _] = dispatch.start_and_end_nodes(id);
             let name = &dispatch.action(id).name;
             let why = match ending {
                 Ending::Succeeded => {
                     dispatch.note_end(id, time);
                     return None;
                 }
-                Ending::Failed { .. } if dispatch.happened(start).is_none() => {
-                    dispatch.try_again(id, time);
+                Ending::Failed { .. } if dispatch.execution_time(start).is_none() => {
+                    dispatch.schedule_retry(id, time);
                     return None;
                 }
-                Ending::Failed { why } => About::Said(why.clone()),
-                Ending::Cancelled => About::Cancelled,
+                Ending::Failed { why } => Subject::ExternalMessage(why.clone()),
+                Ending::Cancelled => Subject::Cancelled,
             };
-            let reason = Reason::new(Cause::Failed).of(name).about(why);
+            let reason = Reason::new(Cause::Failed).for_action(name).about(why);
             Some(reason.since(time.clone()))
         }
         // Conditions are only checked when an action is started.
-        News::Fact(_) | News::Value(_) => None,
-        News::Contradiction { action } => Some(Reason::new(Cause::Contradiction).of(action)),
-        News::Silence { action, since } => {
-            Some(Reason::new(Cause::Silence).of(action).since(since.clone()))
+        PlanEvent::Fact(_) | PlanEvent::Value(_) => None,
+        PlanEvent::Contradiction { action } => {
+            Some(Reason::new(Cause::Contradiction).for_action(action))
         }
+        PlanEvent::TimedOut { action, since } => Some(
+            Reason::new(Cause::Silence)
+                .for_action(action)
+                .since(since.clone()),
+        ),
     }
 }
 
@@ -155,7 +164,7 @@ mod tests {
     use super::orderings;
 
     #[test]
-    fn only_what_comes_first_is_taken_from_a_constraint() {
+    fn constraint_contributes_only_its_ordering() {
         let between = |lower: i64, upper: i64| Constraint {
             from: NodeId(1),
             to: NodeId(2),

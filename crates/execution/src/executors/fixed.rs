@@ -3,14 +3,14 @@
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{Bound, Constraint, Node, NodeId, Schedule, StnPlan};
 
-use super::Registered;
-use crate::dispatch::{Bounds, Dispatch, Sight, given, replan};
-use crate::executor::Need;
-use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
-use crate::quantities::amounts;
-use crate::reason::{About, Cause, Reason};
+use super::ExecutorEntry;
+use crate::dispatch::{Bounds, Dispatch, PropagationReach, constant_bounds, replan};
+use crate::executor::PlanForm;
+use crate::executor::{Decided, DecisionContext, Executor, Planned, PreparedPlan, StepId};
+use crate::measured_amounts::amounts;
+use crate::reason::{Cause, Reason, Subject};
 
-pub(super) const REGISTERED: Registered = Registered {
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "fixed",
     argument: Some("percentage of the planned value"),
     is_optional: false,
@@ -18,7 +18,7 @@ pub(super) const REGISTERED: Registered = Registered {
               value by more than X %. It looks no further than the constraints at each time \
               point, and notices a missed deadline only there.",
     paper: "BLEX(X) in Cashmore et al. (2020), section 5",
-    need: Need::Orderings,
+    need: PlanForm::Orderings,
     make: |argument, _| Box::new(Fixed::new(&argument.unwrap_or_default())),
 };
 
@@ -27,7 +27,7 @@ pub(super) const REGISTERED: Registered = Registered {
 struct Fixed {
     /// X / 100.
     share: Rational,
-    state: Option<(Dispatch, Mission)>,
+    state: Option<(Dispatch, PreparedPlan)>,
 }
 
 impl Fixed {
@@ -39,7 +39,7 @@ impl Fixed {
     }
 
     /// Returns the tolerated values around a nominal one.
-    fn around(&self, nominal: &Rational) -> Interval {
+    fn tolerance_around(&self, nominal: &Rational) -> Interval {
         let room = nominal.abs() * &self.share;
         Interval::closed(nominal - &room, nominal + &room)
     }
@@ -47,7 +47,7 @@ impl Fixed {
 
 /// Replaces constraints relative to timed initials by constraints relative to time 0, which is one
 /// hop away. The times of timed initials are known from the beginning.
-fn place_timed(plan: &mut StnPlan, nominal: &Schedule) {
+fn anchor_timed_initials(plan: &mut StnPlan, nominal: &Schedule) {
     let is_timed = |node: NodeId| matches!(plan.nodes[node.index()], Node::Timed(_));
     let shifted = |bound: &Bound, by: &Rational| match bound {
         Bound::Finite(value) => Some(Bound::Finite(value + by)),
@@ -87,21 +87,21 @@ fn place_timed(plan: &mut StnPlan, nominal: &Schedule) {
 }
 
 impl Executor for Fixed {
-    fn need(&self) -> Need {
+    fn need(&self) -> PlanForm {
         REGISTERED.need
     }
 
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {
         let mut mission = mission.clone();
-        place_timed(&mut mission.plan.plan, &mission.nominal);
+        anchor_timed_initials(&mut mission.plan.plan, &mission.nominal);
         let mission = &mission;
         let plan = &mission.plan.plan;
         let bounds = |constraint: &Constraint| -> Bounds {
             let Some(instance) = plan.duration_of(constraint) else {
-                return given(constraint);
+                return constant_bounds(constraint);
             };
             let time = |node: elbowroom_plan::NodeId| &mission.nominal[node];
-            let room = self.around(&(time(constraint.to) - time(constraint.from)));
+            let room = self.tolerance_around(&(time(constraint.to) - time(constraint.from)));
             // The remaining duration of a running action is an estimate; the action may end sooner.
             let is_rest = mission.running.contains_key(&StepId::from(instance));
             let lower = if is_rest {
@@ -113,25 +113,25 @@ impl Executor for Fixed {
         };
         // The orderings are those of facts alone, so numbers could be written and read at the same
         // time.
-        let dispatch =
-            Dispatch::new(mission, Sight::OneHop, &bounds)?.keeping_apart(&Rational::ZERO);
+        let dispatch = Dispatch::new(mission, PropagationReach::OneHop, &bounds)?
+            .with_separation(&Rational::ZERO);
         self.state = Some((dispatch, mission.clone()));
         Ok(())
     }
 
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided {
         let share = self.share.clone();
         let Some((dispatch, mission)) = &mut self.state else {
             return super::without_plan();
         };
-        if let Some(reason) = dispatch.take(moment) {
+        if let Some(reason) = dispatch.process_news(moment) {
             return replan(*reason);
         }
         for deviation in amounts(&mission.plan, moment).deviations {
             let room = deviation.expected.abs() * &share;
             let distance = (&deviation.observed - &deviation.expected).abs();
             if distance > room {
-                let about = About::Change(deviation.fluent);
+                let about = Subject::Change(deviation.fluent);
                 let mut reason = Reason::new(Cause::OutsideInterval).about(about);
                 reason.action = Some(deviation.action);
                 reason.observed = Some(deviation.observed);

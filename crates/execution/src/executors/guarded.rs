@@ -3,14 +3,16 @@
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{Constraint, DecoupledEnvelope, InstanceId, Valuation};
 
-use super::{Registered, promise};
+use super::{ExecutorEntry, guarantee_status};
 use crate::dispatch::{Dispatch, replan};
-use crate::executor::{CAN_HAVE_A_CLOCK, Need};
-use crate::executor::{Decided, Decision, Executor, Mission, Moment, Planned, StepId};
-use crate::quantities::{Reading, amounts, duration_parameters};
-use crate::reason::{About, Cause, Promise, Reason};
+use crate::executor::{
+    Decided, Decision, DecisionContext, Executor, Planned, PreparedPlan, StepId,
+};
+use crate::executor::{PlanForm, SUPPORTS_REAL_CLOCK};
+use crate::measured_amounts::{AmountEquation, amounts, duration_parameters};
+use crate::reason::{Cause, GuaranteeLevel, Reason, Subject};
 
-pub(super) const REGISTERED: Registered = Registered {
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "guarded",
     argument: None,
     is_optional: false,
@@ -19,94 +21,94 @@ pub(super) const REGISTERED: Registered = Registered {
               upper end, or too little time is left. Where only a start is late, it goes on with a \
               smaller envelope, if there is one.",
     paper: "DREEX, Algorithm 2 in Cashmore et al. (2020)",
-    need: Need::Envelope,
+    need: PlanForm::Envelope,
     make: |_, _| Box::new(Guarded { state: None }),
 };
 
 /// See [`REGISTERED`].
 #[derive(Clone, Debug)]
 struct Guarded {
-    state: Option<Guard>,
+    state: Option<GuardedPlan>,
 }
 
 #[derive(Clone, Debug)]
-struct Guard {
+struct GuardedPlan {
     dispatch: Dispatch,
-    mission: Mission,
+    prepared_plan: PreparedPlan,
     envelope: DecoupledEnvelope,
     /// The guarantee that dispatching maintains. It covers less than the envelope if the whole
     /// envelope would require knowing values in advance.
-    promise: Promise,
+    guarantee: GuaranteeLevel,
     /// `true` if the plan's conditions are more than single facts, for example numeric.
     reads_more_than_facts: bool,
     /// The weakest promise with which the plan is continued.
-    least: Promise,
+    weakest_guarantee: GuaranteeLevel,
     /// The observed values, and nominal ones for the rest.
     values: Valuation,
 }
 
 impl Executor for Guarded {
-    fn need(&self) -> Need {
+    fn need(&self) -> PlanForm {
         REGISTERED.need
     }
 
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {
         let Some(envelope) = mission.envelope.clone() else {
             return Err(Box::new(
-                Reason::new(Cause::GuaranteeLost).about(About::NoEnvelope),
+                Reason::new(Cause::GuaranteeLost).about(Subject::NoEnvelope),
             ));
         };
-        let reading = |constraint: &Constraint| mission.plan.reading(constraint, &envelope);
-        let (dispatch, promise) = match Dispatch::controlled(mission, &reading) {
-            Ok(dispatch) => (dispatch, Promise::Envelope),
-            Err(_) => promise::begin(mission)?,
+        let reading = |constraint: &Constraint| mission.plan.role(constraint, &envelope);
+        let (dispatch, promise) = match Dispatch::with_contingent_durations(mission, &reading) {
+            Ok(dispatch) => (dispatch, GuaranteeLevel::Envelope),
+            Err(_) => guarantee_status::begin(mission)?,
         };
-        self.state = Some(Guard {
+        self.state = Some(GuardedPlan {
             dispatch,
-            promise,
-            least: match promise {
-                Promise::Envelope => Promise::PartOfEnvelope,
-                _ => Promise::Luck,
+            guarantee: promise,
+            weakest_guarantee: match promise {
+                GuaranteeLevel::Envelope => GuaranteeLevel::PartOfEnvelope,
+                _ => GuaranteeLevel::Luck,
             },
             values: mission.plan.nominal(),
             reads_more_than_facts: mission.plan.reads_more_than_facts(&mission.task),
-            mission: mission.clone(),
+            prepared_plan: mission.clone(),
             envelope,
         });
         Ok(())
     }
 
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided {
         let Some(guard) = &mut self.state else {
             return super::without_plan();
         };
-        let trouble = guard.dispatch.take(moment);
+        let trouble = guard.dispatch.process_news(moment);
         if let Some(reason) = trouble
-            && let Some(reason) = guard.outlast(moment.now, *reason)
+            && let Some(reason) = guard.check_windows(moment.now, *reason)
         {
             return replan(*reason);
         }
-        if let Some(reason) = guard.dispatch.overdue(moment)
-            && let Some(reason) = guard.outlast(moment.now, reason)
+        if let Some(reason) = guard.dispatch.overdue_reason(moment)
+            && let Some(reason) = guard.check_windows(moment.now, reason)
         {
             return replan(*reason);
         }
-        let amounts = amounts(&guard.mission.plan, moment);
+        let amounts = amounts(&guard.prepared_plan.plan, moment);
         let outside = amounts
             .readings
             .iter()
-            .find_map(|reading| guard.outside(reading, moment.now));
+            .find_map(|reading| guard.outside_interval(reading, moment.now));
         if let Some(reason) = outside {
             return replan(reason);
         }
         for deviation in &amounts.deviations {
-            if let Some(reason) = guard.dispatch.surprise(moment, &deviation.fluent) {
+            if let Some(reason) = guard.dispatch.unexpected_failure(moment, &deviation.fluent) {
                 return replan(reason);
             }
         }
         let mut decided = guard.dispatch.next(moment);
-        decided.reason.promise = match decided.decision {
-            Decision::Start(_) | Decision::Wait { .. } => Some(guard.promise),
+        decided.reason.guarantee = match decided.decision {
+            Decision::Start(_) | Decision::Wait { .. } => Some(guard.guarantee),
             _ => None,
         };
         decided
@@ -117,7 +119,7 @@ impl Executor for Guarded {
     }
 
     fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
-        let guard = self.state.as_ref().filter(|_| CAN_HAVE_A_CLOCK)?;
+        let guard = self.state.as_ref().filter(|_| SUPPORTS_REAL_CLOCK)?;
         guard.bears_until(step.instance(), now)
     }
 
@@ -126,23 +128,23 @@ impl Executor for Guarded {
     }
 }
 
-impl Guard {
+impl GuardedPlan {
     /// Returns the latest end of a running action, beyond its present window, that does not require
     /// a new plan. It lies within the action's interval if the plan was adopted with its whole
     /// envelope.
     fn bears_until(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
-        let [start, _] = self.dispatch.nodes_of(instance);
-        let begun = self.dispatch.happened(start)?;
-        let mut durations = duration_parameters(&self.mission.plan);
+        let [start, _] = self.dispatch.start_and_end_nodes(instance);
+        let begun = self.dispatch.execution_time(start)?;
+        let mut durations = duration_parameters(&self.prepared_plan.plan);
         let own = durations.find(|(_, own)| *own == instance);
         let most = own.and_then(|(own, _)| self.envelope.interval(own).upper.value());
         let most = begun + most?;
-        if self.least == Promise::PartOfEnvelope {
-            return self.dispatch.prolongable(instance, &most, now);
+        if self.weakest_guarantee == GuaranteeLevel::PartOfEnvelope {
+            return self.dispatch.latest_tolerable_end(instance, &most, now);
         }
-        let plan = (&self.mission, &self.values);
-        let latest = promise::bears_until(&self.dispatch, plan, instance, now)?;
-        Some(latest.min(self.dispatch.world(&most)))
+        let plan = (&self.prepared_plan, &self.values);
+        let latest = guarantee_status::bears_until(&self.dispatch, plan, instance, now)?;
+        Some(latest.min(self.dispatch.to_world_time(&most)))
     }
 
     /// Returns the reason to abandon the plan if an event happened outside its window. The plan is
@@ -150,15 +152,15 @@ impl Guard {
     /// the dispatched network never covered the whole envelope, or a start is late. On a real clock
     /// all starts are a little late, which reduces the slack of later steps, and an envelope may
     /// use up all the slack there is.
-    fn outlast(&mut self, now: &Rational, reason: Reason) -> Option<Box<Reason>> {
-        let local = self.dispatch.local(now);
+    fn check_windows(&mut self, now: &Rational, reason: Reason) -> Option<Box<Reason>> {
+        let local = self.dispatch.to_plan_time(now);
         let mut has_outlived = false;
-        for (parameter, instance) in duration_parameters(&self.mission.plan) {
-            let [start, end] = self.dispatch.nodes_of(instance);
-            let Some(start) = self.dispatch.happened(start) else {
+        for (parameter, instance) in duration_parameters(&self.prepared_plan.plan) {
+            let [start, end] = self.dispatch.start_and_end_nodes(instance);
+            let Some(start) = self.dispatch.execution_time(start) else {
                 continue;
             };
-            if let Some(end) = self.dispatch.happened(end) {
+            if let Some(end) = self.dispatch.execution_time(end) {
                 self.values[parameter] = end - start;
             } else {
                 let elapsed = &local - start;
@@ -169,25 +171,26 @@ impl Guard {
                 };
             }
         }
-        let was_whole = self.least == Promise::PartOfEnvelope;
-        let is_part = self.promise != Promise::Envelope;
+        let was_whole = self.weakest_guarantee == GuaranteeLevel::PartOfEnvelope;
+        let is_part = self.guarantee != GuaranteeLevel::Envelope;
         let is_borne =
             !was_whole || !has_outlived && (is_part || reason.cause == Cause::Unreachable);
         let stays_inside = self.envelope.contains(&self.values);
-        if !stays_inside || !is_borne || !promise::is_about_time(&reason) {
+        if !stays_inside || !is_borne || !guarantee_status::is_time_violation(&reason) {
             return Some(Box::new(reason));
         }
-        let rest = promise::Rest {
-            mission: &self.mission,
+        let rest = guarantee_status::RemainingPlan {
+            prepared_plan: &self.prepared_plan,
             values: &self.values,
             is_inside: was_whole,
             reads_more_than_facts: self.reads_more_than_facts,
-            promise: self.promise,
+            guarantee: self.guarantee,
             has_other_constraints: false,
         };
-        match promise::weaken(&mut self.dispatch, &rest, now, reason.clone()) {
-            Ok(promise) if promise <= self.least => {
-                self.promise = promise.max(Promise::PartOfEnvelope);
+        match guarantee_status::strongest_guarantee(&mut self.dispatch, &rest, now, reason.clone())
+        {
+            Ok(promise) if promise <= self.weakest_guarantee => {
+                self.guarantee = promise.max(GuaranteeLevel::PartOfEnvelope);
                 None
             }
             Ok(_) => Some(Box::new(reason)),
@@ -196,17 +199,21 @@ impl Guard {
     }
 
     /// Returns the reason if a measured amount is outside its guaranteed interval.
-    fn outside(&self, reading: &Reading, now: &Rational) -> Option<Reason> {
+    fn outside_interval(&self, reading: &AmountEquation, now: &Rational) -> Option<Reason> {
         let (about, observed, allowed) = if let Some((parameter, value)) = reading.value() {
-            let name = self.mission.plan.parameter(parameter).name.clone();
+            let name = self.prepared_plan.plan.parameter(parameter).name.clone();
             (
-                About::Parameter(name),
+                Subject::Parameter(name),
                 value,
                 self.envelope.interval(parameter).clone(),
             )
         } else {
-            let about = About::Change(reading.fluent.clone());
-            (about, reading.observed.clone(), self.guaranteed(reading))
+            let about = Subject::Change(reading.fluent.clone());
+            (
+                about,
+                reading.observed.clone(),
+                self.guaranteed_amounts(reading),
+            )
         };
         if allowed.contains(&observed) {
             return None;
@@ -224,7 +231,7 @@ impl Guard {
     /// Returns the amounts that are possible while all of their parameters lie in their intervals.
     /// The values of the individual parameters are unknown, but the guarantee only requires that
     /// such values exist.
-    fn guaranteed(&self, reading: &Reading) -> Interval {
+    fn guaranteed_amounts(&self, reading: &AmountEquation) -> Interval {
         let mut amounts = Interval::point(reading.constant.clone());
         for (parameter, slope) in &reading.slopes {
             let interval = self.envelope.interval(*parameter);
@@ -234,15 +241,15 @@ impl Guard {
             } else {
                 (low, high)
             };
-            amounts.lower = moved(&amounts.lower, low, slope);
-            amounts.upper = moved(&amounts.upper, high, slope);
+            amounts.lower = shifted_end(&amounts.lower, low, slope);
+            amounts.upper = shifted_end(&amounts.upper, high, slope);
         }
         amounts
     }
 }
 
 /// Returns the end of an interval, moved by `slope` times another end.
-fn moved(end: &End, by: &End, slope: &Rational) -> End {
+fn shifted_end(end: &End, by: &End, slope: &Rational) -> End {
     match (end.value(), by.value()) {
         (Some(value), Some(by_value)) => {
             let sum = value + by_value * slope;

@@ -5,13 +5,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use elbowroom_model::Task;
 use elbowroom_model::ground::Condition;
 use elbowroom_probability::Likelihoods;
-use elbowroom_probability::optimum::Table;
+use elbowroom_probability::optimum::PolicyTable;
 
-use super::Registered;
+use super::ExecutorEntry;
 use super::adaptable::Adaptable;
-use crate::executor::Need;
+use crate::executor::PlanForm;
 
-pub(super) const REGISTERED: Registered = Registered {
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "lookahead",
     argument: None,
     is_optional: false,
@@ -21,11 +21,11 @@ pub(super) const REGISTERED: Registered = Registered {
               something else ends. In other worlds it acts like `adaptable`, but chooses the \
               most likely order again before each start if the plan is short.",
     paper: "goes beyond Ribeiro et al. (2021)",
-    need: Need::PartialOrder,
+    need: PlanForm::PartialOrder,
     make: |_, means| {
-        Box::new(Adaptable::with_foresight(
+        Box::new(Adaptable::with_policy_tables(
             means.likelihoods,
-            means.foresight,
+            means.policy_cache,
         ))
     },
 };
@@ -34,23 +34,23 @@ pub(super) const REGISTERED: Registered = Registered {
 /// not change decisions; it avoids computing the same table in every run. When the goal changes,
 /// the table is replaced.
 #[derive(Clone, Debug, Default)]
-pub struct Foresight(Arc<Mutex<Option<GoalTable>>>);
+pub struct PolicyTableCache(Arc<Mutex<Option<GoalTable>>>);
 
 /// The table for a goal; `None` if the world cannot be tabulated.
 #[derive(Debug)]
 struct GoalTable {
     goal: Condition,
-    table: Option<Arc<Table>>,
+    table: Option<Arc<PolicyTable>>,
 }
 
-impl Foresight {
+impl PolicyTableCache {
     /// Returns the table for the goal of the task; `None` if the world cannot be tabulated.
-    pub(super) fn table(&self, task: &Task, likelihoods: &Likelihoods) -> Option<Arc<Table>> {
+    pub(super) fn table(&self, task: &Task, likelihoods: &Likelihoods) -> Option<Arc<PolicyTable>> {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = known.as_ref().filter(|it| it.goal == *task.goal()) {
             return known.table.clone();
         }
-        let table = Table::new(task, likelihoods).map(Arc::new);
+        let table = PolicyTable::new(task, likelihoods).map(Arc::new);
         *known = Some(GoalTable {
             goal: task.goal().clone(),
             table: table.clone(),

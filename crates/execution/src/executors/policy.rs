@@ -2,7 +2,7 @@
 //! makes the most likely move.
 
 mod moves;
-mod rehearsed;
+mod rollout;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,18 +10,20 @@ use std::sync::Arc;
 use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
 
-use super::{Registered, live};
+use super::{ExecutorEntry, live};
+use crate::action_values::ActionValues;
+use crate::belief_state::GoalStatus as Prospect;
 use crate::dispatch::replan;
-use crate::executor::Need;
-use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
-use crate::outlook::Outlook;
-use crate::progression::Outlook as Prospect;
-use crate::reason::{About, Cause, Reason};
+use crate::executor::PlanForm;
+use crate::executor::{
+    Decided, Decision, DecisionContext, Executor, Order, PlanEvent, Planned, PreparedPlan, StepId,
+};
+use crate::reason::{Cause, Reason, Subject};
 
-use moves::{begins, wait};
-use rehearsed::Rehearsed;
+use moves::{period_start, wait};
+use rollout::RolloutExecutor;
 
-pub(super) const REGISTERED: Registered = Registered {
+pub(super) const REGISTERED: ExecutorEntry = ExecutorEntry {
     name: "policy",
     argument: None,
     is_optional: false,
@@ -34,52 +36,52 @@ pub(super) const REGISTERED: Registered = Registered {
               or `esterel`, of another plan, and of waiting.",
     paper: "the policy of a semi-Markov decision process (Howard, 1971); without it, the rollout algorithm \
             (Bertsekas, Tsitsiklis & Wu, 1997); goes beyond both papers",
-    need: Need::OpenNetwork,
+    need: PlanForm::OpenNetwork,
     make: |_, mut means| {
-        if means.outlook.is_none()
-            && let Some(rehearsal) = means.rehearsal.take()
+        if means.action_values.is_none()
+            && let Some(rehearsal) = means.rollout.take()
         {
             let keeper = (live::REGISTERED.make)(None, means);
-            return Box::new(Rehearsed::new(rehearsal, keeper));
+            return Box::new(RolloutExecutor::new(rehearsal, keeper));
         }
-        let outlook = means.outlook.clone();
+        let outlook = means.action_values.clone();
         // An executor that evaluates moves does not need to compare plans.
-        let compares = means.odds.is_some() && outlook.is_none();
+        let compares = means.comparator.is_some() && outlook.is_none();
         let advantage = compares.then(|| Rational::from(5));
         Box::new(Policy {
-            outlook,
+            action_values: outlook,
             plan: (live::REGISTERED.make)(advantage, means),
-            follows: false,
-            forgone: 0.0,
+            is_plan_followed: false,
+            probability_loss: 0.0,
             steps: BTreeMap::new(),
             changed: Vec::new(),
             last: None,
             waited: None,
-            ordered: None,
+            last_command: None,
             next_step: 0,
-            lost: None,
+            abandonment_reason: None,
         })
     },
 };
 
 /// Total loss of success probability that is accepted for following a plan with a guarantee.
-const MOST_FORGONE: f64 = 0.005;
+const MAX_PROBABILITY_LOSS: f64 = 0.005;
 
 /// Number of decisions to start or cancel actions at one time, after which the next period is
 /// awaited.
-const MOST_AT_ONCE: u32 = 50;
+const MAX_COMMANDS_PER_TIME: u32 = 50;
 
 /// See [`REGISTERED`].
 struct Policy {
-    outlook: Option<Arc<dyn Outlook>>,
+    action_values: Option<Arc<dyn ActionValues>>,
     /// Executor of the plan.
     plan: Box<dyn Executor>,
     /// `true` while the plan is followed.
-    follows: bool,
+    is_plan_followed: bool,
     /// Loss of success probability by following the plan, in total.
-    forgone: f64,
+    probability_loss: f64,
     /// Commanded actions that have not ended.
-    steps: BTreeMap<StepId, Ordered>,
+    steps: BTreeMap<StepId, CommandedAction>,
     /// Spontaneous changes of facts.
     changed: Vec<(FactId, bool)>,
     /// The time of the last happening.
@@ -87,24 +89,24 @@ struct Policy {
     /// The last period at whose beginning the decision was to wait.
     waited: Option<usize>,
     /// The time of the last command, and the number of decisions with commands at that time.
-    ordered: Option<(Rational, u32)>,
+    last_command: Option<(Rational, u32)>,
     /// The number of the next order.
     next_step: u32,
     /// Reason for which the plan is no longer followed.
-    lost: Option<Reason>,
+    abandonment_reason: Option<Reason>,
 }
 
 #[derive(Clone, Debug)]
-struct Ordered {
+struct CommandedAction {
     name: String,
     is_of_plan: bool,
     has_started: bool,
     /// `true` if it was cancelled.
-    is_let_go: bool,
+    is_cancelled: bool,
 }
 
 /// Time of the next evaluation of moves.
-enum Turn {
+enum NextEvaluation {
     /// Now, in this period.
     Now(usize),
     /// At the beginning of this period.
@@ -112,11 +114,11 @@ enum Turn {
 }
 
 impl Executor for Policy {
-    fn need(&self) -> Need {
+    fn need(&self) -> PlanForm {
         REGISTERED.need
     }
 
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {
         let adopted = self.plan.adopt(mission);
         let instances = &mission.plan.plan.instances;
         self.steps = mission
@@ -124,48 +126,48 @@ impl Executor for Policy {
             .keys()
             .filter_map(|step| {
                 let instance = instances.get(step.instance().index())?;
-                let ordered = Ordered {
+                let ordered = CommandedAction {
                     name: instance.action.name.clone(),
                     is_of_plan: true,
                     has_started: true,
-                    is_let_go: false,
+                    is_cancelled: false,
                 };
                 Some((*step, ordered))
             })
             .collect();
         self.next_step = u32::try_from(instances.len()).unwrap_or(u32::MAX);
-        self.follows = adopted.is_ok();
-        self.lost = adopted.as_ref().err().map(|reason| (**reason).clone());
-        if self.outlook.is_some() {
+        self.is_plan_followed = adopted.is_ok();
+        self.abandonment_reason = adopted.as_ref().err().map(|reason| (**reason).clone());
+        if self.action_values.is_some() {
             return Ok(());
         }
         adopted
     }
 
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided {
         let (own, doubt) = self.learn(moment);
-        if let Some(doubt) = doubt.filter(|_| !self.follows) {
+        if let Some(doubt) = doubt.filter(|_| !self.is_plan_followed) {
             return replan(doubt);
         }
-        let kept = self.follows.then(|| {
-            self.plan.decide(&Moment {
-                news: &own,
+        let kept = self.is_plan_followed.then(|| {
+            self.plan.decide(&DecisionContext {
+                plan_events: &own,
                 ..*moment
             })
         });
-        let outlook = self.outlook.clone();
+        let outlook = self.action_values.clone();
         let decided = match (kept, outlook) {
             (Some(kept), None) => kept,
-            (kept, Some(outlook)) => self.weigh(moment, kept, outlook.as_ref()),
+            (kept, Some(outlook)) => self.decide_by_values(moment, kept, outlook.as_ref()),
             (None, None) => super::without_plan(),
         };
-        self.note(&decided, moment.now);
+        self.record_commands(&decided, moment.now);
         decided
     }
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         let is_of_plan = self.steps.get(&step).is_some_and(|it| it.is_of_plan);
-        (self.follows && is_of_plan)
+        (self.is_plan_followed && is_of_plan)
             .then(|| self.plan.window(step, is_end))
             .flatten()
     }
@@ -174,11 +176,11 @@ impl Executor for Policy {
 impl Policy {
     /// Processes the news. Returns the news that concern the plan, and the reason if the state has
     /// become uncertain.
-    fn learn(&mut self, moment: &Moment<'_>) -> (Vec<News>, Option<Reason>) {
+    fn learn(&mut self, moment: &DecisionContext<'_>) -> (Vec<PlanEvent>, Option<Reason>) {
         let (mut own, mut doubt) = (Vec::new(), None);
-        for news in moment.news {
+        for news in moment.plan_events {
             let is_own = match news {
-                News::Started { step, time, .. } => {
+                PlanEvent::Started { step, time, .. } => {
                     self.last = self.last.take().max(Some(time.clone()));
                     match self.steps.get_mut(step) {
                         Some(ordered) => {
@@ -188,26 +190,32 @@ impl Policy {
                         None => true,
                     }
                 }
-                News::Ended { step, time, .. } => {
+                PlanEvent::Ended { step, time, .. } => {
                     self.last = self.last.take().max(Some(time.clone()));
                     self.steps.remove(step).is_none_or(|it| it.is_of_plan)
                 }
-                News::Fact(fact) => {
+                PlanEvent::Fact(fact) => {
                     self.last = self.last.take().max(Some(moment.now.clone()));
                     self.changed.push((*fact, moment.belief.fact(*fact)));
                     true
                 }
-                News::Value(_) | News::Contradiction { .. } | News::Silence { .. } => true,
+                PlanEvent::Value(_)
+                | PlanEvent::Contradiction { .. }
+                | PlanEvent::TimedOut { .. } => true,
             };
             if is_own {
                 own.push(news.clone());
             }
             match news {
-                News::Contradiction { action } => {
-                    doubt = Some(Reason::new(Cause::Contradiction).of(action));
+                PlanEvent::Contradiction { action } => {
+                    doubt = Some(Reason::new(Cause::Contradiction).for_action(action));
                 }
-                News::Silence { action, since } => {
-                    doubt = Some(Reason::new(Cause::Silence).of(action).since(since.clone()));
+                PlanEvent::TimedOut { action, since } => {
+                    doubt = Some(
+                        Reason::new(Cause::Silence)
+                            .for_action(action)
+                            .since(since.clone()),
+                    );
                 }
                 _ => {}
             }
@@ -222,13 +230,13 @@ impl Policy {
     }
 
     /// Records the commanded and cancelled actions.
-    fn note(&mut self, decided: &Decided, now: &Rational) {
+    fn record_commands(&mut self, decided: &Decided, now: &Rational) {
         let orders: &[Order] = match &decided.decision {
             Decision::Start(orders) => orders,
             Decision::Cancel(steps) => {
                 for step in steps {
                     if let Some(ordered) = self.steps.get_mut(step) {
-                        ordered.is_let_go = true;
+                        ordered.is_cancelled = true;
                     }
                 }
                 &[]
@@ -236,14 +244,16 @@ impl Policy {
             _ => return,
         };
         for order in orders {
-            self.steps.entry(order.step).or_insert_with(|| Ordered {
-                name: order.action.name.clone(),
-                is_of_plan: true,
-                has_started: false,
-                is_let_go: false,
-            });
+            self.steps
+                .entry(order.step)
+                .or_insert_with(|| CommandedAction {
+                    name: order.action.name.clone(),
+                    is_of_plan: true,
+                    has_started: false,
+                    is_cancelled: false,
+                });
         }
-        self.ordered = Some(match self.ordered.take() {
+        self.last_command = Some(match self.last_command.take() {
             Some((time, count)) if time == *now => (time, count.saturating_add(1)),
             _ => (now.clone(), 1),
         });
@@ -251,17 +261,17 @@ impl Policy {
 
     /// Returns the decision by the values of the moves. `kept` is the decision of the plan's
     /// executor.
-    fn weigh(
+    fn decide_by_values(
         &mut self,
-        moment: &Moment<'_>,
+        moment: &DecisionContext<'_>,
         kept: Option<Decided>,
-        outlook: &dyn Outlook,
+        outlook: &dyn ActionValues,
     ) -> Decided {
-        let kept = self.still_kept(kept);
+        let kept = self.plan_decision(kept);
         // The goal holds, so the remaining steps of the plan are not needed.
-        if moment.belief.outlook() == Prospect::Reached {
-            self.follows = false;
-            return self.finish();
+        if moment.belief.goal_status() == Prospect::Reached {
+            self.is_plan_followed = false;
+            return self.end_if_goal_holds();
         }
         let starts = kept.as_ref().is_some_and(|kept| {
             matches!(
@@ -270,65 +280,68 @@ impl Policy {
             )
         });
         let mut steps = self.steps.values();
-        let pending = steps.find(|ordered| !ordered.has_started || ordered.is_let_go);
+        let pending = steps.find(|ordered| !ordered.has_started || ordered.is_cancelled);
         if let Some(ordered) = pending
             && !starts
         {
-            let about = if ordered.is_let_go {
-                About::EndOfCancelled
+            let about = if ordered.is_cancelled {
+                Subject::EndOfCancelledActions
             } else {
-                About::StartOfOrdered
+                Subject::StartOfCommandedActions
             };
             return kept.unwrap_or_else(|| wait(None, about));
         }
-        let turn = self.turn(moment.now, outlook.period());
+        let turn = self.next_evaluation(moment.now, outlook.period());
         let period = match turn {
-            Turn::Now(period) | Turn::At(period) => period,
+            NextEvaluation::Now(period) | NextEvaluation::At(period) => period,
         };
-        let Some(weighed) = outlook.weigh(&self.standing(moment.belief, period, outlook, None))
+        let Some(weighed) =
+            outlook.evaluate(&self.decision_state(moment.belief, period, outlook, None))
         else {
             return match (kept, turn) {
                 (Some(kept), _) => kept,
-                (None, Turn::Now(_)) => self.hopeless(moment.now),
+                (None, NextEvaluation::Now(_)) => self.request_new_plan(moment.now),
                 // Until it begins, an event may still help.
-                (None, Turn::At(period)) => {
-                    let until = begins(period, outlook.period());
-                    wait(Some(until), About::NextDecision(0.0))
+                (None, NextEvaluation::At(period)) => {
+                    let until = period_start(period, outlook.period());
+                    wait(Some(until), Subject::NextEvaluation(0.0))
                 }
             };
         };
         if let Some(kept) = kept {
-            let worth = self.worth(&kept, &weighed, moment.belief, period, outlook);
+            let worth = self.plan_value(&kept, &weighed, moment.belief, period, outlook);
             let forgone = (weighed.best() - worth).max(0.0);
-            let is_free = matches!(turn, Turn::At(_)) && !starts;
-            if is_free || self.forgone + forgone <= MOST_FORGONE {
+            let is_free = matches!(turn, NextEvaluation::At(_)) && !starts;
+            if is_free || self.probability_loss + forgone <= MAX_PROBABILITY_LOSS {
                 if !is_free {
-                    self.forgone += forgone;
+                    self.probability_loss += forgone;
                 }
-                return self.until_next(kept, moment.now, &turn, outlook.period());
+                return self.limit_wait_to_next_period(kept, moment.now, &turn, outlook.period());
             }
-            self.follows = false;
-            self.lost = Some(Reason::new(Cause::Likelier));
+            self.is_plan_followed = false;
+            self.abandonment_reason = Some(Reason::new(Cause::Likelier));
         }
         match turn {
-            Turn::At(period) => {
-                let until = begins(period, outlook.period());
-                wait(Some(until), About::NextDecision(weighed.best()))
+            NextEvaluation::At(period) => {
+                let until = period_start(period, outlook.period());
+                wait(Some(until), Subject::NextEvaluation(weighed.best()))
             }
-            Turn::Now(period) => self.best(moment, period, &weighed, outlook.period()),
+            NextEvaluation::Now(period) => {
+                self.best_decision(moment, period, &weighed, outlook.period())
+            }
         }
     }
 
     /// Ends the run when the goal holds. Running actions are cancelled first, because the goal does
     /// not count as reached while an action is running.
-    fn finish(&self) -> Decided {
+    fn end_if_goal_holds(&self) -> Decided {
         let open = self.steps.iter();
         let open: Vec<StepId> = open
-            .filter(|(_, ordered)| !ordered.is_let_go)
+            .filter(|(_, ordered)| !ordered.is_cancelled)
             .map(|(step, _)| *step)
             .collect();
         if open.is_empty() && !self.steps.is_empty() {
-            return wait(None, About::EndOfCancelled);
+            return wait(None, Subject::EndOfCancelledActions);
         }
         let decision = if open.is_empty() {
             Decision::GoalReached
@@ -342,19 +355,19 @@ impl Policy {
     }
 
     /// Returns the decision of the plan's executor, or `None` if it requests a new plan.
-    fn still_kept(&mut self, kept: Option<Decided>) -> Option<Decided> {
+    fn plan_decision(&mut self, kept: Option<Decided>) -> Option<Decided> {
         let kept = kept?;
         if kept.decision == Decision::Replan {
-            self.follows = false;
-            self.lost = Some(kept.reason);
+            self.is_plan_followed = false;
+            self.abandonment_reason = Some(kept.reason);
             return None;
         }
         Some(kept)
     }
 
     /// Requests a new plan, because no move is known to lead to the goal.
-    fn hopeless(&self, now: &Rational) -> Decided {
-        let reason = self.lost.clone();
+    fn request_new_plan(&self, now: &Rational) -> Decided {
+        let reason = self.abandonment_reason.clone();
         replan(reason.unwrap_or_else(|| Reason::new(Cause::NoOrder).since(now.clone())))
     }
 }

@@ -12,191 +12,196 @@ use elbowroom_model::ground::{Condition, FactId, FluentId};
 use elbowroom_model::{Situation, Task, reachability};
 use elbowroom_num::{Interval, Rational};
 
-use super::{Account, Run};
-use crate::event::{Ending, Ticket};
-use crate::progression::Progression;
-use crate::reason::{About, Behind, Cause, Changed, Reason};
+use super::{ActionLog, Run};
+use crate::belief_state::BeliefState;
+use crate::event::{ActionHandle, Ending};
+use crate::reason::{Cause, Evidence, Reason, Subject, TimedChange};
 
 /// An observation that was believed.
 #[derive(Clone, Debug)]
-pub(super) struct Happened {
+pub(super) struct BelievedEvent {
     /// The time of the event.
     time: Rational,
-    what: What,
+    kind: BelievedEventKind,
 }
 
 #[derive(Clone, Debug)]
-pub(super) enum What {
-    Started(Ticket),
+pub(super) enum BelievedEventKind {
+    Started(ActionHandle),
     /// With its end effects.
-    Ended(Ticket),
+    Ended(ActionHandle),
     /// Without its end effects.
-    Stopped(Ticket),
+    Stopped(ActionHandle),
     Fact(FactId, bool),
     Value(FluentId, Rational),
 }
 
 /// Limit on the work of reachability for an explanation: about a second.
-const MOST_STEPS: u64 = 10_000_000;
+const MAX_STEPS: u64 = 10_000_000;
 
 /// The same limit for [`is_goal_unreachable`], which delays the run: about a tenth of a second.
-const MOST_STEPS_MEANWHILE: u64 = 1_000_000;
+const MAX_STEPS_DURING_RUN: u64 = 1_000_000;
 
 /// Limit on the number of parts of the goal that are explained.
-const MOST_NAMED: usize = 3;
+const MAX_EXPLAINED_PARTS: usize = 3;
 
 impl Run<'_> {
     /// Records an observation that was believed, for a later explanation of a dead end.
-    pub(super) fn note(&mut self, time: &Rational, what: What) {
-        self.lost.in_vain = None;
-        if !matches!(what, What::Stopped(_)) {
-            self.refusals.forget();
+    pub(super) fn record_believed_event(&mut self, time: &Rational, what: BelievedEventKind) {
+        self.search_results.failed_at = None;
+        if !matches!(what, BelievedEventKind::Stopped(_)) {
+            self.refusal_backoff.reset();
         }
         if self.is_explaining {
-            self.history.push(Happened {
+            self.history.push(BelievedEvent {
                 time: time.clone(),
-                what,
+                kind: what,
             });
         }
     }
 
     /// Returns the parts of the goal that can never become true again, and since when.
     pub(super) fn dead_end(&self) -> Vec<Reason> {
-        let mut past = self.past();
-        let mut present = past.after(self.history.len());
+        let mut past = self.run_history();
+        let mut present = past.belief_after(self.history.len());
         let _ = present.advance(&self.now);
-        let Some(lost) = unreachable(&present, MOST_STEPS) else {
+        let Some(lost) = unreachable(&present, MAX_STEPS) else {
             return Vec::new();
         };
         if lost.is_empty() {
             let conflict = self.conflicts().into_iter().next();
             let reason = Reason::new(Cause::NotTogether);
             return vec![match conflict {
-                Some(conflict) => reason.about(About::Said(conflict.in_words())),
+                Some(conflict) => reason.about(Subject::ExternalMessage(conflict.in_words())),
                 None => reason,
             }];
         }
-        let explained = lost.iter().take(MOST_NAMED).map(|goal| past.explain(goal));
+        let explained = lost
+            .iter()
+            .take(MAX_EXPLAINED_PARTS)
+            .map(|goal| past.explain(goal));
         explained.collect()
     }
 
     /// Returns the belief after the first `count` events of the history.
-    pub(super) fn believed_after(&self, count: usize) -> Progression {
-        self.past().after(count)
+    pub(super) fn believed_after(&self, count: usize) -> BeliefState {
+        self.run_history().belief_after(count)
     }
 
-    fn past(&self) -> Past<'_> {
-        Past {
+    fn run_history(&self) -> RunHistory<'_> {
+        RunHistory {
             task: self.belief.task(),
-            beginning: &self.beginning,
+            initial_belief: &self.initial_belief,
             history: &self.history,
-            account: &self.account,
+            account: &self.action_log,
             now: &self.now,
-            known: BTreeMap::new(),
+            unreachable_parts: BTreeMap::new(),
         }
     }
 }
 
 /// Queries about the history of a run.
-struct Past<'a> {
+struct RunHistory<'a> {
     task: &'a Arc<Task>,
-    beginning: &'a Progression,
-    history: &'a [Happened],
-    account: &'a Account,
+    initial_belief: &'a BeliefState,
+    history: &'a [BelievedEvent],
+    account: &'a ActionLog,
     now: &'a Rational,
     /// The unreachable parts of the goal, by the number of events before.
-    known: BTreeMap<usize, Option<Vec<Condition>>>,
+    unreachable_parts: BTreeMap<usize, Option<Vec<Condition>>>,
 }
 
-impl Past<'_> {
+impl RunHistory<'_> {
     /// Returns the parts of the goal that were unreachable after the first `count` events, if that
     /// can be computed.
     fn unreachable_after(&mut self, count: usize) -> Option<Vec<Condition>> {
-        if let Some(known) = self.known.get(&count) {
+        if let Some(known) = self.unreachable_parts.get(&count) {
             return known.clone();
         }
-        let found = unreachable(&self.after(count), MOST_STEPS);
-        self.known.insert(count, found.clone());
+        let found = unreachable(&self.belief_after(count), MAX_STEPS);
+        self.unreachable_parts.insert(count, found.clone());
         found
     }
 
-    fn is_lost_after(&mut self, count: usize, goal: &Condition) -> bool {
+    fn is_unreachable_after(&mut self, count: usize, goal: &Condition) -> bool {
         let lost = self.unreachable_after(count);
         lost.is_some_and(|lost| lost.contains(goal))
     }
 
     /// Returns the event since when a part of the goal has been unreachable.
     fn explain(&mut self, goal: &Condition) -> Reason {
-        let about = About::Conditions(vec![self.task.describe_condition(goal)]);
+        let about = Subject::Conditions(vec![self.task.describe_condition(goal)]);
         let reason = Reason::new(Cause::NeverAgain).about(about);
         // Goes back in growing strides until the part is reachable, then bisects.
         let mut lost = self.history.len();
-        if !self.is_lost_after(lost, goal) {
-            return self.between(lost, reason, goal);
+        if !self.is_unreachable_after(lost, goal) {
+            return self.explain_between(lost, reason, goal);
         }
         let mut stride = 1;
         let mut open = loop {
             let before = lost.saturating_sub(stride);
-            if !self.is_lost_after(before, goal) {
+            if !self.is_unreachable_after(before, goal) {
                 break before;
             }
             if before == 0 {
-                return self.at_the_beginning(reason, goal);
+                return self.explain_from_beginning(reason, goal);
             }
             lost = before;
             stride *= 2;
         };
         while lost - open > 1 {
             let middle = usize::midpoint(open, lost);
-            if self.is_lost_after(middle, goal) {
+            if self.is_unreachable_after(middle, goal) {
                 lost = middle;
             } else {
                 open = middle;
             }
         }
-        self.between(open, reason, goal)
+        self.explain_between(open, reason, goal)
     }
 
     /// Explains a part of the goal that was reachable after `count` events, and unreachable after
     /// one more or because time has passed.
-    fn between(&self, count: usize, reason: Reason, goal: &Condition) -> Reason {
+    fn explain_between(&self, count: usize, reason: Reason, goal: &Condition) -> Reason {
         let next = self.history.get(count);
         let until = next.map_or(self.now, |next| &next.time).clone();
-        if let Some((time, event)) = self.timed(&self.after(count), &until, goal) {
+        if let Some((time, event)) =
+            self.explain_by_timed_initials(&self.belief_after(count), &until, goal)
+        {
             return with_event(reason, event, time);
         }
         match next {
-            Some(next) => with_event(reason, self.named(&next.what), next.time.clone()),
+            Some(next) => with_event(reason, self.describe_event(&next.kind), next.time.clone()),
             None => reason.since(self.now.clone()),
         }
     }
 
     /// Explains a part of the goal that was unreachable after each observation: since a timed
     /// initial, or from the beginning.
-    fn at_the_beginning(&self, reason: Reason, goal: &Condition) -> Reason {
-        let start = self.after(0);
-        if is_lost(&start, goal) {
+    fn explain_from_beginning(&self, reason: Reason, goal: &Condition) -> Reason {
+        let start = self.belief_after(0);
+        if is_unreachable(&start, goal) {
             return reason;
         }
-        match self.timed(&start, self.now, goal) {
+        match self.explain_by_timed_initials(&start, self.now, goal) {
             Some((time, event)) => with_event(reason, event, time),
             None => reason,
         }
     }
 
     /// Returns the first timed initials until then that make the part of the goal unreachable.
-    fn timed(
+    fn explain_by_timed_initials(
         &self,
-        from: &Progression,
+        from: &BeliefState,
         until: &Rational,
         goal: &Condition,
-    ) -> Option<(Rational, Behind)> {
+    ) -> Option<(Rational, Evidence)> {
         let mut state = from.clone();
-        let to_come = self.task.timed().iter().skip(state.timed_past());
+        let to_come = self.task.timed().iter().skip(state.past_timed_initials());
         for timed in to_come.take_while(|timed| timed.time <= *until) {
             let _ = state.advance(&timed.time);
-            if is_lost(&state, goal) {
-                let event = Behind::Past(Changed::all(self.task, &timed.changes));
+            if is_unreachable(&state, goal) {
+                let event = Evidence::Past(TimedChange::all(self.task, &timed.changes));
                 return Some((timed.time.clone(), event));
             }
         }
@@ -204,26 +209,26 @@ impl Past<'_> {
     }
 
     /// Describes an event by name.
-    fn named(&self, what: &What) -> Behind {
+    fn describe_event(&self, what: &BelievedEventKind) -> Evidence {
         let task = self.task;
-        let entry = |ticket: &Ticket| {
+        let entry = |ticket: &ActionHandle| {
             let entry = self.account.get(*ticket);
             let name = entry.map(|entry| entry.action.name.clone());
             let ending = entry.and_then(|entry| Some(entry.ended.clone()?.1));
             (name.unwrap_or_default(), ending)
         };
         match what {
-            What::Started(ticket) => Behind::Start(entry(ticket).0),
-            What::Ended(ticket) => Behind::End(entry(ticket).0),
-            What::Stopped(ticket) => match entry(ticket) {
-                (action, Some(Ending::Failed { why })) => Behind::Failed { action, why },
-                (action, _) => Behind::Cancelled(action),
+            BelievedEventKind::Started(ticket) => Evidence::Start(entry(ticket).0),
+            BelievedEventKind::Ended(ticket) => Evidence::End(entry(ticket).0),
+            BelievedEventKind::Stopped(ticket) => match entry(ticket) {
+                (action, Some(Ending::Failed { why })) => Evidence::Failed { action, why },
+                (action, _) => Evidence::Cancelled(action),
             },
-            What::Fact(fact, truth) => Behind::Fact {
+            BelievedEventKind::Fact(fact, truth) => Evidence::Fact {
                 fact: task.fact_name(*fact),
                 truth: *truth,
             },
-            What::Value(fluent, value) => Behind::Value {
+            BelievedEventKind::Value(fluent, value) => Evidence::Value {
                 fluent: task.fluent_name(*fluent),
                 value: Some(value.clone()),
             },
@@ -231,31 +236,31 @@ impl Past<'_> {
     }
 
     /// Returns the belief after `count` events.
-    fn after(&self, count: usize) -> Progression {
-        let mut state = self.beginning.clone();
-        state.pursue(self.task);
+    fn belief_after(&self, count: usize) -> BeliefState {
+        let mut state = self.initial_belief.clone();
+        state.set_goal(self.task);
         for happened in &self.history[..count] {
             // Values that cannot be computed stay the same, as they did in the run.
-            let _ = state.arrive(&happened.time);
-            match &happened.what {
-                What::Started(ticket) => {
+            let _ = state.advance_for_happening(&happened.time);
+            match &happened.kind {
+                BelievedEventKind::Started(ticket) => {
                     if let Some(entry) = self.account.get(*ticket) {
                         let planned = entry.planned.clone().unwrap_or_default();
                         let measured = &entry.measured[0];
                         let _ = state.start(*ticket, &entry.action, &planned, measured);
                     }
                 }
-                What::Ended(ticket) => {
+                BelievedEventKind::Ended(ticket) => {
                     if let Some(entry) = self.account.get(*ticket) {
                         let _ = state.end(*ticket, &entry.measured[1]);
                     }
                 }
-                What::Stopped(ticket) => state.stop(*ticket),
-                What::Fact(fact, truth) => {
-                    state.see_fact(*fact, *truth);
+                BelievedEventKind::Stopped(ticket) => state.stop(*ticket),
+                BelievedEventKind::Fact(fact, truth) => {
+                    state.observe_fact(*fact, *truth);
                 }
-                What::Value(fluent, value) => {
-                    state.see_value(*fluent, value);
+                BelievedEventKind::Value(fluent, value) => {
+                    state.observe_value(*fluent, value);
                 }
             }
         }
@@ -263,31 +268,31 @@ impl Past<'_> {
     }
 }
 
-fn with_event(reason: Reason, event: Behind, time: Rational) -> Reason {
+fn with_event(reason: Reason, event: Evidence, time: Rational) -> Reason {
     Reason {
-        behind: vec![event],
+        evidence: vec![event],
         ..reason.since(time)
     }
 }
 
-fn is_lost(state: &Progression, goal: &Condition) -> bool {
-    unreachable(state, MOST_STEPS).is_some_and(|lost| lost.contains(goal))
+fn is_unreachable(state: &BeliefState, goal: &Condition) -> bool {
+    unreachable(state, MAX_STEPS).is_some_and(|lost| lost.contains(goal))
 }
 
 /// Returns `true` if part of the goal can never become true any more, and `false` if that cannot be
 /// decided within a small limit.
-pub(super) fn is_goal_unreachable(state: &Progression) -> bool {
-    unreachable(state, MOST_STEPS_MEANWHILE).is_some_and(|lost| !lost.is_empty())
+pub(super) fn is_goal_unreachable(state: &BeliefState) -> bool {
+    unreachable(state, MAX_STEPS_DURING_RUN).is_some_and(|lost| !lost.is_empty())
 }
 
 /// Returns the parts of the goal that can never become true any more, as far as that can be decided
 /// within a small limit.
-pub(super) fn hopeless_conditions(state: &Progression) -> Vec<Condition> {
-    unreachable(state, MOST_STEPS_MEANWHILE).unwrap_or_default()
+pub(super) fn unreachable_conditions(state: &BeliefState) -> Vec<Condition> {
+    unreachable(state, MAX_STEPS_DURING_RUN).unwrap_or_default()
 }
 
 /// Returns the unreachable parts of the goal, if they can be computed within the limit.
-fn unreachable(state: &Progression, step_limit: u64) -> Option<Vec<Condition>> {
+fn unreachable(state: &BeliefState, step_limit: u64) -> Option<Vec<Condition>> {
     let running = state.running().values().map(|underway| {
         let duration = Interval::point(underway.planned.clone());
         state.running_action(underway, duration)
@@ -297,7 +302,7 @@ fn unreachable(state: &Progression, step_limit: u64) -> Option<Vec<Condition>> {
         state: state.state(),
         running: running.collect(),
     };
-    let task = Task::beginning_at(state.task(), &situation);
+    let task = Task::starting_from(state.task(), &situation);
     let settings = reachability::Settings {
         step_limit,
         ..reachability::Settings::default()

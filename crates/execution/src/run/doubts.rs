@@ -9,19 +9,19 @@ use std::sync::Arc;
 use elbowroom_model::ground::{Action, Body, SnapAction};
 use elbowroom_num::Rational;
 
-use super::agenda::Todo;
-use super::dead_end::What;
-use super::intake::Remark;
+use super::dead_end::BelievedEventKind;
+use super::observations::Remark;
+use super::work_queue::PendingStep;
 use super::{MissingPlan, Next, Run, Stop, Verdict};
-use crate::event::{Ending, Measured, Ticket};
-use crate::executor::News;
+use crate::belief_state::Doubt;
+use crate::event::{ActionHandle, Ending, Measured};
+use crate::executor::PlanEvent;
 use crate::planning::PlanAnswer;
-use crate::progression::Doubt;
 use crate::reason::Reason;
 
 /// The last question to the world about doubts.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Inquiry {
+pub(super) struct DoubtInquiry {
     /// It covers the doubts that arose until then.
     until: Option<Rational>,
     /// `true` until the world has answered.
@@ -31,7 +31,7 @@ pub(super) struct Inquiry {
 impl Run<'_> {
     /// Marks the effects of an action as doubtful: it is unknown whether it has ended, or whether
     /// it has started at all.
-    pub(super) fn doubt(&mut self, ticket: Ticket, action: &Action, has_started: bool) {
+    pub(super) fn doubt(&mut self, ticket: ActionHandle, action: &Action, has_started: bool) {
         let doubt = Doubt {
             since: self.now.clone(),
             ticket,
@@ -43,50 +43,50 @@ impl Run<'_> {
     }
 
     /// Processes a report on the end of an action that had timed out.
-    pub(super) fn ended_after_all(
+    pub(super) fn process_late_end(
         &mut self,
-        ticket: Ticket,
+        ticket: ActionHandle,
         time: &Rational,
         ending: &Ending,
         measured: &[Measured],
     ) -> Remark {
-        let entry = self.account.get(ticket)?;
+        let entry = self.action_log.get(ticket)?;
         let (action, has_started) = (Arc::clone(&entry.action), entry.started.is_some());
-        let started = entry.started.as_ref().unwrap_or(&entry.ordered).clone();
+        let started = entry.started.as_ref().unwrap_or(&entry.commanded).clone();
         let time = &started.clone().max(time.clone());
-        self.account.note_doubt(ticket, false);
-        self.believe_until(time);
+        self.action_log.note_doubt(ticket, false);
+        self.advance_belief(time);
         let (facts, fluents) = if *ending == Ending::Succeeded {
-            self.account.note_end(ticket, time, ending, measured);
+            self.action_log.note_end(ticket, time, ending, measured);
             let effects = unknown_effects(&action, has_started);
             let duration = time - &started;
             let belief = &mut self.belief;
-            belief.settle_happened(ticket, &effects, &duration, measured)
+            belief.resolve_doubts_as_happened(ticket, &effects, &duration, measured)
         } else {
-            self.belief.settle(ticket)
+            self.belief.resolve_doubts(ticket)
         };
         for fact in facts {
             let truth = self.belief.fact(fact);
-            self.note(time, What::Fact(fact, truth));
-            self.news.push(News::Fact(fact));
+            self.record_believed_event(time, BelievedEventKind::Fact(fact, truth));
+            self.plan_events.push(PlanEvent::Fact(fact));
         }
         for fluent in fluents {
             if let Some(value) = self.belief.value(fluent).cloned() {
-                self.note(time, What::Value(fluent, value));
+                self.record_believed_event(time, BelievedEventKind::Value(fluent, value));
             }
-            self.news.push(News::Value(fluent));
+            self.plan_events.push(PlanEvent::Value(fluent));
         }
-        self.note_surprise();
+        self.record_unexpected_event();
         Some("it had timed out; its effects are known now")
     }
 
     /// Asks the world about doubtful facts and values before a plan is requested, unless it was
     /// asked before. Returns `true` if it asks.
-    pub(super) fn inquire(&mut self, reason: &Reason) -> bool {
+    pub(super) fn ask_about_doubts(&mut self, reason: &Reason) -> bool {
         let (facts, values) = (self.belief.doubtful_facts(), self.belief.doubtful_values());
         let doubts = facts.values().chain(values.values()).flatten();
         let latest = doubts.map(|doubt| &doubt.since).max();
-        let inquiry = &self.lost.inquiry;
+        let inquiry = &self.search_results.inquiry;
         let Some(latest) = latest.filter(|latest| inquiry.until.as_ref() < Some(*latest)) else {
             return false;
         };
@@ -94,27 +94,27 @@ impl Run<'_> {
             facts: facts.keys().copied().collect(),
             fluents: values.keys().copied().collect(),
         };
-        self.lost.inquiry = Inquiry {
+        self.search_results.inquiry = DoubtInquiry {
             until: Some(latest.clone()),
             is_open: true,
         };
-        self.agenda.push(Todo::Plan(reason.clone()));
-        self.asked = Some(look);
+        self.work_queue.push(PendingStep::Plan(reason.clone()));
+        self.open_request = Some(look);
         true
     }
 
     /// Ends the run if the goal holds, but only by the assumptions about doubtful facts. A plan
     /// would not change that.
     pub(super) fn stop_if_goal_is_in_doubt(&mut self) -> Result<(), Stop> {
-        let is_idle = self.account.open_tickets().next().is_none();
+        let is_idle = self.action_log.open_tickets().next().is_none();
         if !is_idle || !self.belief.is_goal_in_doubt() {
             return Ok(());
         }
         let why = format!(
             "whether the goal holds is in doubt: {}",
-            self.doubts_in_words()
+            self.describe_doubts()
         );
-        Err(Stop::Over(Verdict::NoPlan {
+        Err(Stop::Ended(Verdict::NoPlan {
             why,
             missing: MissingPlan::InDoubt,
         }))
@@ -123,17 +123,18 @@ impl Run<'_> {
     /// Continues with the present plan if the executor does; otherwise ends the run. While actions
     /// are running, doubts may be settled; a plan is then requested again when that happens, or
     /// when the actions have ended.
-    pub(super) fn go_on_without_plan(
+    pub(super) fn continue_or_stop_without_plan(
         &mut self,
         answer: &PlanAnswer,
         reason: Reason,
     ) -> Result<(), Stop> {
-        let outcome = self.carry_on_or_stop(self.verdict_without_plan(answer));
-        let running: Vec<Ticket> = self.account.open_tickets().collect();
+        let outcome = self.continue_abandoned_plan_or_stop(self.verdict_without_plan(answer));
+        let running: Vec<ActionHandle> = self.action_log.open_tickets().collect();
         let doubts = self.belief.doubt_count();
         if outcome.is_err() && !running.is_empty() && doubts > 0 {
-            self.agenda.push(Todo::Plan(reason));
-            self.agenda.push(Todo::Linger(running, doubts));
+            self.work_queue.push(PendingStep::Plan(reason));
+            self.work_queue
+                .push(PendingStep::WaitForActions(running, doubts));
             return Ok(());
         }
         outcome
@@ -143,10 +144,10 @@ impl Run<'_> {
     /// is in doubt, the situation of the answer may not be the real one.
     fn verdict_without_plan(&self, answer: &PlanAnswer) -> Verdict {
         let verdict = Verdict::without_plan(answer);
-        let doubts = self.doubts_in_words();
+        let doubts = self.describe_doubts();
         let why = match &verdict {
             _ if doubts.is_empty() => return verdict,
-            Verdict::Unsolvable => answer.why_not().unwrap_or_default(),
+            Verdict::Unsolvable => answer.failure_reason().unwrap_or_default(),
             Verdict::NoPlan {
                 why,
                 missing: MissingPlan::NotFound,
@@ -160,7 +161,7 @@ impl Run<'_> {
     }
 
     /// Returns the facts and fluents in doubt, with the reasons; empty if there are none.
-    fn doubts_in_words(&self) -> String {
+    fn describe_doubts(&self) -> String {
         let facts = self.belief.doubtful_facts().iter();
         let facts = facts.map(|(fact, doubts)| (self.task.fact_name(*fact), doubts));
         let values = self.belief.doubtful_values().iter();

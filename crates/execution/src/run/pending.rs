@@ -6,14 +6,14 @@ use std::sync::Arc;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use super::beginning::{Course, no_plan};
-use super::handover::Attempt;
-use super::lasting::Turn;
-use super::search::Search;
-use super::stand::Goals;
+use super::background_search::BackgroundSearch;
+use super::persistent::PendingGoalChange;
+use super::plan_start::{PlanStart, preparation_failure};
+use super::replanning::Attempt;
+use super::snapshot::Goals;
 use super::{Next, Run, Stop};
-use crate::event::{Event, Observation, Ticket};
-use crate::executor::Mission;
+use crate::event::{ActionHandle, Event, Observation};
+use crate::executor::PreparedPlan;
 use crate::planning::Planned;
 use crate::preparation::PrepareError;
 use crate::reason::Reason;
@@ -21,7 +21,7 @@ use crate::record::Entry;
 use crate::request::{Answer, PlanRequest, PrepareRequest, RequestId, Urgency};
 
 /// Continuation of the run when the awaited answer arrives.
-pub(super) enum Pending {
+pub(super) enum AwaitedAnswer {
     /// The answer is a plan.
     Plan(Attempt),
     /// The answer is a prepared plan.
@@ -32,29 +32,29 @@ pub(super) enum Pending {
 pub(super) struct Preparation {
     plan: TimeTriggeredPlan,
     situation: Situation,
-    running: Vec<Ticket>,
+    running: Vec<ActionHandle>,
     /// The actions of the plan that have begun since.
-    begun: Vec<Ticket>,
+    begun_steps: Vec<ActionHandle>,
     /// The goals of the plan.
     goals: Goals,
     /// Continuation if the plan cannot be prepared.
-    otherwise: Otherwise,
+    fallback: PreparationFallback,
 }
 
 /// Continuation of the run if a plan cannot be prepared.
-pub(super) enum Otherwise {
+pub(super) enum PreparationFallback {
     /// The run ends.
-    End,
+    EndRun,
     /// The plan was fitted to the present situation. Instead, the plan takes over as it was made,
     /// if possible.
-    AsMade(Box<Search>, TimeTriggeredPlan),
+    AdoptUnfitted(Box<BackgroundSearch>, TimeTriggeredPlan),
     /// The plan of this search is outdated.
-    SearchAgain(Box<Search>),
+    SearchAgain(Box<BackgroundSearch>),
     /// The remaining plan was to be kept for other goals. Another plan is made.
-    PlanForOthers(Turn),
+    ReplanForGoals(PendingGoalChange),
     /// The present plan continues, also if the executor does not prefer the prepared one. The
     /// prepared plan was requested for this reason.
-    Continue(Reason),
+    ContinuePlan(Reason),
 }
 
 impl Run<'_> {
@@ -77,18 +77,18 @@ impl Run<'_> {
     /// An answer that arrives while the run waits in the world is recorded at the end of the wait
     /// ([`Event::PlanMade`]), at the present time; the driver can end the wait early.
     pub fn planned(&mut self, id: RequestId, planned: Planned) {
-        if let Some(Next::Plan(request)) = &self.asked
+        if let Some(Next::Plan(request)) = &self.open_request
             && request.id == id
         {
-            self.asked = None;
-            if let Some(Pending::Plan(attempt)) = self.pending.take()
-                && let Err(stop) = self.take_plan(attempt, planned)
+            self.open_request = None;
+            if let Some(AwaitedAnswer::Plan(attempt)) = self.pending.take()
+                && let Err(stop) = self.process_planner_answer(attempt, planned)
             {
-                self.stop(stop);
+                self.begin_shutdown(stop);
             }
             return;
         }
-        let is_waiting = matches!(self.asked, Some(Next::Wait { .. }));
+        let is_waiting = matches!(self.open_request, Some(Next::Wait { .. }));
         if let Some(search) = &mut self.search {
             search.take_answer(id, planned, is_waiting);
         }
@@ -98,28 +98,31 @@ impl Run<'_> {
     ///
     /// An answer that arrives while the run waits in the world is recorded at the end of the wait
     /// ([`Event::PlanReady`]), at the present time; the driver can end the wait early.
-    pub fn prepared(&mut self, id: RequestId, prepared: Result<Mission, PrepareError>) {
-        if let Some(Next::Prepare(request)) = &self.asked
+    pub fn prepared(&mut self, id: RequestId, prepared: Result<PreparedPlan, PrepareError>) {
+        if let Some(Next::Prepare(request)) = &self.open_request
             && request.id == id
         {
-            self.asked = None;
-            if let Some(Pending::Preparation(preparation)) = self.pending.take()
+            self.open_request = None;
+            if let Some(AwaitedAnswer::Preparation(preparation)) = self.pending.take()
                 && let Err(stop) = self.take_preparation(*preparation, prepared)
             {
-                self.stop(stop);
+                self.begin_shutdown(stop);
             }
             return;
         }
         let now = self.now.clone();
-        let is_waiting = matches!(self.asked, Some(Next::Wait { .. }));
+        let is_waiting = matches!(self.open_request, Some(Next::Wait { .. }));
         if let Some(search) = &mut self.search {
             search.take_prepared(id, prepared, (!is_waiting).then_some(now));
         }
     }
 
     /// Returns the answers that arrived during the wait that ends at `now`, as observations.
-    pub(super) fn arrivals(&self, now: &Rational) -> Vec<Observation> {
-        let (is_made, is_ready) = self.search.as_ref().map_or((false, false), Search::arrived);
+    pub(super) fn take_arrived_answers(&self, now: &Rational) -> Vec<Observation> {
+        let (is_made, is_ready) = self
+            .search
+            .as_ref()
+            .map_or((false, false), BackgroundSearch::arrived_answers);
         let made = is_made.then_some(Event::PlanMade);
         let ready = is_ready.then_some(Event::PlanReady);
         let events = made.into_iter().chain(ready);
@@ -138,8 +141,8 @@ impl Run<'_> {
             situation: attempt.situation.clone(),
             urgency: Urgency::Awaited,
         };
-        self.asked = Some(Next::Plan(request));
-        self.pending = Some(Pending::Plan(attempt));
+        self.open_request = Some(Next::Plan(request));
+        self.pending = Some(AwaitedAnswer::Plan(attempt));
     }
 
     /// Requests a plan without waiting for it.
@@ -160,11 +163,11 @@ impl Run<'_> {
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
         situation: &Situation,
-        running: &[Ticket],
+        running: &[ActionHandle],
     ) -> RequestId {
         let request = self.preparation_of(
             task,
-            Course::of(plan, situation, running),
+            PlanStart::of(plan, situation, running),
             Urgency::Background,
         );
         let id = request.id;
@@ -190,7 +193,7 @@ impl Run<'_> {
     fn preparation_of(
         &mut self,
         task: &Arc<Task>,
-        course: Course<'_>,
+        course: PlanStart<'_>,
         urgency: Urgency,
     ) -> PrepareRequest {
         PrepareRequest {
@@ -211,21 +214,21 @@ impl Run<'_> {
         &mut self,
         task: &Arc<Task>,
         goals: &Goals,
-        course: Course<'_>,
-        otherwise: Otherwise,
+        course: PlanStart<'_>,
+        otherwise: PreparationFallback,
     ) {
         if self.settings.plans_aside {
             self.plan_task = Some(Arc::clone(task));
         }
         let request = self.preparation_of(task, course, Urgency::Awaited);
-        self.asked = Some(Next::Prepare(request));
-        self.pending = Some(Pending::Preparation(Box::new(Preparation {
+        self.open_request = Some(Next::Prepare(request));
+        self.pending = Some(AwaitedAnswer::Preparation(Box::new(Preparation {
             plan: course.plan.clone(),
             situation: course.situation.clone(),
             running: course.running.to_vec(),
-            begun: course.begun.to_vec(),
+            begun_steps: course.begun_steps.to_vec(),
             goals: goals.clone(),
-            otherwise,
+            fallback: otherwise,
         })));
     }
 
@@ -233,39 +236,43 @@ impl Run<'_> {
     fn take_preparation(
         &mut self,
         preparation: Preparation,
-        prepared: Result<Mission, PrepareError>,
+        prepared: Result<PreparedPlan, PrepareError>,
     ) -> Result<(), Stop> {
         let mut mission = match prepared {
             Ok(mission) => mission,
             Err(error) => {
-                return match preparation.otherwise {
-                    Otherwise::End => Err(no_plan(&error)),
-                    Otherwise::AsMade(search, plan) => self.take_over_as_made(*search, &plan),
-                    Otherwise::SearchAgain(search) => self.search_again(&search.reason),
-                    Otherwise::PlanForOthers(turn) => self.plan_for_others(&turn),
-                    Otherwise::Continue(_) => Ok(()),
+                return match preparation.fallback {
+                    PreparationFallback::EndRun => Err(preparation_failure(&error)),
+                    PreparationFallback::AdoptUnfitted(search, plan) => {
+                        self.switch_unfitted(*search, &plan)
+                    }
+                    PreparationFallback::SearchAgain(search) => self.search_again(&search.reason),
+                    PreparationFallback::ReplanForGoals(turn) => {
+                        self.replan_for_changed_goals(&turn)
+                    }
+                    PreparationFallback::ContinuePlan(_) => Ok(()),
                 };
             }
         };
-        if let Otherwise::Continue(reason) = &preparation.otherwise
-            && !self.takes_over(&mission, reason)?
+        if let PreparationFallback::ContinuePlan(reason) = &preparation.fallback
+            && !self.replaces_present_plan(&mission, reason)?
         {
             return Ok(());
         }
-        if let Otherwise::PlanForOthers(turn) = &preparation.otherwise {
+        if let PreparationFallback::ReplanForGoals(turn) = &preparation.fallback {
             self.ports.recorder.record(&Entry::Kept {
                 now: &self.now,
                 reason: &turn.reason,
             });
         }
-        let steps = self.steps_of(&mission, &preparation.begun);
+        let steps = self.match_steps(&mission, &preparation.begun_steps);
         mission.begun = steps.unwrap_or_default();
-        let course = Course {
+        let course = PlanStart {
             plan: &preparation.plan,
             situation: &preparation.situation,
             running: &preparation.running,
-            begun: &preparation.begun,
+            begun_steps: &preparation.begun_steps,
         };
-        self.begin_with(course, &preparation.goals, &mission)
+        self.begin_prepared_plan_for_goals(course, &preparation.goals, &mission)
     }
 }

@@ -14,10 +14,10 @@ use std::collections::BTreeSet;
 use elbowroom_num::Rational;
 
 /// Maximum number of goals for an exact selection, which has the greatest value.
-const MOST_EXACT: usize = 5;
+const MAX_EXACT_GOALS: usize = 5;
 
 /// The goals, by position in the order of preference.
-pub(super) type Set = BTreeSet<usize>;
+pub(super) type GoalSet = BTreeSet<usize>;
 
 /// The state of a selection.
 #[derive(Clone, Debug)]
@@ -25,17 +25,17 @@ pub(super) enum Selection {
     /// The values of the goals, and the sets without a plan.
     Exact {
         values: Vec<Rational>,
-        failed: Vec<Set>,
+        failed: Vec<GoalSet>,
     },
     /// See [`Growth`].
-    Growth(Growth),
+    Growth(GrowingSelection),
 }
 
 /// A growing selection.
 #[derive(Clone, Debug)]
-pub(super) struct Growth {
+pub(super) struct GrowingSelection {
     /// The selected goals, for which there is a plan.
-    selected: Set,
+    selected: GoalSet,
     /// The goals that have not been tried, the next one last.
     rest: Vec<usize>,
     /// The goals being tried together with the selected ones.
@@ -44,33 +44,33 @@ pub(super) struct Growth {
 
 /// The next step of a selection.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Step {
+pub(super) enum SelectionStep {
     /// Try this set.
-    Try(Set),
+    Try(GoalSet),
     /// The selection is complete. For an empty set: there is no plan for any goal.
-    Select(Set),
+    Select(GoalSet),
 }
 
 impl Selection {
     /// Selects among goals with these values, for which there is no plan if all are pursued.
     pub(super) fn among(values: Vec<Rational>) -> Self {
-        if values.len() <= MOST_EXACT {
+        if values.len() <= MAX_EXACT_GOALS {
             let failed = Vec::new();
             return Self::Exact { values, failed };
         }
-        Self::Growth(Growth::new(Set::new(), values.len()))
+        Self::Growth(GrowingSelection::new(GoalSet::new(), values.len()))
     }
 
     /// Adds goals to the first `selected` ones, for which there is a plan.
-    pub(super) fn grown(selected: usize, count: usize) -> Self {
-        let mut growth = Growth::new((0..selected).collect(), count);
+    pub(super) fn growing(selected: usize, count: usize) -> Self {
+        let mut growth = GrowingSelection::new((0..selected).collect(), count);
         growth.tried = std::mem::take(&mut growth.rest);
         growth.tried.reverse();
         Self::Growth(growth)
     }
 
     /// Records that there is no plan for this set, which may not have been tried.
-    pub(super) fn exclude(&mut self, set: Set) {
+    pub(super) fn exclude(&mut self, set: GoalSet) {
         if let Self::Exact { failed, .. } = self {
             failed.push(set);
         }
@@ -79,7 +79,7 @@ impl Selection {
     /// Returns `true` if it is known that there is no plan for this goal alone.
     pub(super) fn is_excluded(&self, goal: usize) -> bool {
         match self {
-            Self::Exact { failed, .. } => failed.contains(&Set::from([goal])),
+            Self::Exact { failed, .. } => failed.contains(&GoalSet::from([goal])),
             Self::Growth(_) => false,
         }
     }
@@ -93,13 +93,13 @@ impl Selection {
     }
 
     /// Returns the next step after no plan was found for this set.
-    pub(super) fn after_failure(&mut self, set: Set) -> Step {
+    pub(super) fn after_failure(&mut self, set: GoalSet) -> SelectionStep {
         match self {
             Self::Exact { values, failed } => {
                 failed.push(set);
-                let is_open = |set: &Set| !failed.iter().any(|failed| failed.is_subset(set));
+                let is_open = |set: &GoalSet| !failed.iter().any(|failed| failed.is_subset(set));
                 let next = sets(values).into_iter().find(is_open);
-                next.map_or_else(|| Step::Select(Set::new()), Step::Try)
+                next.map_or_else(|| SelectionStep::Select(GoalSet::new()), SelectionStep::Try)
             }
             Self::Growth(growth) => {
                 let again = growth.tried.len().div_ceil(2);
@@ -115,9 +115,9 @@ impl Selection {
     }
 
     /// Returns the next step after a plan was found for this set.
-    pub(super) fn after_success(&mut self, set: Set) -> Step {
+    pub(super) fn after_success(&mut self, set: GoalSet) -> SelectionStep {
         match self {
-            Self::Exact { .. } => Step::Select(set),
+            Self::Exact { .. } => SelectionStep::Select(set),
             Self::Growth(growth) => {
                 growth.selected = set;
                 let next = 2 * growth.tried.len().max(1);
@@ -128,8 +128,8 @@ impl Selection {
     }
 }
 
-impl Growth {
-    fn new(selected: Set, count: usize) -> Self {
+impl GrowingSelection {
+    fn new(selected: GoalSet, count: usize) -> Self {
         let rest: Vec<usize> = (selected.len()..count).rev().collect();
         let tried = Vec::new();
         Self {
@@ -146,16 +146,16 @@ impl Growth {
         self.tried.reverse();
     }
 
-    fn step(&self) -> Step {
+    fn step(&self) -> SelectionStep {
         if self.tried.is_empty() {
-            return Step::Select(self.selected.clone());
+            return SelectionStep::Select(self.selected.clone());
         }
-        Step::Try(self.selected.iter().chain(&self.tried).copied().collect())
+        SelectionStep::Try(self.selected.iter().chain(&self.tried).copied().collect())
     }
 }
 
 /// Returns all sets of goals with these values, in the order of trial.
-fn sets(values: &[Rational]) -> Vec<Set> {
+fn sets(values: &[Rational]) -> Vec<GoalSet> {
     let all = 1_u32..1 << values.len();
     let set = |bits: u32| -> Vec<usize> {
         let positions = 0..values.len();
@@ -184,7 +184,7 @@ mod tests {
 
     use elbowroom_num::Rational;
 
-    use super::{MOST_EXACT, Selection, Set, Step};
+    use super::{GoalSet, MAX_EXACT_GOALS, Selection, SelectionStep};
 
     /// Goals of equal value.
     fn equal(count: usize) -> Vec<Rational> {
@@ -193,89 +193,92 @@ mod tests {
 
     /// Runs a selection among goals of these values to its end. Returns the selected set and the
     /// number of queries.
-    fn select(values: &[Rational], has_plan: impl Fn(&Set) -> bool) -> (Set, usize) {
-        let all: Set = (0..values.len()).collect();
+    fn select(values: &[Rational], has_plan: impl Fn(&GoalSet) -> bool) -> (GoalSet, usize) {
+        let all: GoalSet = (0..values.len()).collect();
         let mut selection = Selection::among(values.to_vec());
         let mut step = selection.after_failure(all);
         for questions in 1.. {
             step = match step {
-                Step::Select(set) => return (set, questions),
-                Step::Try(set) if has_plan(&set) => selection.after_success(set),
-                Step::Try(set) => selection.after_failure(set),
+                SelectionStep::Select(set) => return (set, questions),
+                SelectionStep::Try(set) if has_plan(&set) => selection.after_success(set),
+                SelectionStep::Try(set) => selection.after_failure(set),
             };
         }
         unreachable!("a selection ends")
     }
 
-    fn value(values: &[Rational], set: &Set) -> Rational {
+    fn value(values: &[Rational], set: &GoalSet) -> Rational {
         set.iter().map(|it| &values[*it]).sum()
     }
 
     /// Returns the greatest value of a set without a conflict, by trying all sets.
-    fn greatest(values: &[Rational], conflicts: &[Set]) -> Rational {
+    fn greatest_value(values: &[Rational], conflicts: &[GoalSet]) -> Rational {
         let count = values.len();
         let sets = (0_u32..1 << count)
-            .map(|bits| -> Set { (0..count).filter(|it| bits >> it & 1 == 1).collect() });
-        let fits = |set: &Set| !conflicts.iter().any(|conflict| conflict.is_subset(set));
+            .map(|bits| -> GoalSet { (0..count).filter(|it| bits >> it & 1 == 1).collect() });
+        let fits = |set: &GoalSet| !conflicts.iter().any(|conflict| conflict.is_subset(set));
         let fitting = sets.filter(fits).map(|set| value(values, &set));
         fitting.max().unwrap_or_default()
     }
 
     proptest! {
         #[test]
-        fn selections_are_maximal_and_small_ones_have_the_greatest_value(
+        fn selections_are_maximal_and_small_ones_optimal(
             values in prop::collection::vec(1_i64..9, 1..12),
             conflicts in prop::collection::vec(prop::collection::btree_set(0_usize..12, 1..4), 0..6),
         ) {
             let values: Vec<Rational> = values.into_iter().map(Rational::from).collect();
             let count = values.len();
-            let all: Set = (0..count).collect();
-            let mut conflicts: Vec<Set> = conflicts.into_iter().filter(|it| it.is_subset(&all)).collect();
+            let all: GoalSet = (0..count).collect();
+            let mut conflicts: Vec<GoalSet> = conflicts.into_iter().filter(|it| it.is_subset(&all)).collect();
             if conflicts.is_empty() {
                 conflicts.push(all);
             }
-            let fits = |set: &Set| !conflicts.iter().any(|conflict| conflict.is_subset(set));
+            let fits = |set: &GoalSet| !conflicts.iter().any(|conflict| conflict.is_subset(set));
             let (selected, _) = select(&values, fits);
             prop_assert!(fits(&selected));
             for other in 0..count {
                 let mut more = selected.clone();
                 prop_assert!(!more.insert(other) || !fits(&more), "{selected:?} and {other}");
             }
-            if count <= MOST_EXACT {
-                prop_assert_eq!(value(&values, &selected), greatest(&values, &conflicts));
+            if count <= MAX_EXACT_GOALS {
+                prop_assert_eq!(value(&values, &selected), greatest_value(&values, &conflicts));
             }
         }
     }
 
     #[test]
-    fn preferred_goals_stay() {
-        let conflict: Set = [0, 1].into();
+    fn preferred_goals_remain_selected() {
+        let conflict: GoalSet = [0, 1].into();
         let (selected, _) = select(&equal(3), |set| !conflict.is_subset(set));
         assert_eq!(selected, [0, 2].into());
-        let conflict: Set = [3, 8].into();
+        let conflict: GoalSet = [3, 8].into();
         let (selected, _) = select(&equal(10), |set| !conflict.is_subset(set));
         assert_eq!(selected, (0..10).filter(|it| *it != 8).collect());
     }
 
     #[test]
-    fn one_impossible_goal_among_many_costs_few_questions() {
+    fn single_impossible_goal_needs_few_attempts() {
         let (selected, questions) = select(&equal(200), |set| !set.contains(&77));
         assert_eq!(selected.len(), 199);
         assert!(questions < 30, "{questions}");
     }
 
     #[test]
-    fn a_selection_grows_by_new_goals() {
-        let mut selection = Selection::grown(2, 4);
-        let tried = |step: Step| match step {
-            Step::Try(set) => set,
-            Step::Select(set) => panic!("{set:?} is selected"),
+    fn new_goals_are_added_to_selection() {
+        let mut selection = Selection::growing(2, 4);
+        let tried = |step: SelectionStep| match step {
+            SelectionStep::Try(set) => set,
+            SelectionStep::Select(set) => panic!("{set:?} is selected"),
         };
         // The selection begins with a failure, because all goals are already pursued.
         let set = tried(selection.after_failure((0..4).collect()));
         assert_eq!(set, [0, 1, 2].into());
         let set = tried(selection.after_failure(set));
         assert_eq!(set, [0, 1, 3].into());
-        assert_eq!(selection.after_success(set), Step::Select([0, 1, 3].into()));
+        assert_eq!(
+            selection.after_success(set),
+            SelectionStep::Select([0, 1, 3].into())
+        );
     }
 }

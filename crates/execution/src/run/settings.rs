@@ -6,7 +6,7 @@ use std::str::FromStr;
 use elbowroom_num::Rational;
 
 use super::TimeoutRule;
-use super::account::ExecutedStep;
+use super::action_log::ExecutedStep;
 use crate::planning::PlanAnswer;
 use crate::reason::Reason;
 
@@ -18,14 +18,14 @@ pub struct RunSettings {
     /// The planning time in the world.
     pub planning_time: PlanningTime,
     /// Maximum number of new plans.
-    pub most_replans: usize,
+    pub max_replans: usize,
     /// The rule that sets the time-out of each action.
     pub timeout: TimeoutRule,
     /// `true` if the slack of running actions is monitored. Then there is a warning before a late
     /// action makes a new plan necessary ([`Entry::Warning`](crate::Entry::Warning)). An action
     /// whose delay no plan tolerates any more is cancelled and counts as failed, and the next plan
     /// does without it. If `false`, such a delay ends the run.
-    pub watches_room: bool,
+    pub monitors_slack: bool,
     /// `true` if plans are made in the background ([`Planner::begin`](crate::Planner::begin)),
     /// while the run continues; [`Run`](super::Run) has the rules. The first plan of a run is
     /// awaited, unless the run is an executive.
@@ -45,9 +45,9 @@ impl Default for RunSettings {
         Self {
             running: RunningRule::Keep,
             planning_time: PlanningTime::Measured,
-            most_replans: 10,
+            max_replans: 10,
             timeout: TimeoutRule::default(),
-            watches_room: false,
+            monitors_slack: false,
             plans_aside: false,
             readies_aside: false,
             time_limit: Rational::from(1_000_000),
@@ -227,7 +227,7 @@ impl Verdict {
 
     /// Returns the verdict of a run if the planner has given this answer, which is not a plan.
     pub(super) fn without_plan(answer: &PlanAnswer) -> Self {
-        let why = answer.why_not().unwrap_or_default().to_owned();
+        let why = answer.failure_reason().unwrap_or_default().to_owned();
         match answer {
             PlanAnswer::Unsolvable => Self::Unsolvable,
             PlanAnswer::Failed { .. } => Self::PlannerFailed { why },
@@ -266,7 +266,7 @@ pub struct Report {
     pub reasons: Vec<Reason>,
     /// If no plan reaches the goal any more: the parts of the goal that can never become true
     /// again, and since when, as far as that is known
-    /// ([`Run::explaining`](super::Run::explaining)).
+    /// ([`Run::with_explanations`](super::Run::explaining)).
     pub dead_end: Vec<Reason>,
     /// The number of actions started.
     pub starts: usize,

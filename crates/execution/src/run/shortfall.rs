@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 
 use super::Run;
 use super::goals::OpenGoal;
-use super::stand::{GivenGoal, Goals};
+use super::snapshot::{GivenGoal, Goals};
 use crate::planning::Shortfall;
-use crate::reason::{About, Cause, Reason};
+use crate::reason::{Cause, Reason, Subject};
 
 /// Goals that exclude each other.
 pub(super) struct Conflict {
@@ -19,7 +19,7 @@ pub(super) struct Conflict {
 
 impl Conflict {
     /// Returns `true` if this goal excludes goals that are all pursued.
-    pub(super) fn excludes(&self, goal: &str, pursued: &BTreeSet<String>) -> bool {
+    pub(super) fn is_excluding(&self, goal: &str, pursued: &BTreeSet<String>) -> bool {
         let mut others = self.goals.iter().filter(|name| *name != goal);
         self.goals.contains(goal) && others.all(|name| pursued.contains(name))
     }
@@ -39,8 +39,8 @@ impl Conflict {
 impl Run<'_> {
     /// Records the information about these goals in the planner's answer.
     pub(super) fn note_shortfall(&mut self, goals: &Goals, shortfall: &Shortfall) {
-        let is_choosing = self.is_choosing_goals();
-        let Some(lasting) = &mut self.lasting else {
+        let is_choosing = self.is_selecting_goals();
+        let Some(lasting) = &mut self.goal_manager else {
             return;
         };
         if !is_choosing {
@@ -49,11 +49,15 @@ impl Run<'_> {
         if !shortfall.conflict.is_empty() {
             lasting.conflicts.push(shortfall.conflict.clone());
         }
-        let pursued: Vec<&GivenGoal> = goals.open.iter().filter(|it| it.aside.is_none()).collect();
+        let pursued: Vec<&GivenGoal> = goals
+            .open
+            .iter()
+            .filter(|it| it.set_aside.is_none())
+            .collect();
         let is_alone = pursued.len() == 1;
         let with_deadlines = pursued.iter().filter(|it| it.terms.deadline.is_some());
-        for late in &shortfall.late {
-            let Some(given) = with_deadlines.clone().nth(late.place) else {
+        for late in &shortfall.missed_deadlines {
+            let Some(given) = with_deadlines.clone().nth(late.deadline_index) else {
                 continue;
             };
             let same = |goal: &&mut OpenGoal| goal.name == given.name && goal.terms == given.terms;
@@ -63,14 +67,14 @@ impl Run<'_> {
             };
             let mut late = late.clone();
             // A plan for several goals may reach this one later than necessary.
-            late.reached = late.reached.filter(|_| is_alone);
-            goal.late = late.in_words(deadline).or(goal.late.take());
+            late.achieved_at = late.achieved_at.filter(|_| is_alone);
+            goal.missed_deadline = late.in_words(deadline).or(goal.missed_deadline.take());
         }
     }
 
     /// Returns the known conflicts among the open goals without deadlines.
     pub(super) fn conflicts(&self) -> Vec<Conflict> {
-        let Some(lasting) = &self.lasting else {
+        let Some(lasting) = &self.goal_manager else {
             return Vec::new();
         };
         let conflicts = lasting.conflicts.iter().map(|conjuncts| {
@@ -90,17 +94,17 @@ impl Run<'_> {
 
     /// Returns the number of pursued goals.
     pub(super) fn pursued_goals(&self) -> usize {
-        let goals = self.lasting.iter().flat_map(|it| &it.goals);
+        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
         goals.filter(|goal| goal.is_pursued()).count()
     }
 
     /// Returns the lateness of the pursued goals with deadlines, as far as it is known.
     pub(super) fn missed_deadlines(&self) -> Vec<Reason> {
-        let goals = self.lasting.iter().flat_map(|it| &it.goals);
+        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
         let late = goals.filter(|goal| goal.is_pursued()).filter_map(|goal| {
-            let late = goal.late.as_ref()?;
+            let late = goal.missed_deadline.as_ref()?;
             let words = format!("`{}` would be {late}", goal.name);
-            Some(Reason::new(Cause::TooLate).about(About::Said(words)))
+            Some(Reason::new(Cause::TooLate).about(Subject::ExternalMessage(words)))
         });
         late.collect()
     }

@@ -6,16 +6,16 @@ use std::str::FromStr;
 
 use elbowroom_num::Rational;
 
-use super::agenda::Todo;
+use super::work_queue::PendingStep;
 use super::{Run, UnknownSetting};
-use crate::event::Ticket;
+use crate::event::ActionHandle;
 use crate::record::{Entry, WarningCause};
 
 /// Longest wait for the end of a cancelled action, in seconds of the world's clock.
-const STOPPING: i64 = 600;
+const CANCEL_TIMEOUT: i64 = 600;
 
 /// The same for an action that was cancelled because it had reached its time-out.
-const STOPPING_AFTER_TIMEOUT: i64 = 10;
+const CANCEL_TIMEOUT_AFTER_TIMEOUT: i64 = 10;
 
 /// The rule that sets the time-out of each action: the longest time from its start, or from its
 /// last progress, to its end. An action that reaches its time-out is cancelled and counts as
@@ -112,7 +112,7 @@ impl TimeoutRule {
     }
 
     /// Parses one rule.
-    fn read_one(text: &str) -> Option<Self> {
+    fn parse_rule(text: &str) -> Option<Self> {
         let number = |text: &str| text.trim().parse::<Rational>().ok();
         let rule = match text.trim().split_once("x,") {
             _ if text.trim() == Self::OFF => Some(Self::Off),
@@ -135,7 +135,7 @@ impl TimeoutRule {
     fn read(text: &str) -> Option<Self> {
         let mut parts = text.split(';').peekable();
         let others = match parts.next_if(|first| !first.contains('=')) {
-            Some(first) => Self::read_one(first)?,
+            Some(first) => Self::parse_rule(first)?,
             None => Self::default(),
         };
         if parts.peek().is_none() {
@@ -151,7 +151,7 @@ impl TimeoutRule {
                 (None, words) => words.len() == 1,
             };
             let is_new = actions
-                .insert(words.join(" "), Self::read_one(rule)?)
+                .insert(words.join(" "), Self::parse_rule(rule)?)
                 .is_none();
             if !is_name || !is_new {
                 return None;
@@ -174,7 +174,7 @@ fn name_of(action: &str) -> &str {
 }
 
 /// Formats a number as a decimal, or as a fraction if the decimal would be rounded.
-fn written(number: &Rational) -> String {
+fn format_number(number: &Rational) -> String {
     let decimal = number.to_decimal(6);
     if decimal.parse::<Rational>().as_ref() == Ok(number) {
         decimal
@@ -187,9 +187,11 @@ impl fmt::Display for TimeoutRule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Off => f.write_str(Self::OFF),
-            Self::After { factor, at_least } if factor.is_zero() => f.write_str(&written(at_least)),
+            Self::After { factor, at_least } if factor.is_zero() => {
+                f.write_str(&format_number(at_least))
+            }
             Self::After { factor, at_least } => {
-                write!(f, "{}x,{}", written(factor), written(at_least))
+                write!(f, "{}x,{}", format_number(factor), format_number(at_least))
             }
             Self::ByAction { actions, others } => {
                 others.fmt(f)?;
@@ -218,8 +220,8 @@ impl FromStr for TimeoutRule {
 }
 
 /// An action that can time out.
-struct Limit {
-    ticket: Ticket,
+struct ActionTimeout {
+    ticket: ActionHandle,
     /// The time of the warning; `None` if it was given, or if the action has been cancelled.
     warn: Option<Rational>,
     /// The time-out.
@@ -228,16 +230,16 @@ struct Limit {
 
 impl Run<'_> {
     /// Returns the time-outs of the actions that have not ended, on the world's clock.
-    fn limits(&self) -> impl Iterator<Item = Limit> + '_ {
-        let open = self.account.open_tickets();
+    fn action_timeouts(&self) -> impl Iterator<Item = ActionTimeout> + '_ {
+        let open = self.action_log.open_tickets();
         open.filter_map(|ticket| {
-            let entry = self.account.get(ticket)?;
+            let entry = self.action_log.get(ticket)?;
             if let Some(cancelled) = &entry.cancelled {
                 let stopping = match entry.timed_out {
-                    Some(_) => STOPPING_AFTER_TIMEOUT,
-                    None => STOPPING,
+                    Some(_) => CANCEL_TIMEOUT_AFTER_TIMEOUT,
+                    None => CANCEL_TIMEOUT,
                 };
-                return Some(Limit {
+                return Some(ActionTimeout {
                     ticket,
                     warn: None,
                     until: cancelled + Rational::from(stopping),
@@ -245,7 +247,7 @@ impl Run<'_> {
             }
             let planned = entry.planned.clone().unwrap_or_default();
             let timeout = self.settings.timeout.of(&entry.action.name, &planned)?;
-            let began = entry.started.as_ref().unwrap_or(&entry.ordered);
+            let began = entry.started.as_ref().unwrap_or(&entry.commanded);
             let progress = entry.progress.as_ref().map_or(began, |(time, _)| time);
             let until = began.max(progress) + &timeout;
             // The warning comes when a quarter of the time between the planned end and the time-out
@@ -257,7 +259,7 @@ impl Run<'_> {
             };
             let ahead = (timeout - since) * Rational::new(1, 4);
             let is_new = entry.warned_timeout.as_ref() != Some(&until);
-            Some(Limit {
+            Some(ActionTimeout {
                 ticket,
                 warn: is_new.then(|| &until - ahead),
                 until,
@@ -271,21 +273,22 @@ impl Run<'_> {
     /// returned at the latest.
     pub(super) fn next_timeout(&self) -> Option<Rational> {
         let epsilon = self.task.epsilon();
-        let due = self.limits();
+        let due = self.action_timeouts();
         let due = due.map(|limit| limit.warn.unwrap_or_else(|| limit.until + epsilon));
-        let mut open = self.account.open_tickets();
+        let mut open = self.action_log.open_tickets();
         let end = open.next().map(|_| self.settings.time_limit.clone());
         due.chain(end).min()
     }
 
     /// Warns of approaching time-outs, and cancels the actions that have reached theirs.
     pub(super) fn check_timeouts(&mut self) {
-        let limits: Vec<Limit> = self.limits().collect();
+        let limits: Vec<ActionTimeout> = self.action_timeouts().collect();
         let (expired, running): (Vec<_>, Vec<_>) =
             limits.into_iter().partition(|limit| limit.until < self.now);
-        let is_due = |limit: &&Limit| limit.warn.as_ref().is_some_and(|warn| *warn <= self.now);
+        let is_due =
+            |limit: &&ActionTimeout| limit.warn.as_ref().is_some_and(|warn| *warn <= self.now);
         for limit in running.iter().filter(is_due) {
-            let Some(entry) = self.account.get(limit.ticket) else {
+            let Some(entry) = self.action_log.get(limit.ticket) else {
                 continue;
             };
             self.ports.recorder.record(&Entry::Warning {
@@ -295,11 +298,11 @@ impl Run<'_> {
                 until: &limit.until,
                 cause: WarningCause::Timeout,
             });
-            self.account
+            self.action_log
                 .note_timeout_warning(limit.ticket, &limit.until);
         }
         let expired = expired.into_iter().rev();
-        let expired = expired.map(|limit| Todo::TimeOut(limit.ticket, limit.until));
-        self.agenda.extend(expired);
+        let expired = expired.map(|limit| PendingStep::TimeOut(limit.ticket, limit.until));
+        self.work_queue.extend(expired);
     }
 }

@@ -6,13 +6,13 @@ mod scene;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use elbowroom_execution::executors::{EXECUTORS, Orders};
+use elbowroom_execution::executors::{EXECUTORS, OrderCache};
 use elbowroom_execution::run::{Next, Report, Run, RunSettings, Verdict};
 use elbowroom_execution::{
-    Command, Entry, Passage, PortWorkers, Recorder, Ticket, World, WorldError,
+    ActionHandle, Command, Entry, PortWorkers, Recorder, TimeAdvance, World, WorldError,
 };
 use elbowroom_num::Rational;
-use scene::{Scene, Toy, Whims};
+use scene::{Scene, ToyWorld, WorldFaults};
 
 /// Recorder that keeps each entry as text; of a plan, only its adoption.
 #[derive(Clone, Default)]
@@ -23,7 +23,7 @@ impl Recorder for Notes {
         let mut notes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         notes.push(match entry {
             // Its table of facts is a hash map without a defined order.
-            Entry::Mission(mission) => format!("a plan from {}", mission.origin),
+            Entry::PlanAdopted(mission) => format!("a plan from {}", mission.origin),
             other => format!("{other:?}"),
         });
     }
@@ -38,17 +38,17 @@ impl Notes {
 
 /// Started actions that have neither ended nor been cancelled.
 #[derive(Default)]
-struct Books {
-    open: BTreeSet<Ticket>,
-    given: BTreeSet<Ticket>,
+struct CommandLedger {
+    open: BTreeSet<ActionHandle>,
+    given: BTreeSet<ActionHandle>,
 }
 
 /// Drives a run to its end.
 fn drive(
     (mut run, mut workers): (Run<'_>, PortWorkers<'_>),
     world: &mut dyn World,
-) -> (Report, Books) {
-    let mut books = Books::default();
+) -> (Report, CommandLedger) {
+    let mut books = CommandLedger::default();
     loop {
         let answered = match run.next() {
             Next::Command(command) => {
@@ -78,7 +78,7 @@ fn drive(
             }
             Next::Look { facts, fluents } => world
                 .look(&facts, &fluents)
-                .map(|seen| run.see(seen).expect("it was asked for")),
+                .map(|seen| run.observe_requested(seen).expect("it was asked for")),
             Next::Over(report) => return (report, books),
             request => {
                 run.delegate(request, &mut workers);
@@ -92,13 +92,13 @@ fn drive(
 }
 
 #[test]
-fn where_all_goes_as_planned_the_goal_is_reached_without_a_new_plan() {
+fn undisturbed_run_reaches_goal_without_replan() {
     let scene = Scene::new();
     for registered in EXECUTORS {
         let executor = registered.example();
         let notes = Notes::default();
         let run = scene.run(&executor, notes, RunSettings::default());
-        let (report, books) = drive(run, &mut Toy::new(Whims::None));
+        let (report, books) = drive(run, &mut ToyWorld::new(WorldFaults::None));
         assert_eq!(report.verdict, Verdict::GoalReached, "{executor}");
         assert_eq!(report.replans, 0, "{executor}: {:?}", report.reasons);
         assert!(books.open.is_empty(), "{executor}");
@@ -107,7 +107,7 @@ fn where_all_goes_as_planned_the_goal_is_reached_without_a_new_plan() {
 }
 
 #[test]
-fn the_same_history_leads_to_the_same_decisions() {
+fn same_history_yields_same_decisions() {
     let scene = Scene::new();
     for registered in EXECUTORS {
         let executor = registered.example();
@@ -115,7 +115,7 @@ fn the_same_history_leads_to_the_same_decisions() {
             let record = || {
                 let notes = Notes::default();
                 let run = scene.run(&executor, notes.clone(), RunSettings::default());
-                drive(run, &mut Toy::new(Whims::Seeded(seed)));
+                drive(run, &mut ToyWorld::new(WorldFaults::Seeded(seed)));
                 notes.taken()
             };
             assert_eq!(record(), record(), "{executor}, {seed}");
@@ -124,23 +124,23 @@ fn the_same_history_leads_to_the_same_decisions() {
 }
 
 #[test]
-fn orders_that_another_run_has_found_change_no_decision() {
-    let decisions = |orders: Option<Orders>| -> Vec<Vec<String>> {
+fn cached_orders_change_no_decision() {
+    let decisions = |orders: Option<OrderCache>| -> Vec<Vec<String>> {
         let mut scene = Scene::new();
         scene.orders = orders;
         let runs = (0..20).map(|seed| {
             let notes = Notes::default();
             let run = scene.run("adaptable", notes.clone(), RunSettings::default());
-            drive(run, &mut Toy::new(Whims::Seeded(seed)));
+            drive(run, &mut ToyWorld::new(WorldFaults::Seeded(seed)));
             notes.taken()
         });
         runs.collect()
     };
-    assert_eq!(decisions(None), decisions(Some(Orders::default())));
+    assert_eq!(decisions(None), decisions(Some(OrderCache::default())));
 }
 
 #[test]
-fn whatever_the_world_says_the_run_ends_and_nothing_is_left_running() {
+fn arbitrary_reports_end_run_without_running_actions() {
     let scene = Scene::new();
     let settings = RunSettings {
         time_limit: Rational::from(5000),
@@ -151,7 +151,7 @@ fn whatever_the_world_says_the_run_ends_and_nothing_is_left_running() {
         let executor = registered.example();
         for seed in 0..40 {
             let run = scene.run(&executor, Notes::default(), settings.clone());
-            let (report, books) = drive(run, &mut Toy::new(Whims::Seeded(seed)));
+            let (report, books) = drive(run, &mut ToyWorld::new(WorldFaults::Seeded(seed)));
             verdicts.insert(report.verdict.name());
             assert!(
                 books.open.is_empty(),
@@ -168,14 +168,14 @@ fn whatever_the_world_says_the_run_ends_and_nothing_is_left_running() {
 }
 
 #[test]
-fn a_world_that_fails_at_any_moment_ends_the_run_at_once() {
+fn world_failure_ends_run_at_once() {
     /// World that fails after a number of answers.
-    struct Mortal {
-        inner: Toy,
+    struct FailingWorld {
+        inner: ToyWorld,
         left: usize,
     }
-    impl Mortal {
-        fn live(&mut self) -> Result<(), WorldError> {
+    impl FailingWorld {
+        fn count_call(&mut self) -> Result<(), WorldError> {
             self.left = self
                 .left
                 .checked_sub(1)
@@ -183,13 +183,13 @@ fn a_world_that_fails_at_any_moment_ends_the_run_at_once() {
             Ok(())
         }
     }
-    impl World for Mortal {
+    impl World for FailingWorld {
         fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-            self.live()?;
+            self.count_call()?;
             self.inner.command(now, command)
         }
-        fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-            self.live()?;
+        fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
+            self.count_call()?;
             self.inner.wait(until)
         }
     }
@@ -198,8 +198,8 @@ fn a_world_that_fails_at_any_moment_ends_the_run_at_once() {
         let executor = registered.example();
         for left in 0..6 {
             let run = scene.run(&executor, Notes::default(), RunSettings::default());
-            let inner = Toy::new(Whims::None);
-            let (report, _) = drive(run, &mut Mortal { inner, left });
+            let inner = ToyWorld::new(WorldFaults::None);
+            let (report, _) = drive(run, &mut FailingWorld { inner, left });
             let why = "it is gone".to_owned();
             let failed = Verdict::WorldFailed { why };
             if report.verdict != failed {
@@ -212,7 +212,7 @@ fn a_world_that_fails_at_any_moment_ends_the_run_at_once() {
 }
 
 #[test]
-fn a_run_can_be_moved_to_another_thread_between_two_steps() {
+fn run_can_move_between_threads() {
     let scene = Scene::new();
     for registered in EXECUTORS {
         let (mut run, mut workers) = scene.run(
@@ -226,10 +226,10 @@ fn a_run_can_be_moved_to_another_thread_between_two_steps() {
             panic!("the plan begins with a start");
         };
         let moved = std::thread::spawn(move || {
-            let mut world = Toy::new(Whims::None);
+            let mut world = ToyWorld::new(WorldFaults::None);
             let told = world.command(&Rational::ZERO, &first);
             told.expect("the toy takes everything");
-            run.go(&mut world, &mut workers)
+            run.run_to_end(&mut world, &mut workers)
         });
         let report = moved.join().expect("nobody panics");
         assert_eq!(report.verdict, Verdict::GoalReached, "{}", registered.name);

@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, Orders};
+use elbowroom_execution::executors::{
+    ExecutorServices, ExecutorSpec, OrderCache, PolicyTableCache,
+};
 use elbowroom_execution::run::{Ports, Run, RunSettings};
 use elbowroom_execution::{
-    Command, Ending, Event, Forms, Need, NoPlanner, Observation, Passage, PortWorkers,
-    PrepareError, Prepared, Preparer, Recorder, Region, Ticket, World, WorldError,
+    ActionHandle, Command, DispatchableCache, Ending, Event, NoPlanner, Observation, PlanForm,
+    PortWorkers, PreparationResult, PrepareError, Preparer, Recorder, RegionOracle, TimeAdvance,
+    World, WorldError,
 };
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -37,7 +40,7 @@ pub(crate) struct Scene {
     task: Arc<Task>,
     plan: TimeTriggeredPlan,
     /// Orders shared between executors, if any.
-    pub(crate) orders: Option<Orders>,
+    pub(crate) orders: Option<OrderCache>,
 }
 
 impl Scene {
@@ -62,38 +65,38 @@ impl Scene {
     ) -> (Run<'static>, PortWorkers<'static>) {
         let spec: ExecutorSpec = executor.parse().expect("a registered executor");
         let ports = Ports {
-            executor: spec.build(Means {
-                outlook: None,
-                rehearsal: None,
-                region: Box::new(Everywhere),
+            executor: spec.build(ExecutorServices {
+                action_values: None,
+                rollout: None,
+                region: Box::new(UnlimitedRegion),
                 likelihoods: Arc::new(Likelihoods::certain()),
-                odds: None,
-                foresight: Foresight::default(),
-                orders: self.orders.clone(),
+                comparator: None,
+                policy_cache: PolicyTableCache::default(),
+                order_cache: self.orders.clone(),
             }),
             recorder: Box::new(recorder),
         };
         let plan = Some(self.plan.clone());
         let run = Run::new(Arc::clone(&self.task), plan, settings, ports);
-        (run, PortWorkers::new(NoPlanner, ByHand))
+        (run, PortWorkers::new(NoPlanner, ManualPreparer))
     }
 }
 
 /// Prepares plans without a solver: each duration may be up to twice as long as planned. For this
 /// plan, which has no deadlines, that is correct.
-struct ByHand;
+struct ManualPreparer;
 
-impl Preparer for ByHand {
+impl Preparer for ManualPreparer {
     fn prepare(
         &mut self,
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
-        need: Need,
-    ) -> Result<Prepared, PrepareError> {
+        need: PlanForm,
+    ) -> Result<PreparationResult, PrepareError> {
         let deordered = deorder(task, plan)?;
         let (instances, nominal) = (deordered.instances, deordered.nominal);
-        let is_open = matches!(need, Need::OpenNetwork | Need::Envelope);
-        let order = (need == Need::PartialOrder).then(|| partial_order(task, plan));
+        let is_open = matches!(need, PlanForm::OpenNetwork | PlanForm::Envelope);
+        let order = (need == PlanForm::PartialOrder).then(|| partial_order(task, plan));
         let prepared = if is_open {
             parametrize(task, deordered.plan, &nominal, &[])?
         } else {
@@ -105,29 +108,34 @@ impl Preparer for ByHand {
         });
         let twice = twice.collect();
         let envelope = is_open.then(|| DecoupledEnvelope::new(&prepared, twice));
-        Ok(Prepared {
+        Ok(PreparationResult {
             plan: prepared,
             instances,
             nominal,
             envelope: envelope.flatten(),
-            forms: Forms::default(),
+            forms: DispatchableCache::default(),
             order,
         })
     }
 }
 
 /// Region without objections, for plans without numbers.
-struct Everywhere;
+struct UnlimitedRegion;
 
-impl Region for Everywhere {
-    fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &Valuation) -> Option<String> {
+impl RegionOracle for UnlimitedRegion {
+    fn find_violation(
+        &mut self,
+        _: &Arc<Task>,
+        _: &ParametrizedPlan,
+        _: &Valuation,
+    ) -> Option<String> {
         None
     }
 }
 
 /// Deviations of a world.
 #[derive(Clone, Copy)]
-pub(crate) enum Whims {
+pub(crate) enum WorldFaults {
     /// No deviations.
     None,
     /// Actions take longer or fail, and reports are lost, repeated, wrong, or from the future.
@@ -135,18 +143,18 @@ pub(crate) enum Whims {
 }
 
 /// World in which actions take the commanded durations, apart from its deviations.
-pub(crate) struct Toy {
+pub(crate) struct ToyWorld {
     now: Rational,
     coming: Vec<Observation>,
-    whims: Whims,
+    whims: WorldFaults,
     state: u64,
 }
 
-impl Toy {
-    pub(crate) fn new(whims: Whims) -> Self {
+impl ToyWorld {
+    pub(crate) fn new(whims: WorldFaults) -> Self {
         let state = match whims {
-            Whims::None => 0,
-            Whims::Seeded(seed) => seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1,
+            WorldFaults::None => 0,
+            WorldFaults::Seeded(seed) => seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1,
         };
         Self {
             now: Rational::ZERO,
@@ -157,8 +165,8 @@ impl Toy {
     }
 
     /// Returns `true` once in `times` calls on average; xorshift.
-    fn one_in(&mut self, times: u64) -> bool {
-        if matches!(self.whims, Whims::None) {
+    fn with_chance_one_in(&mut self, times: u64) -> bool {
+        if matches!(self.whims, WorldFaults::None) {
             return false;
         }
         self.state ^= self.state << 13;
@@ -168,18 +176,18 @@ impl Toy {
     }
 
     fn report(&mut self, time: Rational, event: Event) {
-        if self.one_in(12) {
+        if self.with_chance_one_in(12) {
             return;
         }
         let observation = Observation { time, event };
-        if self.one_in(8) {
+        if self.with_chance_one_in(8) {
             self.coming.push(observation.clone());
         }
         self.coming.push(observation);
     }
 }
 
-impl World for Toy {
+impl World for ToyWorld {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
         let measured = Vec::new;
         match *command {
@@ -194,10 +202,10 @@ impl World for Toy {
                 };
                 self.report(now.clone(), event);
                 let mut end = now + duration.clone().unwrap_or_default();
-                if self.one_in(4) {
+                if self.with_chance_one_in(4) {
                     end += &Rational::from(3);
                 }
-                let ending = if self.one_in(10) {
+                let ending = if self.with_chance_one_in(10) {
                     let why = "it slipped".to_owned();
                     Ending::Failed { why }
                 } else {
@@ -221,25 +229,25 @@ impl World for Toy {
                 self.report(now.clone(), event);
             }
         }
-        if self.one_in(20) {
+        if self.with_chance_one_in(20) {
             let (said, why) = ("mumble".to_owned(), "no words".to_owned());
             self.report(now.clone(), Event::Unintelligible { said, why });
         }
-        if self.one_in(20) {
-            let ticket = Ticket(1_000_000);
+        if self.with_chance_one_in(20) {
+            let ticket = ActionHandle(1_000_000);
             let measured = measured();
             self.report(now + Rational::from(9), Event::Started { ticket, measured });
         }
         Ok(())
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         let times = self.coming.iter().map(|it| it.time.clone());
         let next = times.chain([until.clone()]).min().unwrap_or_default();
         self.now = next.max(self.now.clone());
         let now = self.now.clone();
         let observations = self.coming.extract_if(.., |it| it.time <= now);
-        Ok(Passage {
+        Ok(TimeAdvance {
             observations: observations.collect(),
             now: self.now.clone(),
         })
@@ -247,7 +255,7 @@ impl World for Toy {
 }
 
 /// Returns the start whose end the observation reports.
-fn ended_by(observation: &Observation) -> Option<Ticket> {
+fn ended_by(observation: &Observation) -> Option<ActionHandle> {
     match observation.event {
         Event::Ended { ticket, .. } => Some(ticket),
         _ => None,
@@ -255,6 +263,6 @@ fn ended_by(observation: &Observation) -> Option<Ticket> {
 }
 
 /// Returns the starts whose ends are reported.
-pub(crate) fn ended(passage: &Passage) -> Vec<Ticket> {
+pub(crate) fn ended(passage: &TimeAdvance) -> Vec<ActionHandle> {
     passage.observations.iter().filter_map(ended_by).collect()
 }

@@ -100,7 +100,7 @@ impl InitialProblem {
     }
 
     /// Submits a problem and waits up to 20 s. Returns `true` if it is accepted, `false` if it is still being read.
-    pub(super) fn give(&self, text: String) -> Result<bool, ApiError> {
+    pub(super) fn submit_and_wait(&self, text: String) -> Result<bool, ApiError> {
         let (sender, answer) = channel();
         {
             let mut place = self.lock();
@@ -139,10 +139,10 @@ mod tests {
     fn client_receives_result_of_its_problem() {
         let (slot, stop) = (InitialProblem::default(), Stop::default());
         std::thread::scope(|scope| {
-            let refused = scope.spawn(|| slot.give("wrong".to_owned()));
+            let refused = scope.spawn(|| slot.submit_and_wait("wrong".to_owned()));
             let (text, client) = slot.wait(&stop).expect("one is given").parts();
             assert_eq!(text, "wrong");
-            let second = slot.give("right".to_owned());
+            let second = slot.submit_and_wait("right".to_owned());
             assert!(
                 second.is_err_and(|it| it.status == 409),
                 "one after the other"
@@ -152,7 +152,7 @@ mod tests {
             let refused = refused.join().expect("an answer");
             assert!(refused.is_err_and(|it| it.error == "it is wrong"));
 
-            let taken = scope.spawn(|| slot.give("right".to_owned()));
+            let taken = scope.spawn(|| slot.submit_and_wait("right".to_owned()));
             let (_, client) = slot.wait(&stop).expect("one is given").parts();
             client.accept();
             assert!(taken.join().expect("an answer").is_ok_and(|it| it));
@@ -163,7 +163,7 @@ mod tests {
     fn problem_during_shutdown_is_rejected() {
         let (slot, stop) = (InitialProblem::default(), Stop::default());
         std::thread::scope(|scope| {
-            let given = scope.spawn(|| slot.give("late".to_owned()));
+            let given = scope.spawn(|| slot.submit_and_wait("late".to_owned()));
             drop(slot.wait(&stop));
             slot.close();
             let given = given.join().expect("an answer");
@@ -172,7 +172,7 @@ mod tests {
         stop.request();
         assert!(slot.wait(&stop).is_none());
         assert!(
-            slot.give("later".to_owned())
+            slot.submit_and_wait("later".to_owned())
                 .is_err_and(|it| it.status == 409)
         );
     }

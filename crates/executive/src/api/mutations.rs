@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use elbowroom::execution::run::FIRST_GOAL;
-use elbowroom::execution::{GoalTerms, Request, Ticket};
+use elbowroom::execution::run::PROBLEM_GOAL_NAME;
+use elbowroom::execution::{ActionHandle, GoalTerms, Request};
 use elbowroom::executive::documents::{
     Activity, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, State, Taken,
 };
@@ -17,7 +17,7 @@ use serde::de::DeserializeOwned;
 
 use super::router::{Accepted, ApiError, ApiRouter, ServedRun};
 use crate::error::Error;
-use crate::messages::counted;
+use crate::messages::count_with_noun;
 use crate::request_check::{check, check_target};
 use crate::request_queue::{ExternalRequest, RequestStatus};
 
@@ -32,7 +32,7 @@ impl ApiRouter {
                 Accepted::Everything
             }
             ("DELETE", _) | ("POST", "/v1/actions" | "/v1/pause" | "/v1/resume") => {
-                Accepted::Pauses
+                Accepted::PausesOnly
             }
             _ => Accepted::Nothing,
         };
@@ -117,7 +117,7 @@ impl ApiRouter {
         match self.queue().silence() {
             Some(seconds) => format!(
                 "the world answers, which it has not done for {}",
-                counted(usize::try_from(seconds).unwrap_or(usize::MAX), "second")
+                count_with_noun(usize::try_from(seconds).unwrap_or(usize::MAX), "second")
             ),
             None => "a plan is made".to_owned(),
         }
@@ -131,7 +131,7 @@ impl ApiRouter {
     }
 
     /// Submits a request about an open goal or a running action if the run knows it.
-    fn submit_about(
+    fn submit_for_target(
         &self,
         request: ExternalRequest,
         name: Option<String>,
@@ -144,11 +144,11 @@ impl ApiRouter {
     fn abandon(&self, name: &str) -> Result<Taken, ApiError> {
         let name = name.to_owned();
         let request = Request::Abandon { name: name.clone() };
-        self.submit_about(ExternalRequest::Request(request), Some(name))
+        self.submit_for_target(ExternalRequest::Request(request), Some(name))
     }
 
     fn action(&self, given: &NewOutcome) -> Result<Taken, ApiError> {
-        let ticket = Ticket(given.ticket);
+        let ticket = ActionHandle(given.ticket);
         let outcome = |succeeded| ExternalRequest::Outcome { ticket, succeeded };
         let request = match given.becomes.as_str() {
             "done" => outcome(true),
@@ -160,7 +160,7 @@ impl ApiRouter {
                 return Err(ApiError::new(422, error, help));
             }
         };
-        self.submit_about(request, None)
+        self.submit_for_target(request, None)
     }
 
     fn fact(&self, given: NewFact) -> Result<Taken, ApiError> {
@@ -188,7 +188,7 @@ impl ApiRouter {
             ApiError::new(422, first.unwrap_or_default(), help)
         })?;
         let Ok(ServedRun { status, task, .. }) = self.run() else {
-            let taken = self.initial_problem().give(given.problem)?;
+            let taken = self.initial_problem().submit_and_wait(given.problem)?;
             let until = (!taken).then(|| "it is read".to_owned());
             let name = None;
             return Ok(Taken { taken, until, name });
@@ -261,7 +261,7 @@ fn requests_for(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> 
         let name = goal.name.clone();
         requests.push(ExternalRequest::Request(Request::Abandon { name }));
     }
-    let (name, goal) = (FIRST_GOAL.to_owned(), goal_text(new));
+    let (name, goal) = (PROBLEM_GOAL_NAME.to_owned(), goal_text(new));
     let terms = GoalTerms::default();
     requests.push(ExternalRequest::Request(Request::Pursue {
         name,

@@ -66,7 +66,7 @@ pub(super) enum Accepted {
     /// None.
     Nothing,
     /// Pauses, and the cancellation of its only goal.
-    Pauses,
+    PausesOnly,
     /// Goals, facts, numbers, problems and pauses.
     Everything,
 }
@@ -147,14 +147,14 @@ impl ApiRouter {
     ///
     /// # Errors
     /// When the specification cannot be written.
-    pub fn begin(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
+    pub fn begin_run(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
         let status = Status::new(task, spec.timeout.clone());
         let mut header = |line: &str| self.buffer.add(line);
         let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
         written.map_err(|error| Error::new(format!("cannot show the run: {error}"), ""))?;
         let accepted = match () {
-            () if spec.is_lasting => Accepted::Everything,
-            () if spec.is_attended => Accepted::Pauses,
+            () if spec.is_persistent => Accepted::Everything,
+            () if spec.is_interactive => Accepted::PausesOnly,
             () => Accepted::Nothing,
         };
         let _ = self.run.set(ServedRun {
@@ -296,10 +296,10 @@ impl ApiRouter {
                 respond(stream, 200, JSON, &text(&self.run()?.status.guarantee()))
             }
             ("GET", "/v1/next") => respond(stream, 200, JSON, &text(&self.run()?.status.next())),
-            ("GET", path) => return Err(no_such(path, "GET")),
+            ("GET", path) => return Err(unknown_path_error(path, "GET")),
             (method, path) => {
                 if !methods(path).any(|verb| verb == method) {
-                    return Err(no_such(path, method));
+                    return Err(unknown_path_error(path, method));
                 }
                 self.allow(request)?;
                 let taken = self.change(method, path, &request.body)?;
@@ -349,7 +349,7 @@ impl ServedRun {
             return Ok(());
         }
         let error = match self.accepted {
-            Accepted::Pauses => {
+            Accepted::PausesOnly => {
                 "this run has one goal, and accepts no other goals, problems, facts or numbers"
             }
             _ => "this run accepts no request but to stop",
@@ -414,7 +414,7 @@ fn is_path(path: &str, pattern: &str) -> bool {
 }
 
 /// Returns the error for a path without this method.
-fn no_such(path: &str, method_name: &str) -> ApiError {
+fn unknown_path_error(path: &str, method_name: &str) -> ApiError {
     let help = "GET /v1/openapi.json lists all requests";
     match methods(path).next() {
         Some(verb) => {

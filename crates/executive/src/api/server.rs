@@ -10,7 +10,7 @@ use elbowroom::execute::NamedText;
 use super::ApiRouter;
 use crate::error::Error;
 use crate::http::{self, AccessControl, Address, Listener};
-use crate::messages::plain;
+use crate::messages::io_error_message;
 
 /// Serves the HTTP interface of an executive or a run at a TCP address, and at a Unix socket if a path is given, until
 /// the program ends. Without `control`, clients can only read. `domain` is the domain of the problems that clients may
@@ -31,10 +31,10 @@ pub fn serve(
             "choose another port; with port 0, a free one is taken",
         )
     };
-    let listener = TcpListener::bind(address).map_err(|error| cannot(&plain(&error)))?;
+    let listener = TcpListener::bind(address).map_err(|error| cannot(&io_error_message(&error)))?;
     let own = listener
         .local_addr()
-        .map_err(|error| cannot(&plain(&error)))?;
+        .map_err(|error| cannot(&io_error_message(&error)))?;
     let socket = socket_path.map(socket).transpose()?;
     let router = Arc::new(ApiRouter::new(control, own, domain.cloned()));
     for (listener, is_local_only) in [
@@ -71,9 +71,10 @@ fn socket(path: &Path) -> Result<Listener, Error> {
         }
         let _ = std::fs::remove_file(path);
     }
-    let listener = UnixListener::bind(path).map_err(|error| cannot(&plain(&error)))?;
+    let listener = UnixListener::bind(path).map_err(|error| cannot(&io_error_message(&error)))?;
     let owner_only = std::fs::Permissions::from_mode(0o600);
-    std::fs::set_permissions(path, owner_only).map_err(|error| cannot(&plain(&error)))?;
+    std::fs::set_permissions(path, owner_only)
+        .map_err(|error| cannot(&io_error_message(&error)))?;
     Ok(Listener::Unix(listener))
 }
 

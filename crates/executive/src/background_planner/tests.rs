@@ -12,9 +12,9 @@ use super::{BackgroundPlanner, BackgroundSettings};
 use crate::completion_signal::{Completion, CompletionSignal};
 
 /// Planner for situations without a plan in advance. Counts its calls.
-struct Asked<'a>(&'a AtomicUsize);
+struct CountingPlanner<'a>(&'a AtomicUsize);
 
-impl Planner for Asked<'_> {
+impl Planner for CountingPlanner<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         self.0.fetch_add(1, Ordering::SeqCst);
         Embedded::default().plan(task, situation)
@@ -40,7 +40,7 @@ fn settings(stop: &Stop) -> BackgroundSettings {
     BackgroundSettings {
         stop: stop.clone(),
         signal: CompletionSignal::default(),
-        most_memory: None,
+        memory_limit: None,
     }
 }
 
@@ -57,8 +57,11 @@ fn steps(answer: PlanAnswer) -> Vec<(String, Rational)> {
 fn plan_in_advance_equals_awaited_plan() {
     let ((spec, task), asked) = (delivery(), AtomicUsize::new(0));
     let situation = Situation::initial(&task);
-    let mut planner =
-        BackgroundPlanner::new(Box::new(Asked(&asked)), &spec, &settings(&Stop::default()));
+    let mut planner = BackgroundPlanner::new(
+        Box::new(CountingPlanner(&asked)),
+        &spec,
+        &settings(&Stop::default()),
+    );
     planner.expect(&task, &situation);
     let made = steps(planner.plan(&task, &situation).answer);
     assert_eq!(asked.load(Ordering::SeqCst), 0);
@@ -79,7 +82,8 @@ fn plan_for_other_situation_is_discarded() {
     let mut later = situation.clone();
     later.time = Rational::from(1);
     let stop = Stop::default();
-    let mut planner = BackgroundPlanner::new(Box::new(Asked(&asked)), &spec, &settings(&stop));
+    let mut planner =
+        BackgroundPlanner::new(Box::new(CountingPlanner(&asked)), &spec, &settings(&stop));
     planner.expect(&task, &later);
     assert!(!steps(planner.plan(&task, &situation).answer).is_empty());
     assert_eq!(asked.load(Ordering::SeqCst), 1);
@@ -101,7 +105,7 @@ fn begun_plan_is_signalled() {
     let situation = Situation::initial(&task);
     let settings = settings(&Stop::default());
     let long = std::time::Duration::from_secs(60);
-    let mut planner = BackgroundPlanner::new(Box::new(Asked(&asked)), &spec, &settings);
+    let mut planner = BackgroundPlanner::new(Box::new(CountingPlanner(&asked)), &spec, &settings);
     planner.expect(&task, &situation);
     assert!(!settings.signal.is_awaited());
     for _ in 0..2 {
@@ -129,10 +133,10 @@ fn search_beyond_memory_limit_finds_no_plan() {
     // The goal is unreachable without the parcel, but the search space is large.
     situation.state.facts.clear();
     let settings = BackgroundSettings {
-        most_memory: Some(0),
+        memory_limit: Some(0),
         ..settings(&Stop::default())
     };
-    let mut planner = BackgroundPlanner::new(Box::new(Asked(&asked)), &spec, &settings);
+    let mut planner = BackgroundPlanner::new(Box::new(CountingPlanner(&asked)), &spec, &settings);
     assert!(planner.begin(&task, &situation));
     let answer = planner.collect(&task, &situation).answer;
     assert!(!matches!(answer, PlanAnswer::Plan(_)), "{answer:?}");

@@ -1,9 +1,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::execute::{Analyst, Embedded, RunSpec};
+use elbowroom::execute::{Embedded, PlanPreparer, RunSpec};
 use elbowroom::execution::executors::ExecutorSpec;
-use elbowroom::execution::{Mission, Need, PlanAnswer, Planner, Preparer, Wanted};
+use elbowroom::execution::{
+    PlanAnswer, PlanForm, Planner, PreparationRequest, PreparedPlan, Preparer,
+};
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 
@@ -12,8 +14,8 @@ use crate::background_planner::tests::delivery;
 use crate::completion_signal::{Completion, CompletionSignal};
 
 /// Returns a prepared plan as text, without its task.
-fn said(mission: &Mission) -> String {
-    let Mission {
+fn mission_text(mission: &PreparedPlan) -> String {
+    let PreparedPlan {
         plan,
         instances,
         nominal,
@@ -47,7 +49,7 @@ fn background_preparation_equals_awaited_one() {
             Rational::ZERO,
             Rational::from(3),
         );
-        let mut wanted = Wanted {
+        let mut wanted = PreparationRequest {
             task: &task,
             plan: &plan,
             situation: &situation,
@@ -62,12 +64,12 @@ fn background_preparation_equals_awaited_one() {
         assert_eq!(signal.poll(), Some(Completion::PlanReady));
         wanted.now = &later;
         let aside = preparer.collect(&wanted).expect("it works");
-        let mut analyst = Analyst::new(spec.envelopes());
-        let waited_for = wanted.mission(&mut analyst).expect("it works");
-        assert_eq!(said(&aside), said(&waited_for), "{name}");
+        let mut analyst = PlanPreparer::new(spec.envelopes());
+        let waited_for = wanted.prepare_now(&mut analyst).expect("it works");
+        assert_eq!(mission_text(&aside), mission_text(&waited_for), "{name}");
         assert_eq!(aside.now, later);
         assert_eq!(aside.task.initial(), waited_for.task.initial());
-        assert_eq!(need == Need::PartialOrder, aside.order.is_some());
+        assert_eq!(need == PlanForm::PartialOrder, aside.order.is_some());
         // An abandoned preparation is not signalled.
         assert!(preparer.begin(&wanted));
         preparer.give_up();

@@ -8,10 +8,10 @@ use elbowroom::num::work::Stop;
 
 use super::Request;
 use crate::error::Error;
-use crate::messages::plain;
+use crate::messages::io_error_message;
 
 /// Minimum length of a token, in bytes.
-const LEAST_TOKEN: usize = 16;
+const MIN_TOKEN_LENGTH: usize = 16;
 
 /// Access token: its holders may change and stop the run.
 pub struct AccessControl {
@@ -34,10 +34,13 @@ impl AccessControl {
         });
         let is_shared = read.map_err(|error| {
             Error::new(
-                format!("cannot read the token in {name}: {}", plain(&error)),
+                format!(
+                    "cannot read the token in {name}: {}",
+                    io_error_message(&error)
+                ),
                 format!(
                     "the option names a file with a token in it; {}",
-                    making(path)
+                    token_file_advice(path)
                 ),
             )
         })?;
@@ -51,12 +54,12 @@ impl AccessControl {
         }
         let token = text.trim().to_owned();
         let is_safe = token.bytes().all(|byte| byte.is_ascii_graphic());
-        if token.len() < LEAST_TOKEN || !is_safe {
+        if token.len() < MIN_TOKEN_LENGTH || !is_safe {
             return Err(Error::new(
                 format!(
-                    "the token in {name} is not one word of {LEAST_TOKEN} or more printable ASCII characters"
+                    "the token in {name} is not one word of {MIN_TOKEN_LENGTH} or more printable ASCII characters"
                 ),
-                making(path),
+                token_file_advice(path),
             ));
         }
         Ok(Self { token, stop })
@@ -89,7 +92,7 @@ impl AccessControl {
 }
 
 /// Returns advice on how to make a file with a token that only its owner can read.
-fn making(path: &Path) -> String {
+fn token_file_advice(path: &Path) -> String {
     let name = path.display();
     format!("make one, for example with `(umask 077; openssl rand -hex 16 > {name})`")
 }

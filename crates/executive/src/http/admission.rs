@@ -8,16 +8,16 @@ use super::{Request, RequestError, Stream};
 
 /// Limit on clients whose requests are being read. Beyond it, the oldest of these connections is closed. A
 /// request usually arrives at once, so idle connections are closed first.
-const MOST_READING: usize = 64;
+const MAX_READING: usize = 64;
 
 /// Limit on concurrent clients with the token, and on those without.
-const MOST_SERVED: usize = 64;
+const MAX_SERVED: usize = 64;
 
 /// Limit on concurrent event streams without the token.
-const MOST_STREAMS: usize = 32;
+const MAX_STREAMS: usize = 32;
 
 /// Limit on concurrent clients without the token from one address of another machine.
-const MOST_OF_PEER: usize = 16;
+const MAX_PER_PEER: usize = 16;
 
 /// Clients of a listener.
 #[derive(Clone, Default)]
@@ -74,7 +74,7 @@ impl Admission {
         let mut clients = self.clients();
         clients.connections += 1;
         let connection = clients.connections;
-        if clients.reading.len() >= MOST_READING
+        if clients.reading.len() >= MAX_READING
             && let Some((_, oldest)) = clients.reading.pop_front()
         {
             oldest.shut_down();
@@ -108,7 +108,7 @@ impl Admission {
         };
         let mut clients = self.clients();
         match class {
-            Class::Known if clients.known >= MOST_SERVED => {
+            Class::Known if clients.known >= MAX_SERVED => {
                 return Err(RequestError::new(
                     503,
                     "too many clients with the token; come back later",
@@ -117,9 +117,9 @@ impl Admission {
             Class::Known => clients.known += 1,
             Class::Other { peer, is_stream } => {
                 let of_peer = peer.and_then(|peer| clients.of_peer.get(&peer).copied());
-                let is_too_many = clients.others >= MOST_SERVED
-                    || of_peer.unwrap_or(0) >= MOST_OF_PEER
-                    || is_stream && clients.streams >= MOST_STREAMS;
+                let is_too_many = clients.others >= MAX_SERVED
+                    || of_peer.unwrap_or(0) >= MAX_PER_PEER
+                    || is_stream && clients.streams >= MAX_STREAMS;
                 if is_too_many {
                     return Err(RequestError::new(
                         503,
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn clients_without_the_token_leave_room_for_those_with_it() {
+    fn unauthenticated_clients_leave_capacity_for_authenticated_ones() {
         let admission = Admission::default();
         let (state, events) = (request("/v1/state"), request("/v1/events"));
         let serve = |request, peer: Option<&str>, is_known| {
@@ -184,13 +184,13 @@ mod tests {
         };
         let local = Some("127.0.0.1");
         let streams: Vec<_> = std::iter::from_fn(|| serve(&events, local, false)).collect();
-        assert_eq!(streams.len(), MOST_STREAMS);
+        assert_eq!(streams.len(), MAX_STREAMS);
         let far: Vec<_> = std::iter::from_fn(|| serve(&state, Some("192.0.2.1"), false)).collect();
-        assert_eq!(far.len(), MOST_OF_PEER);
+        assert_eq!(far.len(), MAX_PER_PEER);
         let others: Vec<_> = std::iter::from_fn(|| serve(&state, None, false)).collect();
-        assert_eq!(streams.len() + far.len() + others.len(), MOST_SERVED);
+        assert_eq!(streams.len() + far.len() + others.len(), MAX_SERVED);
         let known: Vec<_> = std::iter::from_fn(|| serve(&events, local, true)).collect();
-        assert_eq!(known.len(), MOST_SERVED);
+        assert_eq!(known.len(), MAX_SERVED);
         drop((streams, far, others, known));
         let clients = admission.clients();
         assert_eq!((clients.known, clients.others, clients.streams), (0, 0, 0));

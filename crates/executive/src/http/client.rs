@@ -13,13 +13,13 @@ use super::Stream;
 const RESPONSE_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Limit on the status line and the headers of a response, in bytes.
-const LONGEST_HEAD: u64 = 64 << 10;
+const MAX_HEAD: u64 = 64 << 10;
 
 /// Limit on the number of headers of a response.
-const MOST_HEADERS: usize = 100;
+const MAX_HEADERS: usize = 100;
 
 /// Limit on a response, in bytes.
-const LONGEST_RESPONSE: u64 = 256 << 20;
+const MAX_RESPONSE: u64 = 256 << 20;
 
 /// Address of an executive.
 #[derive(Clone, Debug)]
@@ -89,7 +89,7 @@ impl Response {
     /// When the connection fails, or the body is not UTF-8.
     pub fn text(self) -> io::Result<String> {
         let mut text = String::new();
-        self.body.take(LONGEST_RESPONSE).read_to_string(&mut text)?;
+        self.body.take(MAX_RESPONSE).read_to_string(&mut text)?;
         Ok(text)
     }
 
@@ -135,10 +135,10 @@ pub fn send(
 /// Reads the status line and the headers of a response. Returns the status code.
 fn read_head(response: &mut impl BufRead) -> io::Result<u16> {
     let nonsense = || io::Error::other("what answers there is not HTTP");
-    let mut limited = response.take(LONGEST_HEAD);
+    let mut limited = response.take(MAX_HEAD);
     let mut head = Vec::new();
     while limited.read_until(b'\n', &mut head)? > 0 {
-        let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
+        let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut parsed = httparse::Response::new(&mut headers);
         let status = parsed.parse(&head).map_err(|_| nonsense())?;
         if status.is_complete() {

@@ -13,18 +13,18 @@ use crate::clock::Clock;
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Limit on the request line and the headers, in bytes.
-const LONGEST_HEAD: usize = 16 << 10;
+const MAX_HEAD: usize = 16 << 10;
 
 /// Limit on the number of headers.
-const MOST_HEADERS: usize = 100;
+const MAX_HEADERS: usize = 100;
 
 /// Limit on a body, in bytes.
 const LONGEST_BODY: usize = 4 << 20;
 
 /// Headers that must not be repeated, because readers disagree about their meaning then.
-const SINGLE: [&str; 4] = ["host", "content-length", "authorization", "origin"];
+const SINGLETON_HEADERS: [&str; 4] = ["host", "content-length", "authorization", "origin"];
 
-const TOO_LONG: RequestError = RequestError::new(431, "the headers are longer than 16 KB");
+const HEADERS_TOO_LONG: RequestError = RequestError::new(431, "the headers are longer than 16 KB");
 
 /// Request of a client.
 #[derive(Debug, Default)]
@@ -95,7 +95,7 @@ pub(super) fn read(stream: &mut Stream) -> Result<Request, RequestError> {
         let known = text.len();
         read_more(stream, &mut text, &clock)?;
         // A head ends with a line feed. Parsing after each byte would take quadratic time.
-        let may_be_complete = text[known..].contains(&b'\n') || text.len() > LONGEST_HEAD;
+        let may_be_complete = text[known..].contains(&b'\n') || text.len() > MAX_HEAD;
         if may_be_complete && let Some(parsed) = parse_head(&text)? {
             break parsed;
         }
@@ -132,12 +132,12 @@ fn read_more(stream: &mut Stream, text: &mut Vec<u8>, clock: &Clock) -> Result<(
 /// if the head is incomplete.
 fn parse_head(text: &[u8]) -> Result<Option<(Request, usize)>, RequestError> {
     let nonsense = RequestError::new(400, "this is not HTTP");
-    let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
+    let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut head = httparse::Request::new(&mut headers);
     let length = match head.parse(text) {
-        Ok(Status::Complete(length)) if length <= LONGEST_HEAD => length,
-        Ok(Status::Partial) if text.len() <= LONGEST_HEAD => return Ok(None),
-        Ok(_) => return Err(TOO_LONG),
+        Ok(Status::Complete(length)) if length <= MAX_HEAD => length,
+        Ok(Status::Partial) if text.len() <= MAX_HEAD => return Ok(None),
+        Ok(_) => return Err(HEADERS_TOO_LONG),
         Err(httparse::Error::TooManyHeaders) => {
             return Err(RequestError::new(431, "there are more than 100 headers"));
         }
@@ -158,7 +158,7 @@ fn parse_head(text: &[u8]) -> Result<Option<(Request, usize)>, RequestError> {
         let value = std::str::from_utf8(header.value);
         let value = value.map_err(|_| RequestError::new(400, "the headers are not UTF-8"))?;
         let name = header.name.to_ascii_lowercase();
-        let is_single = SINGLE.contains(&name.as_str());
+        let is_single = SINGLETON_HEADERS.contains(&name.as_str());
         let earlier = request.headers.insert(name, value.trim().to_owned());
         if earlier.is_some() && is_single {
             return Err(RequestError::new(
@@ -172,7 +172,7 @@ fn parse_head(text: &[u8]) -> Result<Option<(Request, usize)>, RequestError> {
 
 #[cfg(test)]
 mod tests {
-    use super::{LONGEST_HEAD, MOST_HEADERS, Request, RequestError, parse_head};
+    use super::{MAX_HEAD, MAX_HEADERS, Request, RequestError, parse_head};
 
     const GET: &str = "GET /v1/events?after=3 HTTP/1.1\r\nHost: localhost\r\n";
 
@@ -208,8 +208,8 @@ mod tests {
 
     #[test]
     fn malformed_and_ambiguous_heads_are_rejected() {
-        let long = format!("{GET}X: {}\r\n\r\n", "y".repeat(LONGEST_HEAD));
-        let many = format!("{GET}{}\r\n", "X: y\r\n".repeat(MOST_HEADERS));
+        let long = format!("{GET}X: {}\r\n\r\n", "y".repeat(MAX_HEAD));
+        let many = format!("{GET}{}\r\n", "X: y\r\n".repeat(MAX_HEADERS));
         for (text, status) in [
             ("\0\u{1} nonsense\r\n\r\n".to_owned(), 400),
             ("GET /\r\n\r\n".to_owned(), 400),
@@ -247,7 +247,7 @@ mod tests {
             let read = parsed(&text).map_err(|error| error.status);
             assert_eq!(read.err(), Some(status), "{}", &text[..text.len().min(99)]);
         }
-        let endless = format!("{GET}X: {}", "y".repeat(LONGEST_HEAD));
+        let endless = format!("{GET}X: {}", "y".repeat(MAX_HEAD));
         let read = parse_head(endless.as_bytes());
         assert_eq!(read.map(drop).map_err(|it| it.status), Err(431));
         let latin = [GET.as_bytes(), b"X: \xe9\r\n\r\n"].concat();

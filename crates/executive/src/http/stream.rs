@@ -99,7 +99,7 @@ impl Stream {
 
 impl Subscriber for Stream {
     /// Reads without waiting, and drops the bytes that the client has sent.
-    fn has_left(&mut self) -> bool {
+    fn has_disconnected(&mut self) -> bool {
         let _ = either!(self, it => it.set_nonblocking(true));
         let read = self.read(&mut [0; 1024]);
         let _ = either!(self, it => it.set_nonblocking(false));

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use super::{INITIAL_CHECKSUM, JournalFile, WallTime, for_owner, lock, record};
 use crate::error::WarningSink;
-use crate::messages::plain;
+use crate::messages::io_error_message;
 
 /// Rotation settings of a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +58,7 @@ impl JournalFile {
             self.warnings.warn(&format!(
                 "the journal {} keeps growing, as no new segment can be started: {}",
                 self.path.display(),
-                plain(error)
+                io_error_message(error)
             ));
         }
         replaced.is_ok()

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::execution::{Command, Event, Observation, Passage, World, WorldError};
+use elbowroom::execution::{Command, Event, Observation, TimeAdvance, World, WorldError};
 use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
@@ -117,10 +117,10 @@ impl<'a, W: World> InteractiveWorld<'a, W> {
         answer
     }
 
-    fn note(&mut self, passage: &Passage) {
+    fn note(&mut self, passage: &TimeAdvance) {
         self.now.clone_from(&passage.now);
         if let Some(status) = &self.status {
-            status.pass(&self.now);
+            status.set_time(&self.now);
         }
         for observation in &passage.observations {
             if let Event::Ended { ticket, .. } = &observation.event {
@@ -144,7 +144,7 @@ impl<W: World> World for InteractiveWorld<'_, W> {
         self.ask(|world| world.command(now, command))
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
         if self.queue.is_none() && !self.signal.is_awaited() {
             let passage = self.inner.wait(until)?;
             self.note(&passage);
@@ -156,7 +156,7 @@ impl<W: World> World for InteractiveWorld<'_, W> {
             return Ok(passage);
         }
         if let Some(completion) = self.signal.poll_timeout() {
-            return Ok(Passage {
+            return Ok(TimeAdvance {
                 now: self.now.clone(),
                 observations: vec![self.observed(completion)],
             });

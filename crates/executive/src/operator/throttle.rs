@@ -5,7 +5,7 @@ use std::time::Duration;
 use crate::clock::Clock;
 
 /// Limit on one delay.
-const LONGEST_DELAY: Duration = Duration::from_millis(100);
+const MAX_DELAY: Duration = Duration::from_millis(100);
 
 /// Delays a simulation that runs ahead of the wall clock, but not a robot.
 ///
@@ -16,7 +16,7 @@ pub(super) struct SimulationThrottle {
     /// Runs since the last answer.
     since: Clock,
     /// Lead of the world's clock over the wall clock.
-    ahead: Duration,
+    lead: Duration,
     /// `true` if there was a delay since the last answer.
     has_slept: bool,
 }
@@ -26,7 +26,7 @@ impl SimulationThrottle {
     pub(super) fn start() -> Self {
         Self {
             since: Clock::start(),
-            ahead: Duration::ZERO,
+            lead: Duration::ZERO,
             has_slept: false,
         }
     }
@@ -43,17 +43,15 @@ impl SimulationThrottle {
         let has_slept = std::mem::take(&mut self.has_slept);
         // The latency of answers varies.
         if !has_slept && passed <= elapsed + passed / 4 {
-            self.ahead = Duration::ZERO;
+            self.lead = Duration::ZERO;
             return Duration::ZERO;
         }
-        self.ahead = (self.ahead + passed)
-            .saturating_sub(elapsed)
-            .min(LONGEST_DELAY);
+        self.lead = (self.lead + passed).saturating_sub(elapsed).min(MAX_DELAY);
         if has_slept {
             return Duration::ZERO;
         }
-        self.has_slept = !self.ahead.is_zero();
-        self.ahead
+        self.has_slept = !self.lead.is_zero();
+        self.lead
     }
 }
 
@@ -118,7 +116,7 @@ mod tests {
         let mut throttle = SimulationThrottle::start();
         assert_eq!(
             throttle.pause(Duration::from_secs(5), long),
-            super::LONGEST_DELAY
+            super::MAX_DELAY
         );
     }
 }

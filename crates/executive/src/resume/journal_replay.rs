@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use elbowroom::answers::{Halt, Watcher};
-use elbowroom::execution::run::Stand;
+use elbowroom::answers::{Observer, StopRequest};
+use elbowroom::execution::run::RunSnapshot;
 use elbowroom::execution::{Entry, Planner, PlannerAnswer, Recorder};
 use elbowroom::model::{Situation, Task};
 use elbowroom::report::trace::{Line, ReplayPlanner, Stored};
@@ -91,7 +91,7 @@ impl Recorder for ReplayRecorder<'_> {
         self.writer.commit();
     }
 
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+    fn begin_anew(&mut self, stand: &dyn Fn() -> RunSnapshot) -> bool {
         // Only new entries can be replaced.
         self.replay.is_over() && self.replay.difference().is_none() && self.writer.begin_anew(stand)
     }
@@ -101,7 +101,7 @@ impl Recorder for ReplayRecorder<'_> {
 /// made again.
 pub(super) struct ResumedPlanner<'a> {
     /// For each request for a plan in the journal, in order: `true` if it has the answer.
-    asked: VecDeque<bool>,
+    answered_requests: VecDeque<bool>,
     journal: ReplayPlanner,
     planner: Box<dyn Planner + 'a>,
     /// Source of the plan that is made in the background.
@@ -132,7 +132,7 @@ impl<'a> ResumedPlanner<'a> {
             }
         }
         Self {
-            asked,
+            answered_requests: asked,
             journal: ReplayPlanner::new(stored),
             planner,
             begun: Source::Journal,
@@ -141,9 +141,9 @@ impl<'a> ResumedPlanner<'a> {
 
     /// Returns the source of the next plan, or `None` for a plan that was begun and abandoned in the journal.
     fn next(&mut self) -> Option<Source> {
-        match self.asked.pop_front() {
+        match self.answered_requests.pop_front() {
             Some(true) => Some(Source::Journal),
-            Some(false) if !self.asked.is_empty() => None,
+            Some(false) if !self.answered_requests.is_empty() => None,
             _ => Some(Source::Planner),
         }
     }
@@ -179,25 +179,25 @@ impl Planner for ResumedPlanner<'_> {
     }
 
     fn expect(&mut self, task: &Task, situation: &Situation) {
-        if self.asked.is_empty() {
+        if self.answered_requests.is_empty() {
             self.planner.expect(task, situation);
         }
     }
 
     fn is_recorded(&self) -> bool {
-        self.asked.front() == Some(&true)
+        self.answered_requests.front() == Some(&true)
     }
 }
 
 /// Watcher that ends the run at an interruption in the journal, after a failure of the journal, and after its end as the
 /// inner watcher requests.
 pub(super) struct ReplayWatcher<'w> {
-    pub(super) inner: &'w mut (dyn Watcher + Send),
+    pub(super) inner: &'w mut (dyn Observer + Send),
     pub(super) replay: Arc<JournalReplay>,
     pub(super) health: JournalHealth,
 }
 
-impl Watcher for ReplayWatcher<'_> {
+impl Observer for ReplayWatcher<'_> {
     fn elapsed(&mut self) -> Duration {
         self.inner.elapsed()
     }
@@ -209,10 +209,10 @@ impl Watcher for ReplayWatcher<'_> {
         }
     }
 
-    fn flow(&mut self) -> ControlFlow<Halt> {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         let is_to_end = self.replay.is_to_end.load(Ordering::SeqCst) || self.health.has_failed();
         match () {
-            () if is_to_end => ControlFlow::Break(Halt::Cancelled),
+            () if is_to_end => ControlFlow::Break(StopRequest::Cancelled),
             () if self.replay.is_over() => self.inner.flow(),
             () => ControlFlow::Continue(()),
         }

@@ -81,7 +81,7 @@ pub struct MessageParser {
     /// `true` after the first valid message.
     has_spoken: bool,
     /// Tickets below this one were issued.
-    given: u64,
+    next_ticket: u64,
     /// Number of the last question.
     question: u64,
 }
@@ -94,14 +94,14 @@ impl MessageParser {
             clocks: Clocks::default(),
             greeting: None,
             has_spoken: false,
-            given: 0,
+            next_ticket: 0,
             question: 0,
         }
     }
 
     /// Records that the ticket was issued to the program.
     pub fn note_start(&mut self, ticket: u64) {
-        self.given = self.given.max(ticket.saturating_add(1));
+        self.next_ticket = self.next_ticket.max(ticket.saturating_add(1));
     }
 
     /// Returns the number of a new question.
@@ -167,7 +167,7 @@ impl MessageParser {
             Event::Started { ticket, .. }
             | Event::Ended { ticket, .. }
             | Event::Feedback { ticket, .. }
-                if ticket.0 >= self.given =>
+                if ticket.0 >= self.next_ticket =>
             {
                 Err(format!("ticket {} was never given", ticket.0))
             }

@@ -8,10 +8,10 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
 /// Limit on a message, in bytes.
-pub const LONGEST_LINE: usize = 1 << 20;
+pub const MAX_LINE: usize = 1 << 20;
 
 /// Limit on unread bytes, and on the bytes of one answer.
-pub const LONGEST_ANSWER: usize = 16 << 20;
+pub const MAX_ANSWER: usize = 16 << 20;
 
 /// Reader of a program's standard output.
 pub struct LineReader {
@@ -25,9 +25,9 @@ pub enum ReadResult {
     /// A line; invalid UTF-8 is replaced.
     Line(String),
     /// More than [`LONGEST_LINE`] bytes without a line feed.
-    EndlessLine,
-    /// More than [`LONGEST_ANSWER`] unread bytes.
-    TooMuch,
+    LineTooLong,
+    /// More than [`MAX_ANSWER`] unread bytes.
+    AnswerTooLong,
     /// No line arrived before the timeout.
     Timeout,
     /// The program has closed its output.
@@ -66,15 +66,15 @@ impl LineReader {
 fn read_lines(mut reader: impl BufRead, sender: &Sender<ReadResult>, waiting: &AtomicUsize) {
     loop {
         let mut bytes = Vec::new();
-        let most = LONGEST_LINE as u64 + 1;
+        let most = MAX_LINE as u64 + 1;
         let result = match reader.by_ref().take(most).read_until(b'\n', &mut bytes) {
             Ok(0) | Err(_) => return,
-            Ok(_) if bytes.len() > LONGEST_LINE => ReadResult::EndlessLine,
+            Ok(_) if bytes.len() > MAX_LINE => ReadResult::LineTooLong,
             Ok(_) => {
                 let line = String::from_utf8_lossy(&bytes).into_owned();
                 let before = waiting.fetch_add(line.len(), Ordering::Relaxed);
-                if before + line.len() > LONGEST_ANSWER {
-                    ReadResult::TooMuch
+                if before + line.len() > MAX_ANSWER {
+                    ReadResult::AnswerTooLong
                 } else {
                     ReadResult::Line(line)
                 }

@@ -19,20 +19,20 @@ use super::{Ended, Ending, Limits, Stream, Watcher};
 use crate::processes::{MARK, Processes, Usage};
 
 /// Interval between checks of the limits.
-const TICK: Duration = Duration::from_millis(20);
+const LIMIT_CHECK_INTERVAL: Duration = Duration::from_millis(20);
 /// Interval between measurements of memory and processor time; reading `/proc` costs a few
 /// milliseconds.
 const MEASURE: Duration = Duration::from_millis(60);
 /// Interval between checks for the end of the process once its output is closed.
-const NEAR_END: Duration = Duration::from_millis(2);
+const EXIT_POLL_INTERVAL: Duration = Duration::from_millis(2);
 /// Maximum time to wait for the end of killed processes.
-const LAST_WAIT: Duration = Duration::from_secs(2);
+const REAP_TIMEOUT: Duration = Duration::from_secs(2);
 /// Maximum time spent on killing children that keep forking.
-const HUNT: Duration = Duration::from_millis(500);
+const KILL_TIMEOUT: Duration = Duration::from_millis(500);
 #[cfg(target_os = "linux")]
 const MEGABYTE: u64 = 1 << 20;
 /// Maximum length of the output read from the pipes after the end.
-const LEFT_OVER: usize = 4 << 20;
+const MAX_REMAINING_OUTPUT: usize = 4 << 20;
 
 pub(super) fn supervise(
     mut command: Command,
@@ -87,7 +87,7 @@ struct Run {
     is_output_open: bool,
     is_error_open: bool,
     /// `true` if another thread waits for the end of the process.
-    is_left: bool,
+    is_abandoned: bool,
 }
 
 impl Run {
@@ -108,16 +108,16 @@ impl Run {
             processes: Processes::of(pid, mark),
             is_output_open: child.stdout.is_some(),
             is_error_open: child.stderr.is_some(),
-            is_left: false,
+            is_abandoned: false,
             child,
         };
         // If this fails, reads may block. The limits still end them, because killing the process
         // closes the pipes.
         if let Some(output) = &run.child.stdout {
-            let _ = without_waiting(output);
+            let _ = set_nonblocking(output);
         }
         if let Some(error) = &run.child.stderr {
-            let _ = without_waiting(error);
+            let _ = set_nonblocking(error);
         }
         run
     }
@@ -172,7 +172,7 @@ impl Run {
                 return Some(Ending::TimeLimit);
             }
             // Shortly before the limit, a measurement would only delay the end.
-            if left.is_none_or(|left| left > TICK) {
+            if left.is_none_or(|left| left > LIMIT_CHECK_INTERVAL) {
                 self.measure(elapsed);
             }
             let Usage { memory, work } = self.usage;
@@ -183,7 +183,7 @@ impl Run {
                 return Some(Ending::TimeLimit);
             }
             watcher.tick(memory);
-            let patience = left.map_or(TICK, |left| left.min(TICK));
+            let patience = left.map_or(LIMIT_CHECK_INTERVAL, |left| left.min(LIMIT_CHECK_INTERVAL));
             self.wait_for_output(patience);
             self.read(&mut buffer, watcher);
         }
@@ -199,7 +199,7 @@ impl Run {
     fn measure(&mut self, elapsed: Duration) {
         let is_due = |last: Duration| elapsed.saturating_sub(last) >= MEASURE;
         // Very short runs are not measured.
-        if elapsed >= TICK / 2 && self.measured.is_none_or(is_due) {
+        if elapsed >= LIMIT_CHECK_INTERVAL / 2 && self.measured.is_none_or(is_due) {
             self.measured = Some(elapsed);
             self.usage = self.processes.usage();
             self.peak_memory = self.peak_memory.max(self.usage.memory);
@@ -220,7 +220,7 @@ impl Run {
             watched.push(PollFd::new(error, PollFlags::IN));
         }
         if watched.is_empty() {
-            thread::sleep(patience.min(NEAR_END));
+            thread::sleep(patience.min(EXIT_POLL_INTERVAL));
             return;
         }
         let timeout = Timespec::try_from(patience).ok();
@@ -256,7 +256,7 @@ impl Run {
     fn drain(&mut self, watcher: &mut dyn Watcher) {
         let mut buffer = vec![0; 64 << 10];
         let mut total = 0;
-        while total < LEFT_OVER {
+        while total < MAX_REMAINING_OUTPUT {
             match self.read(&mut buffer, watcher) {
                 0 => return,
                 read => total += read,
@@ -271,7 +271,7 @@ impl Run {
         #[cfg(target_os = "linux")]
         {
             let hunt = Clock::start();
-            while self.processes.kill() > 0 && hunt.elapsed() < HUNT {
+            while self.processes.kill() > 0 && hunt.elapsed() < KILL_TIMEOUT {
                 let _ = kill_process_group(self.pid, Signal::KILL);
                 thread::sleep(Duration::from_millis(1));
             }
@@ -290,13 +290,13 @@ impl Run {
                         (None, signal) => Ending::Signalled(signal.unwrap_or(0)),
                     };
                 }
-                Ok(None) if clock.elapsed() < LAST_WAIT => thread::sleep(NEAR_END / 4),
+                Ok(None) if clock.elapsed() < REAP_TIMEOUT => thread::sleep(EXIT_POLL_INTERVAL / 4),
                 // The process is killed but has not ended yet. Another thread waits for it, so that
                 // it is reaped.
                 Ok(None) => {
                     let pid = self.pid;
                     thread::spawn(move || waitpid(Some(pid), WaitOptions::empty()));
-                    self.is_left = true;
+                    self.is_abandoned = true;
                     return Ending::Signalled(Signal::KILL.as_raw());
                 }
                 Err(_) => return Ending::Signalled(Signal::KILL.as_raw()),
@@ -308,7 +308,7 @@ impl Run {
 /// Ends the process even if the watcher panics.
 impl Drop for Run {
     fn drop(&mut self) {
-        if !self.is_left
+        if !self.is_abandoned
             && let Ok(None) = self.child.try_wait()
         {
             self.end_all();
@@ -317,7 +317,7 @@ impl Drop for Run {
     }
 }
 
-fn without_waiting(stream: impl AsFd) -> io::Result<()> {
+fn set_nonblocking(stream: impl AsFd) -> io::Result<()> {
     let flags = fcntl_getfl(&stream)?;
     fcntl_setfl(&stream, flags | OFlags::NONBLOCK)?;
     Ok(())

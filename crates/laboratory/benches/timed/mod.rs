@@ -3,7 +3,9 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use elbowroom_execution::{Decided, Executor, Mission, Moment, Need, Planned, Reason, StepId};
+use elbowroom_execution::{
+    Decided, DecisionContext, Executor, PlanForm, Planned, PreparedPlan, Reason, StepId,
+};
 
 /// Decision times.
 #[derive(Clone, Default)]
@@ -29,15 +31,15 @@ pub(crate) struct Timed {
 }
 
 impl Executor for Timed {
-    fn need(&self) -> Need {
+    fn need(&self) -> PlanForm {
         self.inner.need()
     }
 
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+    fn adopt(&mut self, mission: &PreparedPlan) -> Result<(), Box<Reason>> {
         self.inner.adopt(mission)
     }
 
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+    fn decide(&mut self, moment: &DecisionContext<'_>) -> Decided {
         let begin = Instant::now();
         let decided = self.inner.decide(moment);
         let took = begin.elapsed();

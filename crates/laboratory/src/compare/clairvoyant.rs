@@ -40,12 +40,12 @@ fn with_foreknowledge(task: &Task, world: &WorldModel, seed: u64) -> Problem {
             let mut rng = keyed(seed, name, 0, Purpose::Duration);
             world.duration(name, planned, &mut rng)
         });
-        know_amounts(task, world, seed, schema, &mut problem);
+        reveal_amounts(task, world, seed, schema, &mut problem);
     }
     problem
 }
 
-fn know_amounts(
+fn reveal_amounts(
     task: &Task,
     world: &WorldModel,
     seed: u64,

@@ -30,7 +30,7 @@ pub struct Experiment {
     /// Blanks and their values. All combinations are used.
     pub blanks: IndexMap<String, Vec<String>>,
     /// Groups of blanks that are filled in together, row by row.
-    pub together: Vec<Together>,
+    pub linked: Vec<LinkedParameters>,
     /// The columns.
     pub columns: Vec<Column>,
     /// The rows.
@@ -76,7 +76,7 @@ pub enum Planning {
     Embedded,
     /// An external planner, as in `elbowroom plan --planner`. Its answers may depend on the speed
     /// of the machine.
-    Another {
+    External {
         /// Its name, or its command line.
         name: String,
         /// Time to improve plans; `None` to use its first plan.
@@ -101,7 +101,7 @@ pub struct Column {
 
 /// Blanks that are filled in together.
 #[derive(Clone, Debug)]
-pub struct Together {
+pub struct LinkedParameters {
     /// Their names.
     pub names: Vec<String>,
     /// A value for each, row by row.
@@ -150,7 +150,7 @@ impl Experiment {
             domain,
             problem,
             blanks,
-            together,
+            linked: together,
             columns,
             executors,
             clairvoyant,
@@ -170,10 +170,10 @@ impl Experiment {
         let RunSettings {
             running,
             planning_time,
-            most_replans,
+            max_replans: most_replans,
             timeout,
             // Worlds of experiments have no clock.
-            watches_room: _,
+            monitors_slack: _,
             plans_aside: _,
             readies_aside: _,
             time_limit,
@@ -193,7 +193,7 @@ impl Experiment {
         let together = together.iter().map(|it| json!([it.names, it.rows]));
         let planner = match planner {
             Planning::Embedded => json!([]),
-            Planning::Another { name, seconds } => {
+            Planning::External { name, seconds } => {
                 json!([name, seconds.as_ref().map(ToString::to_string)])
             }
         };
@@ -225,16 +225,16 @@ impl Experiment {
         ]);
         // These members are omitted at their defaults, so that the identity of older results does
         // not change.
-        let identity = and(identity, "objective", objective.map(|it| json!(it.name())));
-        let identity = and(identity, "plan", plan.as_ref().map(|it| json!(it)));
+        let identity = with_member(identity, "objective", objective.map(|it| json!(it.name())));
+        let identity = with_member(identity, "plan", plan.as_ref().map(|it| json!(it)));
         let is_usual = first_plan.is_shortest();
         let chosen = (!is_usual).then(|| json!(first_plan.name()));
-        let identity = and(identity, "first plan", chosen);
+        let identity = with_member(identity, "first plan", chosen);
         let is_usual = *planning_budget == Rational::from(PLANNING_BUDGET);
         let budget = (!is_usual).then(|| json!(planning_budget.to_string()));
-        let identity = and(identity, "planning budget", budget);
+        let identity = with_member(identity, "planning budget", budget);
         let is_usual = *table_states == Settings::default().most_states;
-        let identity = and(identity, "table", (!is_usual).then(|| json!(table_states)));
+        let identity = with_member(identity, "table", (!is_usual).then(|| json!(table_states)));
         if *optimum {
             json!([identity, "optimum"])
         } else {
@@ -291,7 +291,7 @@ impl Experiment {
         read.check_published(&rows)
             .map_err(|(at, message)| wrong(at, message))?;
         let wrong_at = |(at, message)| wrong(at, message);
-        let together = read.together().map_err(wrong_at)?;
+        let together = read.linked_parameters().map_err(wrong_at)?;
         let settings = read.settings().map_err(wrong_at)?;
         let planner = read.planning().map_err(wrong_at)?;
         let first_plan = read.first_plan().map_err(wrong_at)?;
@@ -322,7 +322,7 @@ impl Experiment {
                 .into_iter()
                 .map(|(name, values)| (name, values.get_ref().iter().map(text_of).collect()))
                 .collect(),
-            together,
+            linked: together,
             columns,
             executors,
             clairvoyant: read.clairvoyant,
@@ -361,7 +361,7 @@ impl Experiment {
                 .flat_map(|filling| values.iter().map(move |value| longer(filling, value)))
                 .collect();
         }
-        for group in &self.together {
+        for group in &self.linked {
             let longer = |filling: &Vec<(String, String)>, row: &Vec<String>| {
                 let pairs = group.names.iter().cloned().zip(row.iter().cloned());
                 filling.iter().cloned().chain(pairs).collect::<Vec<_>>()
@@ -391,7 +391,7 @@ pub(crate) const CLAIRVOYANT: &str = "clairvoyant";
 
 /// Adds a member to the identity if it has a value. Without one, the identity is that of older
 /// results.
-fn and(identity: Value, label: &str, value: Option<Value>) -> Value {
+fn with_member(identity: Value, label: &str, value: Option<Value>) -> Value {
     match value {
         Some(value) => json!([identity, label, value]),
         None => identity,

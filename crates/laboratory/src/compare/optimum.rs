@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::trials::Setting;
-use super::{Column, Experiment, ExperimentError, Part, for_each};
+use super::{Column, Experiment, ExperimentError, Part, threads_per_piece};
 use crate::timed::{Settings, optimum};
 
 /// Name of the row.
@@ -42,7 +42,7 @@ pub(super) fn of(
         *problem as u64 % part.shards.max(1) == part.shard
     };
     let problems = fillings.iter().enumerate().filter(is_of_part).count();
-    let threads = for_each(rayon::current_num_threads(), problems);
+    let threads = threads_per_piece(rayon::current_num_threads(), problems);
     let columns = experiment.columns.iter();
     columns
         .map(|column| {
@@ -73,7 +73,7 @@ fn bounds(
         pieces: 1,
         threads,
     };
-    let (task, world) = setting.scene(column)?;
+    let (task, world) = setting.problem_and_world(column)?;
     let sets = ActionSets::new(&task, &world, setting.embedded(), goes_on);
     let settings = Settings {
         plans: sets.plans,
@@ -87,7 +87,7 @@ fn bounds(
 }
 
 /// Number of units in 1. Bounds are added up in whole units.
-const SHARES: f64 = 1e9;
+const UNITS: f64 = 1e9;
 
 fn mean(bounds: &[Result<(f64, f64), String>]) -> ColumnOptimum {
     let mut sum = Sum::default();
@@ -96,11 +96,11 @@ fn mean(bounds: &[Result<(f64, f64), String>]) -> ColumnOptimum {
         sum.problems += 1;
         match found {
             Ok((least, most)) => {
-                sum.lower += (least * SHARES).floor();
-                sum.upper += (most * SHARES).ceil();
+                sum.lower += (least * UNITS).floor();
+                sum.upper += (most * UNITS).ceil();
             }
             Err(why) => {
-                sum.upper += SHARES;
+                sum.upper += UNITS;
                 unknown.get_or_insert(why);
             }
         }
@@ -118,7 +118,7 @@ struct Sum {
 
 impl Sum {
     fn of(column: &ColumnOptimum) -> Self {
-        let whole = |mean: f64| (mean * count(column.problems) * SHARES).round();
+        let whole = |mean: f64| (mean * count(column.problems) * UNITS).round();
         Self {
             lower: whole(column.lower),
             upper: whole(column.upper),
@@ -127,7 +127,7 @@ impl Sum {
     }
 
     fn mean(&self, unknown: Option<String>) -> ColumnOptimum {
-        let mean = |sum: f64| sum / SHARES / count(self.problems.max(1));
+        let mean = |sum: f64| sum / UNITS / count(self.problems.max(1));
         ColumnOptimum {
             lower: mean(self.lower),
             upper: mean(self.upper),
@@ -164,7 +164,7 @@ impl ColumnOptimum {
     }
 
     /// Returns the bounds in percent, rounded outwards.
-    pub(super) fn words(&self) -> String {
+    pub(super) fn describe(&self) -> String {
         if !self.is_known() {
             return "-".to_owned();
         }
@@ -185,7 +185,7 @@ mod tests {
 
     /// Parts add up exactly to the whole, in any order, and also with a part without problems.
     #[test]
-    fn parts_add_up_to_the_whole() {
+    fn parts_merge_to_the_whole() {
         let bounds: Vec<Result<(f64, f64), String>> = (0..97)
             .map(|number: u32| {
                 let lower = (f64::from(number) * 0.618_034).fract();
@@ -209,11 +209,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_of_one_problem_is_not_known_of_the_column() {
+    fn unknown_optimum_of_problem_makes_column_unknown() {
         let mut column = mean(&[Ok((1.0, 1.0))]);
-        assert_eq!(column.words(), "100.0 to 100.0");
+        assert_eq!(column.describe(), "100.0 to 100.0");
         column.add(&mean(&[Err("numbers that change".to_owned())]));
         assert_eq!((column.lower, column.upper, column.problems), (0.5, 1.0, 2));
-        assert_eq!(column.words(), "-");
+        assert_eq!(column.describe(), "-");
     }
 }

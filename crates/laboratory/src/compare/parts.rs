@@ -20,7 +20,7 @@ pub(crate) trait Partial: Clone {
 ///
 /// # Errors
 /// They belong to different experiments, or a part occurs twice. The text is for the user.
-pub(crate) fn merged<P: Partial>(parts: &[P]) -> Result<P, String> {
+pub(crate) fn merge_parts<P: Partial>(parts: &[P]) -> Result<P, String> {
     let Some((first, rest)) = parts.split_first() else {
         return Err("there is nothing to put together".to_owned());
     };
@@ -46,13 +46,13 @@ pub(crate) fn merged<P: Partial>(parts: &[P]) -> Result<P, String> {
 }
 
 /// Returns `true` if these are distinct parts of an experiment with `shards` parts.
-pub(crate) fn are_possible(shards: u64, parts: &[u64]) -> bool {
+pub(crate) fn are_valid_parts(shards: u64, parts: &[u64]) -> bool {
     let mut seen = BTreeSet::new();
     !parts.is_empty() && parts.iter().all(|part| *part < shards && seen.insert(part))
 }
 
 /// Describes the number of trials of `what`. Missing parts are mentioned.
-pub(crate) fn made(trials: u64, what: &str, shards: u64, parts: &[u64]) -> String {
+pub(crate) fn describe_trials(trials: u64, what: &str, shards: u64, parts: &[u64]) -> String {
     let shards = shards.max(1);
     if (0..shards).all(|part| parts.contains(&part)) {
         return format!("{trials} trials of {what}");
@@ -90,13 +90,13 @@ pub(crate) fn fingerprint(identity: &Value, trials: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{are_possible, made};
+    use super::{are_valid_parts, describe_trials};
     use crate::compare::Part;
 
     #[test]
-    fn what_was_made_is_what_the_parts_have() {
+    fn number_of_trials_equals_sum_of_parts() {
         assert_eq!(
-            made(8, "each problem", 3, &[0, 1, 2]),
+            describe_trials(8, "each problem", 3, &[0, 1, 2]),
             "8 trials of each problem"
         );
         for (trials, shards) in [(8, 3), (2, 5), (9, 3), (1, 1)] {
@@ -107,7 +107,7 @@ mod tests {
                     shards,
                     jobs: 0,
                 };
-                let words = made(trials, "it", shards, &[shard]);
+                let words = describe_trials(trials, "it", shards, &[shard]);
                 let count = part.numbers().count();
                 let expected =
                     format!("{count} of {trials} trials of it; parts made: {shard}/{shards}");
@@ -117,10 +117,10 @@ mod tests {
     }
 
     #[test]
-    fn a_part_is_there_once_and_below_the_number_of_parts() {
-        assert!(are_possible(3, &[2, 0]));
+    fn part_numbers_are_unique_and_in_range() {
+        assert!(are_valid_parts(3, &[2, 0]));
         for (shards, parts) in [(3, vec![3]), (3, vec![1, 1]), (1, vec![]), (0, vec![0])] {
-            assert!(!are_possible(shards, &parts), "{shards}: {parts:?}");
+            assert!(!are_valid_parts(shards, &parts), "{shards}: {parts:?}");
         }
     }
 }

@@ -8,9 +8,9 @@ use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 use serde::{Deserialize, Serialize};
 
-use super::beginnings::{self, Beginning};
 use super::clairvoyant;
 use super::experiment::CLAIRVOYANT;
+use super::initial_plans::{self, FirstPlanNote};
 use super::optimum::{self, ColumnOptimum};
 use super::parts::{self, Partial, fingerprint};
 use super::{Experiment, Failures, Part, TrialId};
@@ -41,10 +41,10 @@ pub struct Results {
     /// By row and column.
     pub cells: Vec<Vec<Cell>>,
     /// Comparison in pairs of each row with the first one, by row and column.
-    pub pairs: Vec<Vec<Pair>>,
+    pub pairs: Vec<Vec<DiscordantTrials>>,
     /// First plans of executors that were chosen by their probability.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub beginnings: Vec<Beginning>,
+    pub beginnings: Vec<FirstPlanNote>,
     /// Bounds on the optimal policy by column, if the experiment requests them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub optimum: Vec<ColumnOptimum>,
@@ -106,7 +106,7 @@ impl Invalid {
 /// Numbers of trials in which exactly one of two executors reached the goal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Pair {
+pub struct DiscordantTrials {
     /// Only the first row did.
     pub only_first: u64,
     /// Only this row did.
@@ -139,7 +139,7 @@ impl Results {
             parts: vec![part.shard],
             is_interrupted: false,
             cells: vec![vec![Cell::default(); columns.len()]; rows.len()],
-            pairs: vec![vec![Pair::default(); columns.len()]; rows.len()],
+            pairs: vec![vec![DiscordantTrials::default(); columns.len()]; rows.len()],
             beginnings: Vec::new(),
             optimum: Vec::new(),
             rows,
@@ -166,7 +166,7 @@ impl Results {
         if cells != vec![width; height] || pairs != cells || !is_for_all {
             return Err(ResultsError("rows and columns do not fit".to_owned()));
         }
-        if !parts::are_possible(results.shards, &results.parts) {
+        if !parts::are_valid_parts(results.shards, &results.parts) {
             return Err(ResultsError("there are no such parts".to_owned()));
         }
         Ok(results)
@@ -178,7 +178,7 @@ impl Results {
     }
 
     /// Returns `true` if these are results of that experiment, with any number of trials.
-    pub fn are_of(&self, experiment: &Experiment) -> bool {
+    pub fn belong_to(&self, experiment: &Experiment) -> bool {
         self.fingerprint == fingerprint(&experiment.identity(), self.trials)
             && self.rows == experiment.rows()
             && self
@@ -191,8 +191,8 @@ impl Results {
     ///
     /// # Errors
     /// They belong to different experiments, or a part occurs twice.
-    pub fn merged(parts: &[Self]) -> Result<Self, ResultsError> {
-        parts::merged(parts).map_err(ResultsError)
+    pub fn merge_results(parts: &[Self]) -> Result<Self, ResultsError> {
+        parts::merge_parts(parts).map_err(ResultsError)
     }
 
     /// Returns the table: coverage with its 95 % interval, and the mean number of new plans of
@@ -210,7 +210,7 @@ impl Results {
         let best = (!self.optimum.is_empty()).then(|| {
             let mut cells = vec![optimum::ROW.to_owned()];
             for column in &self.optimum {
-                cells.extend([column.words(), "-".to_owned()]);
+                cells.extend([column.describe(), "-".to_owned()]);
                 cells.extend(has_published.then(|| "-".to_owned()));
             }
             cells
@@ -218,14 +218,15 @@ impl Results {
         let rows = self.rows.iter().enumerate().map(|(index, row)| {
             let mut cells = vec![row.clone()];
             for (column, cell) in self.cells[index].iter().enumerate() {
-                cells.extend(cell.words());
+                cells.extend(cell.describe());
                 if !experiment.published.is_empty() {
-                    cells.push(experiment.published_words(row, column));
+                    cells.push(experiment.published_text(row, column));
                 }
             }
             cells
         });
-        let mut made = parts::made(self.trials, "each problem", self.shards, &self.parts);
+        let mut made =
+            parts::describe_trials(self.trials, "each problem", self.shards, &self.parts);
         if self.is_interrupted {
             // All rows have the same trials.
             let made_here = self.cells.first().map_or(0, |row| {
@@ -314,7 +315,7 @@ impl Results {
         if !self.optimum.is_empty() {
             notes.push(format!("`{}`: {}", optimum::ROW, optimum::SUMMARY));
         }
-        notes.extend(beginnings::notes(
+        notes.extend(initial_plans::notes(
             &self.beginnings,
             &self.rows,
             &self.columns,
@@ -360,7 +361,7 @@ impl Partial for Results {
 
     fn add(&mut self, other: &Self) {
         self.is_interrupted |= other.is_interrupted;
-        beginnings::merge(&mut self.beginnings, &other.beginnings);
+        initial_plans::merge(&mut self.beginnings, &other.beginnings);
         // Interrupted results may have no optimum.
         if self.optimum.is_empty() {
             self.optimum.clone_from(&other.optimum);
@@ -431,7 +432,7 @@ impl Cell {
     }
 
     /// Returns [`Self::coverage`] and [`Self::mean_replans`] for the table.
-    fn words(&self) -> [String; 2] {
+    fn describe(&self) -> [String; 2] {
         let (coverage, replans) = (self.coverage(), self.mean_replans());
         let percent = |share: f64| format!("{:.1}", share * 100.0);
         let coverage = match (coverage.share(), coverage.wilson()) {
@@ -453,7 +454,7 @@ impl Cell {
 }
 
 impl Experiment {
-    fn published_words(&self, row: &str, column: usize) -> String {
+    fn published_text(&self, row: &str, column: usize) -> String {
         let Some(published) = self.published.iter().find(|it| it.executor == row) else {
             return "-".to_owned();
         };

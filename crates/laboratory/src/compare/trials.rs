@@ -14,24 +14,24 @@ use elbowroom_planner::embedded;
 use elbowroom_report::trace::TraceWriter;
 use elbowroom_sim::WorldModel;
 
-use super::place::Place;
+use super::scenario::Scenario;
 use super::{
-    Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, beginnings, clairvoyant,
+    Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, clairvoyant,
+    initial_plans,
 };
 use elbowroom::answers::envelope::Search;
 use elbowroom::execute::{
-    Embedded, Execution, NamedText, RememberingPlanner, RunSpec, SpecError, Validated,
-    planning_work,
+    CachingPlanner, Embedded, Execution, NamedText, RunSpec, SpecError, Validated, planning_work,
 };
-use elbowroom::{RoundingRule, flow};
+use elbowroom::{RoundingRule, pipeline};
 
 use crate::record::{TrialRecord, TrialRecords};
 
 /// Number of plans cached for one problem: some megabytes.
-pub(super) const PLANS: usize = 20_000;
+pub(super) const PLAN_CACHE_SIZE: usize = 20_000;
 
 /// Number of prepared plans cached for one problem and column: some megabytes.
-pub(super) const PREPARED: usize = 500;
+pub(super) const PREPARED_CACHE_SIZE: usize = 500;
 
 /// One problem, and some of its trials.
 pub(super) struct Setting<'a> {
@@ -46,10 +46,10 @@ pub(super) struct Setting<'a> {
 }
 
 /// Data shared by all trials of a problem.
-struct Common<'a> {
+struct SharedSetup<'a> {
     task: Arc<Task>,
-    planner: RememberingPlanner<Box<dyn Planner + 'a>>,
-    columns: Vec<Place>,
+    planner: CachingPlanner<Box<dyn Planner + 'a>>,
+    columns: Vec<Scenario>,
 }
 
 impl Setting<'_> {
@@ -73,7 +73,7 @@ impl Setting<'_> {
             return Ok(results);
         }
         for place in &common.columns {
-            beginnings::merge(&mut results.beginnings, &place.beginnings);
+            initial_plans::merge(&mut results.beginnings, &place.first_plan_notes);
         }
         for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
             for column in 0..experiment.columns.len() {
@@ -90,36 +90,40 @@ impl Setting<'_> {
     fn common<'a>(
         &self,
         goes_on: &'a (dyn Fn() -> bool + Sync),
-    ) -> Result<Common<'a>, ExperimentError> {
+    ) -> Result<SharedSetup<'a>, ExperimentError> {
         let (domain, problem) = self.texts()?;
         let task = Self::task(&domain, &problem)?;
         // Checked for all planners, because a plan of another planner could not be executed.
-        if let Some(feature) = task.only_judged() {
-            return Err(self.wrong(&SpecError::Unheeded(feature).to_string()));
+        if let Some(feature) = task.validator_only_feature() {
+            return Err(self.error(&SpecError::UnsupportedFeature(feature).to_string()));
         }
         let mut planner = self.planner(domain, problem, goes_on)?;
         let first = match &self.experiment.plan {
-            Some(text) => self.given(&task, text)?,
+            Some(text) => self.read_given_plan(&task, text)?,
             None => match planner.plan(&task, &Situation::initial(&task)).answer {
                 PlanAnswer::Plan(plan) => plan,
                 PlanAnswer::Unsolvable => {
-                    return Err(self.wrong("no plan exists, so there is nothing to execute"));
+                    return Err(self.error("no plan exists, so there is nothing to execute"));
                 }
-                other => return Err(self.wrong(&in_words_of_files(&other))),
+                other => return Err(self.error(&reason_with_file_options(&other))),
             },
         };
         let task = Arc::new(task);
         let columns = 0..self.experiment.columns.len();
-        let columns = columns.map(|column| self.place(column, &task, &first, goes_on));
-        Ok(Common {
+        let columns = columns.map(|column| self.prepare_scenario(column, &task, &first, goes_on));
+        Ok(SharedSetup {
             columns: columns.collect::<Result<_, _>>()?,
-            planner: RememberingPlanner::new(planner, PLANS),
+            planner: CachingPlanner::new(planner, PLAN_CACHE_SIZE),
             task,
         })
     }
 
     /// Reads the plan that the experiment names.
-    fn given(&self, task: &Task, text: &str) -> Result<TimeTriggeredPlan, ExperimentError> {
+    fn read_given_plan(
+        &self,
+        task: &Task,
+        text: &str,
+    ) -> Result<TimeTriggeredPlan, ExperimentError> {
         let (plan, _) = RoundingRule::default()
             .read_plan(&Source::new("plan", text), task)
             .map_err(ExperimentError::Text)?;
@@ -127,7 +131,7 @@ impl Setting<'_> {
         if verdict.is_valid() {
             Ok(plan)
         } else {
-            Err(self.wrong("`plan` is not valid for it; `elbowroom check` says why"))
+            Err(self.error("`plan` is not valid for it; `elbowroom check` says why"))
         }
     }
 
@@ -136,7 +140,7 @@ impl Setting<'_> {
         &self,
         (trial, column): (u64, usize),
         records: Option<&TrialRecords>,
-        common: &mut Common<'_>,
+        common: &mut SharedSetup<'_>,
         results: &mut Results,
         goes_on: &(dyn Fn() -> bool + Sync),
     ) {
@@ -197,7 +201,7 @@ impl Setting<'_> {
     pub(super) fn trace(&self, trial: u64) -> Result<String, ExperimentError> {
         let (row, column) = (0, 0);
         if self.experiment.columns[column].believed.is_some() {
-            return Err(self.wrong("a trace names one world only, and the executors of the first column believe in another"));
+            return Err(self.error("a trace names one world only, and the executors of the first column believe in another"));
         }
         let mut common = self.common(&|| true)?;
         let seed = self.seed(trial);
@@ -208,7 +212,7 @@ impl Setting<'_> {
         let task = Arc::new(common.task.with_own_table());
         let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
         let written = writer.header(&self.spec(column, executor, seed)?);
-        written.map_err(|error| self.wrong(&error.to_string()))?;
+        written.map_err(|error| self.error(&error.to_string()))?;
         self.execute(
             &task,
             seed,
@@ -232,7 +236,7 @@ impl Setting<'_> {
         let (domain, problem) = self.texts()?;
         let (planner, planner_time) = match &experiment.planner {
             Planning::Embedded => None,
-            Planning::Another { name, seconds } => Some((name.clone(), seconds.clone())),
+            Planning::External { name, seconds } => Some((name.clone(), seconds.clone())),
         }
         .unzip();
         let mut spec = RunSpec::new((&domain).into(), (&problem).into());
@@ -259,7 +263,7 @@ impl Setting<'_> {
             objective: experiment.objective,
             running: settings.running,
             planning_time: settings.planning_time.clone(),
-            max_replans: settings.most_replans,
+            max_replans: settings.max_replans,
             time_limit: settings.time_limit.clone(),
             ..spec
         })
@@ -277,7 +281,7 @@ impl Setting<'_> {
             trial,
             row,
             seed,
-            case: self.words(),
+            case: self.describe_blanks(),
             column: self.experiment.columns[column].name.clone(),
             executor: self.experiment.executors[row].to_string(),
             verdict: report.verdict.name().to_owned(),
@@ -287,7 +291,7 @@ impl Setting<'_> {
     }
 
     /// Lists the values of the blanks.
-    fn words(&self) -> String {
+    fn describe_blanks(&self) -> String {
         let filling = self.filling.iter();
         let filling: Vec<_> = filling
             .map(|(name, value)| format!("{name} = {value}"))
@@ -301,23 +305,23 @@ impl Setting<'_> {
         seed: u64,
         (row, spec): (usize, &ExecutorSpec),
         column: usize,
-        common: &mut Common<'_>,
+        common: &mut SharedSetup<'_>,
         writer: Option<TraceWriter<'_>>,
     ) -> (Report, Vec<String>) {
         let settings = &self.experiment.settings;
-        let Place {
+        let Scenario {
             world,
             likelihoods,
             foresight,
             preparer,
-            odds,
-            likeliest,
-            outlook,
-            rehearse,
-            firsts,
-            beginnings: _,
+            plan_comparator: odds,
+            comparing_planner: likeliest,
+            action_values: outlook,
+            rollouts: rehearse,
+            first_plans: firsts,
+            first_plan_notes: _,
         } = &mut common.columns[column];
-        let asks_odds = spec.asks_odds();
+        let asks_odds = spec.needs_comparator();
         let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
         let planner: &mut dyn Planner = if asks_odds {
             likeliest
@@ -330,21 +334,21 @@ impl Setting<'_> {
             .with_settings(settings.clone())
             .with_likelihoods(Arc::clone(likelihoods))
             .with_foresight(foresight.clone())
-            .with_odds(odds)
-            .with_outlook(outlook.clone().filter(|_| spec.asks_outlook()))
-            .with_rehearsal(rehearse.clone().filter(|_| spec.asks_outlook()))
-            .planned_by(planner)
-            .prepared_by(preparer);
+            .with_plan_comparator(odds)
+            .with_action_values(outlook.clone().filter(|_| spec.needs_action_values()))
+            .with_rollouts(rehearse.clone().filter(|_| spec.needs_action_values()))
+            .with_planner(planner)
+            .with_preparer(preparer);
         // Explanations of missing plans are only read for single runs.
         let (execution, recorder): (_, Box<dyn Recorder>) = match writer {
-            Some(writer) => (execution.explaining(), Box::new(writer)),
+            Some(writer) => (execution.with_explanations(), Box::new(writer)),
             None => (execution, Box::new(NoRecord)),
         };
         let (recorder, validation) = Validated::new(recorder, task, None);
         let report = execution
             .recorded_by(recorder)
             .run_in(&mut *world.world(task, seed));
-        let invalid = validation.found();
+        let invalid = validation.findings();
         (report, invalid.iter().map(ToString::to_string).collect())
     }
 
@@ -356,11 +360,11 @@ impl Setting<'_> {
     ) -> Result<Box<dyn Planner + 'a>, ExperimentError> {
         match &self.experiment.planner {
             Planning::Embedded => Ok(Box::new(Embedded {
-                goes_on: Some(goes_on),
+                may_continue: Some(goes_on),
                 ..self.embedded()
             })),
-            Planning::Another { name, seconds } => {
-                another(name, seconds.as_ref(), domain, problem, goes_on)
+            Planning::External { name, seconds } => {
+                external_planner(name, seconds.as_ref(), domain, problem, goes_on)
             }
         }
     }
@@ -378,8 +382,8 @@ impl Setting<'_> {
         }
     }
 
-    pub(super) fn flow(&self, column: &Column, world: &WorldModel) -> flow::Settings {
-        flow::Settings {
+    pub(super) fn flow(&self, column: &Column, world: &WorldModel) -> pipeline::Settings {
+        pipeline::Settings {
             vary: column.vary.clone(),
             search: match self.experiment.objective {
                 Some(objective) => Search::best(objective),
@@ -387,7 +391,7 @@ impl Setting<'_> {
             }
             .with_precision(self.experiment.precision.clone()),
             world: Some(Arc::new(world.clone())),
-            ..flow::Settings::default()
+            ..pipeline::Settings::default()
         }
     }
 
@@ -398,7 +402,10 @@ impl Setting<'_> {
     }
 
     /// Returns the problem, and the world of a column for it.
-    pub(super) fn scene(&self, column: &Column) -> Result<(Task, WorldModel), ExperimentError> {
+    pub(super) fn problem_and_world(
+        &self,
+        column: &Column,
+    ) -> Result<(Task, WorldModel), ExperimentError> {
         let (domain, problem) = self.texts()?;
         let task = Self::task(&domain, &problem)?;
         let world = world(column, &task)?;
@@ -411,7 +418,7 @@ impl Setting<'_> {
         for (name, value) in self.filling {
             let blank = format!("{{{name}}}");
             if !text.contains(&blank) {
-                return Err(self.wrong(&format!("the problem has no blank {blank}")));
+                return Err(self.error(&format!("the problem has no blank {blank}")));
             }
             text = text.replace(&blank, value);
         }
@@ -419,18 +426,21 @@ impl Setting<'_> {
         Ok((domain, Source::new("problem", text.as_str())))
     }
 
-    pub(super) fn wrong(&self, message: &str) -> ExperimentError {
+    pub(super) fn error(&self, message: &str) -> ExperimentError {
         if self.filling.is_empty() {
             return ExperimentError::other(format!("the problem: {message}"));
         }
-        ExperimentError::other(format!("the problem with {}: {message}", self.words()))
+        ExperimentError::other(format!(
+            "the problem with {}: {message}",
+            self.describe_blanks()
+        ))
     }
 }
 
 /// Returns the reason why there is no plan. The options of `run` in it are replaced by members of
 /// experiment files.
-fn in_words_of_files(answer: &PlanAnswer) -> String {
-    let why = answer.why_not().unwrap_or_default();
+fn reason_with_file_options(answer: &PlanAnswer) -> String {
+    let why = answer.failure_reason().unwrap_or_default();
     why.replace("--planning-budget", "planning_budget")
         .replace("--planner-states", "planner_states")
 }
@@ -441,7 +451,7 @@ pub(super) fn world(column: &Column, task: &Task) -> Result<WorldModel, Experime
 }
 
 /// Returns the world that executors believe in, if it is not the column's own.
-pub(super) fn believed(
+pub(super) fn believed_world(
     column: &Column,
     task: &Task,
 ) -> Result<Option<WorldModel>, ExperimentError> {
@@ -454,7 +464,7 @@ pub(super) fn believed(
 }
 
 /// Returns an external planner.
-fn another<'a>(
+fn external_planner<'a>(
     name: &str,
     seconds: Option<&Rational>,
     domain: Source,
@@ -471,7 +481,7 @@ fn another<'a>(
             time_limit: Some(seconds.unwrap_or(Duration::from_secs(60))),
             ..external::Settings::default()
         },
-        takes_first: seconds.is_none(),
-        goes_on,
+        stops_at_first_plan: seconds.is_none(),
+        may_continue: goes_on,
     }))
 }

@@ -304,7 +304,7 @@ impl PerturbedExperiment {
     }
 
     /// Returns `true` if the text has the format of such an experiment.
-    pub fn is_one(text: &str) -> bool {
+    pub fn is_experiment(text: &str) -> bool {
         toml::from_str::<Head>(text).is_ok_and(|head| head.format == FORMAT)
     }
 
@@ -333,8 +333,11 @@ impl PerturbedExperiment {
         }
         let mut cases = Vec::new();
         for name in &read.include {
-            let text = named(&source, name, file)?;
-            cases.extend(Self::included(&Source::new(name.get_ref(), text), file)?);
+            let text = read_named(&source, name, file)?;
+            cases.extend(Self::read_included(
+                &Source::new(name.get_ref(), text),
+                file,
+            )?);
         }
         cases.extend(own_cases(&source, &read, file)?);
         if cases.is_empty() {
@@ -357,7 +360,7 @@ impl PerturbedExperiment {
     }
 
     /// Reads the cases of another experiment.
-    fn included(
+    fn read_included(
         source: &Source,
         file: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Vec<Case>, PerturbedError> {
@@ -383,7 +386,7 @@ fn parsed(source: &Source) -> Result<File, PerturbedError> {
 }
 
 /// Reads a file that another one names.
-fn named(
+fn read_named(
     source: &Source,
     name: &Spanned<String>,
     file: &dyn Fn(&str) -> Result<String, String>,
@@ -398,7 +401,7 @@ fn own_cases(
     file: &dyn Fn(&str) -> Result<String, String>,
 ) -> Result<Vec<Case>, PerturbedError> {
     let given = |name: &Option<Spanned<String>>, what: &str| match name {
-        Some(name) => named(source, name, file),
+        Some(name) => read_named(source, name, file),
         None => Err(PerturbedError::at(
             source,
             read.format.span(),
@@ -422,7 +425,7 @@ fn own_cases(
             problem: problem.clone(),
             most_running: most_running.unwrap_or(usize::MAX),
             also: also.clone(),
-            likelihoods: named(source, &case.likelihoods, file)?,
+            likelihoods: read_named(source, &case.likelihoods, file)?,
             published: case.published.clone(),
         })
     };

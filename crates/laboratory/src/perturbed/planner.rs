@@ -14,7 +14,7 @@ use elbowroom::execute::Embedded;
 /// Cache of plans by their initial state.
 pub(super) struct EmbeddedPlans {
     task: Arc<Task>,
-    known: BTreeMap<BTreeSet<FactId>, Option<Arc<TimeTriggeredPlan>>>,
+    plans: BTreeMap<BTreeSet<FactId>, Option<Arc<TimeTriggeredPlan>>>,
 }
 
 /// Maximum number of states in a search. A larger search counts as finding no plan.
@@ -24,13 +24,13 @@ impl EmbeddedPlans {
     pub(super) fn new(task: Arc<Task>) -> Self {
         Self {
             task,
-            known: BTreeMap::new(),
+            plans: BTreeMap::new(),
         }
     }
 
     /// Returns the plan from a state, if one is found.
     pub(super) fn plan(&mut self, state: &State) -> Option<Arc<TimeTriggeredPlan>> {
-        if let Some(known) = self.known.get(&state.facts) {
+        if let Some(known) = self.plans.get(&state.facts) {
             return known.clone();
         }
         let mut planner = Embedded {
@@ -52,7 +52,7 @@ impl EmbeddedPlans {
             PlanAnswer::Plan(plan) => Some(Arc::new(plan)),
             _ => None,
         };
-        self.known.insert(state.facts.clone(), plan.clone());
+        self.plans.insert(state.facts.clone(), plan.clone());
         plan
     }
 }
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn the_embedded_planner_finds_a_plan_exactly_where_there_is_one() {
+    fn embedded_planner_is_complete() {
         for name in ["sf3", "af3"] {
             let task = task(name);
             let actions = all_actions(&task).unwrap();

@@ -63,7 +63,7 @@ impl PerturbedResults {
                 "this program reads {FORMAT}, version 1"
             )));
         }
-        if !parts::are_possible(results.shards, &results.parts) {
+        if !parts::are_valid_parts(results.shards, &results.parts) {
             return Err(PerturbedError::other("there are no such parts"));
         }
         Ok(results)
@@ -75,7 +75,7 @@ impl PerturbedResults {
     }
 
     /// Returns `true` if these are results of that experiment, with any number of trials.
-    pub fn are_of(&self, experiment: &PerturbedExperiment) -> bool {
+    pub fn belong_to(&self, experiment: &PerturbedExperiment) -> bool {
         self.fingerprint == fingerprint(&experiment.identity(), self.trials)
     }
 
@@ -83,8 +83,8 @@ impl PerturbedResults {
     ///
     /// # Errors
     /// They belong to different experiments, or a part occurs twice.
-    pub fn merged(parts: &[Self]) -> Result<Self, PerturbedError> {
-        parts::merged(parts).map_err(PerturbedError::other)
+    pub fn merge_results(parts: &[Self]) -> Result<Self, PerturbedError> {
+        parts::merge_parts(parts).map_err(PerturbedError::other)
     }
 }
 
@@ -148,7 +148,7 @@ pub(super) fn rounded(probability: f64) -> f64 {
 }
 
 /// Names the last step, as the cause of a failure.
-fn after(step: StepKind) -> &'static str {
+fn step_name(step: StepKind) -> &'static str {
     match step {
         StepKind::Started => "after-start",
         StepKind::NotStarted => "start-failed",
@@ -201,11 +201,11 @@ impl Row {
 
     /// Adds the trial of that number; `name` returns the name of an action.
     pub(super) fn add(&mut self, number: u64, trial: &Trial, name: &dyn Fn(&ActionName) -> String) {
-        if let Some(lost) = &trial.lost {
+        if let Some(lost) = &trial.failure {
             let last = lost.last.as_ref();
             self.failures.add(&Failure {
                 verdict: lost.ending.name().to_owned(),
-                cause: last.map(|(kind, _)| after(*kind).to_owned()),
+                cause: last.map(|(kind, _)| step_name(*kind).to_owned()),
                 action: last.map(|(_, action)| name(action)),
                 runs: 1,
                 first: TrialId {

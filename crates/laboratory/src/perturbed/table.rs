@@ -12,7 +12,7 @@ use crate::untimed::ExecutorName;
 /// Returns the results as a table.
 pub fn table(results: &PerturbedResults) -> Table {
     let mut title = results.title.clone();
-    let made = parts::made(results.trials, "each row", results.shards, &results.parts);
+    let made = parts::describe_trials(results.trials, "each row", results.shards, &results.parts);
     if results.is_interrupted {
         title = format!("{title} (interrupted; of {made})");
     } else if made.starts_with("incomplete") {
@@ -20,7 +20,9 @@ pub fn table(results: &PerturbedResults) -> Table {
     }
     let rows = &results.rows;
     let caption = [title].into_iter();
-    let caption = caption.chain(agreement(rows)).chain(nearness(rows));
+    let caption = caption
+        .chain(describe_agreement(rows))
+        .chain(describe_ratio_to_optimum(rows));
     let interval = |row: &Row| {
         let interval = row.success.wilson();
         let interval =
@@ -121,7 +123,7 @@ fn of_rows(
 }
 
 /// Describes the agreement of the published success rates with ours.
-fn agreement(rows: &[Row]) -> Option<String> {
+fn describe_agreement(rows: &[Row]) -> Option<String> {
     let compared = rows.iter().filter(|row| row.published.is_some()).count();
     let inside = rows.iter().filter(|row| row.is_inside() == Some(true));
     let agreeing = rows.iter().filter(|row| row.agrees() == Some(true));
@@ -138,7 +140,7 @@ fn agreement(rows: &[Row]) -> Option<String> {
 }
 
 /// Describes the ratio of the best executor's success rate to the optimum.
-fn nearness(rows: &[Row]) -> Option<String> {
+fn describe_ratio_to_optimum(rows: &[Row]) -> Option<String> {
     let cases = cases(rows);
     let best = cases.iter().filter_map(|case| {
         let of_case = rows.iter().filter(|row| row.case == *case);

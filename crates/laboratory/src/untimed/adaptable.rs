@@ -8,13 +8,13 @@ use elbowroom_model::{Situation, State, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::partial_order::partial_order;
 use elbowroom_plan::{InstanceId, Node, NodeId};
-use elbowroom_probability::dispatch::{goal_holds, lattermost_layer, patient};
+use elbowroom_probability::dispatch::{goal_holds, lattermost_layer, never_interrupt};
 use elbowroom_probability::{
-    Candidates, Circumstances, Likelihoods, Model, OrderSearch, Running, SearchSettings, Semantics,
+    Candidates, Likelihoods, Model, OrderSearch, Running, SearchSettings, SearchState, Semantics,
     TotalOrderPlan,
 };
 
-use super::{Stage, UntimedExecutor, start_of};
+use super::{InstrumentedWorld, UntimedExecutor, start_of};
 
 /// Olisipo's executor. After every step, it continues with the happening after the lattermost layer
 /// that fits. If no layer fits, it searches for the order most likely to succeed from the current
@@ -38,10 +38,10 @@ pub struct Adaptable {
 struct Prepared {
     search: OrderSearch,
     /// Search for orders that rely on spontaneous changes.
-    lucky: OrderSearch,
+    change_search: OrderSearch,
     /// All orders found so far.
     orders: Vec<TotalOrderPlan>,
-    known: BTreeMap<Key, Chosen>,
+    choices: BTreeMap<Key, Chosen>,
 }
 
 /// Current order, true facts and running actions.
@@ -78,9 +78,9 @@ impl Adaptable {
                     };
                     Prepared {
                         search: OrderSearch::new(Arc::clone(&model), SearchSettings::default()),
-                        lucky: OrderSearch::new(model, lucky),
+                        change_search: OrderSearch::new(model, lucky),
                         orders: Vec::new(),
-                        known: BTreeMap::new(),
+                        choices: BTreeMap::new(),
                     }
                 });
             self.plans.push((Arc::clone(plan), prepared));
@@ -100,14 +100,14 @@ pub(super) fn model(
 ) -> Option<Model> {
     let mut situation = Situation::initial(task);
     situation.state = state.clone();
-    let task = task.beginning_at(&situation);
+    let task = task.starting_from(&situation);
     let plan = partial_order(&task, plan);
     Model::new(task, plan, likelihoods, semantics).ok()
 }
 
 /// Returns the believed state with the running actions.
-pub(super) fn circumstances(state: &State, running: &[InstanceId]) -> Circumstances {
-    let mut circumstances = Circumstances::observed(Rational::ZERO, state);
+pub(super) fn circumstances(state: &State, running: &[InstanceId]) -> SearchState {
+    let mut circumstances = SearchState::observed(Rational::ZERO, state);
     let under_way = running.iter().map(|&instance| Running {
         instance,
         start: Rational::ZERO,
@@ -118,11 +118,11 @@ pub(super) fn circumstances(state: &State, running: &[InstanceId]) -> Circumstan
 
 /// Executes a happening of a plan, and updates the running actions. Returns `false` if its
 /// condition does not hold.
-pub(super) fn perform(
+pub(super) fn execute_happening(
     model: &Model,
     node: NodeId,
     running: &mut Vec<InstanceId>,
-    stage: &mut Stage<'_>,
+    stage: &mut InstrumentedWorld<'_>,
 ) -> bool {
     match model.plan().nodes[node.index()] {
         Node::Start(id) | Node::Instant(id) => {
@@ -153,21 +153,26 @@ impl Prepared {
     fn choose(
         &mut self,
         order: Option<usize>,
-        stage: &Stage<'_>,
+        stage: &InstrumentedWorld<'_>,
         running: &[InstanceId],
     ) -> Chosen {
         let key = (order, stage.state().facts.clone(), running.to_vec());
-        if let Some(known) = self.known.get(&key) {
+        if let Some(known) = self.choices.get(&key) {
             return *known;
         }
         let is_dead_end = stage.is_dead_end() == Some(true);
         let now = circumstances(stage.state(), running);
-        let chosen = self.consider(order, &now, is_dead_end);
-        self.known.insert(key, chosen);
+        let chosen = self.compute_choice(order, &now, is_dead_end);
+        self.choices.insert(key, chosen);
         chosen
     }
 
-    fn consider(&mut self, order: Option<usize>, now: &Circumstances, is_dead_end: bool) -> Chosen {
+    fn compute_choice(
+        &mut self,
+        order: Option<usize>,
+        now: &SearchState,
+        is_dead_end: bool,
+    ) -> Chosen {
         let stop = Chosen { next: None, order };
         if now.running.is_empty() && goal_holds(self.search.model(), now) {
             return stop;
@@ -179,9 +184,9 @@ impl Prepared {
             return Chosen { next, order };
         }
         // A condition that couples too many facts counts as if there were no order.
-        let found = self.search.best_order(now, &mut patient).ok();
+        let found = self.search.best_order(now, &mut never_interrupt).ok();
         let Some(found) = found.and_then(|found| found.order) else {
-            if is_dead_end && let Some(next) = self.by_luck(now) {
+            if is_dead_end && let Some(next) = self.next_by_spontaneous_change(now) {
                 return Chosen {
                     next: Some(next),
                     order: None,
@@ -218,14 +223,17 @@ impl Prepared {
 
     /// Returns the first happening of the order most likely to succeed with the help of spontaneous
     /// changes.
-    fn by_luck(&mut self, now: &Circumstances) -> Option<NodeId> {
-        let found = self.lucky.best_order(now, &mut patient).ok()?;
+    fn next_by_spontaneous_change(&mut self, now: &SearchState) -> Option<NodeId> {
+        let found = self
+            .change_search
+            .best_order(now, &mut never_interrupt)
+            .ok()?;
         found.order?.sequence.first().copied()
     }
 }
 
 impl UntimedExecutor for Adaptable {
-    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
+    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut InstrumentedWorld<'_>) {
         let index = self.prepare(plan, stage.state());
         let Some(prepared) = &mut self.plans[index].1 else {
             return;
@@ -235,7 +243,7 @@ impl UntimedExecutor for Adaptable {
         while !stage.is_over() {
             let chosen = prepared.choose(order, stage, &running);
             order = chosen.order;
-            let is_done = |node| perform(&model, node, &mut running, stage);
+            let is_done = |node| execute_happening(&model, node, &mut running, stage);
             if !chosen.next.is_some_and(is_done) {
                 return;
             }

@@ -7,7 +7,7 @@ use elbowroom_model::{Situation, State, Step, Task, TimeTriggeredPlan};
 use elbowroom_plan::deorder::deorder;
 use elbowroom_plan::{Bound, Instance, Node, StnPlan};
 
-use super::{Stage, UntimedExecutor, start_of};
+use super::{InstrumentedWorld, UntimedExecutor, start_of};
 
 /// Executes the deordered plan like `ROSPlan`'s Esterel dispatcher, node by node.
 ///
@@ -51,7 +51,7 @@ impl Esterel {
 }
 
 impl UntimedExecutor for Esterel {
-    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
+    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut InstrumentedWorld<'_>) {
         let index = self.network(plan, stage.state());
         let happenings = &self.networks[index].1;
         let mut is_done = vec![false; happenings.len()];
@@ -91,7 +91,7 @@ impl UntimedExecutor for Esterel {
 fn happenings(task: &Task, plan: &TimeTriggeredPlan, state: &State) -> Vec<Happening> {
     let mut situation = Situation::initial(task);
     situation.state = state.clone();
-    let task = task.beginning_at(&situation);
+    let task = task.starting_from(&situation);
     let deordered = deorder(&task, plan);
     let is_ordered = deordered.is_ok();
     // A planner may return an infeasible plan. Its actions are executed in the order of the list.

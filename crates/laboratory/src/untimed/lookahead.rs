@@ -1,4 +1,4 @@
-//! Executor with the optimal policy of the world: [`Foresighted`].
+//! Executor with the optimal policy of the world: [`LookaheadPolicy`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -7,16 +7,16 @@ use elbowroom_model::ground::Action;
 use elbowroom_model::{State, Task, TimeTriggeredPlan};
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
 use elbowroom_probability::likelihoods::Missing;
-use elbowroom_probability::optimum::{Move, NotSmall, Optimum, Perturbed, Settings};
+use elbowroom_probability::optimum::{Move, Optimum, Perturbed, Settings, TabulationError};
 use elbowroom_probability::{Likelihoods, Model, Semantics};
 
-use super::adaptable::{circumstances, perform};
-use super::{ActionName, Stage, UntimedExecutor};
+use super::adaptable::{circumstances, execute_happening};
+use super::{ActionName, InstrumentedWorld, UntimedExecutor};
 
 /// Optimal policy in the world of the likelihoods, independent of the plan: `lookahead` without a
 /// clock.
 #[derive(Clone, Debug)]
-pub struct Foresighted {
+pub struct LookaheadPolicy {
     process: Perturbed,
     optimum: Optimum,
     instances: BTreeMap<ActionName, InstanceId>,
@@ -24,16 +24,16 @@ pub struct Foresighted {
 
 /// The world cannot be tabulated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NoForesight {
+pub enum NotTabulated {
     /// Likelihoods are missing.
     #[error(transparent)]
     Missing(#[from] Missing),
     /// The world is too large, or of an unsupported kind.
     #[error(transparent)]
-    NotSmall(#[from] NotSmall),
+    NotSmall(#[from] TabulationError),
 }
 
-impl Foresighted {
+impl LookaheadPolicy {
     /// Tabulates the world.
     ///
     /// # Errors
@@ -43,7 +43,7 @@ impl Foresighted {
         actions: Vec<Action>,
         likelihoods: &Likelihoods,
         settings: Settings,
-    ) -> Result<Self, NoForesight> {
+    ) -> Result<Self, NotTabulated> {
         let plan = PartialOrderPlan::unordered(task, actions);
         let model = Model::new(Arc::clone(task), plan, likelihoods, Semantics::World)?;
         let process = Perturbed::new(model, settings)?;
@@ -76,8 +76,8 @@ impl Foresighted {
     }
 }
 
-impl UntimedExecutor for Foresighted {
-    fn execute(&mut self, _: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
+impl UntimedExecutor for LookaheadPolicy {
+    fn execute(&mut self, _: &Arc<TimeTriggeredPlan>, stage: &mut InstrumentedWorld<'_>) {
         let model = Arc::clone(self.process.model());
         let mut running: Vec<InstanceId> = Vec::new();
         while !(stage.is_over() || running.is_empty() && stage.is_goal()) {
@@ -87,19 +87,19 @@ impl UntimedExecutor for Foresighted {
             {
                 return;
             }
-            let patience = stage.patience();
+            let patience = stage.dead_end_steps_left();
             let chosen = self
                 .optimum
                 .choose_at(&self.process, stage.state(), &running, patience);
             match chosen {
-                Move::Do(node) => {
-                    if !perform(&model, node, &mut running, stage) {
+                Move::Try(node) => {
+                    if !execute_happening(&model, node, &mut running, stage) {
                         return;
                     }
                 }
                 Move::Abandon(id) => {
                     running.retain(|&other| other != id);
-                    stage.let_go(&model.plan().instance(id).action);
+                    stage.abandon(&model.plan().instance(id).action);
                 }
                 Move::Stop => return,
             }

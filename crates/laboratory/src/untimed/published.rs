@@ -10,8 +10,8 @@ use elbowroom_probability::{
     Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings, Semantics, TotalOrderPlan,
 };
 
-use super::adaptable::{circumstances, model, perform};
-use super::{Stage, UntimedExecutor, apply, holds, start_of};
+use super::adaptable::{circumstances, execute_happening, model};
+use super::{InstrumentedWorld, UntimedExecutor, apply, holds, start_of};
 
 /// The published program, with the faults on which its results depend:
 ///
@@ -25,56 +25,56 @@ use super::{Stage, UntimedExecutor, apply, holds, start_of};
 /// rounds with the old order applied to the happenings of new plans. This never reached the goal,
 /// and is omitted here.
 #[derive(Clone, Debug)]
-pub struct AsPublished {
+pub struct PublishedExecutor {
     task: Arc<Task>,
     likelihoods: Arc<Likelihoods>,
-    found: Vec<(Arc<TimeTriggeredPlan>, Option<Found>)>,
+    orders: Vec<(Arc<TimeTriggeredPlan>, Option<FoundOrder>)>,
     /// `true` if this trial's order was abandoned.
-    is_given_up: bool,
+    is_abandoned: bool,
 }
 
 #[derive(Clone, Debug)]
-struct Found {
+struct FoundOrder {
     model: Arc<Model>,
     sequence: Vec<NodeId>,
     /// Facts that must be true. Negative conditions were treated as positive ones.
     layers: Vec<BTreeSet<FactId>>,
 }
 
-impl AsPublished {
+impl PublishedExecutor {
     /// Creates an executor for plans of this task in a world of these likelihoods.
     pub fn new(task: Arc<Task>, likelihoods: Arc<Likelihoods>) -> Self {
         Self {
             task,
             likelihoods,
-            found: Vec::new(),
-            is_given_up: false,
+            orders: Vec::new(),
+            is_abandoned: false,
         }
     }
 
     fn order(&mut self, plan: &Arc<TimeTriggeredPlan>, state: &State) -> usize {
-        let known = self.found.iter().position(|(p, _)| Arc::ptr_eq(p, plan));
+        let known = self.orders.iter().position(|(p, _)| Arc::ptr_eq(p, plan));
         known.unwrap_or_else(|| {
             let model = model(&self.task, plan, state, &self.likelihoods, Semantics::Paper);
             let found = model.and_then(|model| last_order(Arc::new(model), state));
-            self.found.push((Arc::clone(plan), found));
-            self.found.len() - 1
+            self.orders.push((Arc::clone(plan), found));
+            self.orders.len() - 1
         })
     }
 }
 
-impl UntimedExecutor for AsPublished {
+impl UntimedExecutor for PublishedExecutor {
     fn begin(&mut self) {
-        self.is_given_up = false;
+        self.is_abandoned = false;
     }
 
-    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
-        if self.is_given_up {
+    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut InstrumentedWorld<'_>) {
+        if self.is_abandoned {
             return;
         }
-        self.is_given_up = true;
+        self.is_abandoned = true;
         let index = self.order(plan, stage.state());
-        let Some(found) = &self.found[index].1 else {
+        let Some(found) = &self.orders[index].1 else {
             return;
         };
         let mut running = Vec::new();
@@ -82,14 +82,14 @@ impl UntimedExecutor for AsPublished {
             let Some(next) = found.next(stage.state(), &running) else {
                 return;
             };
-            if !perform(&found.model, next, &mut running, stage) {
+            if !execute_happening(&found.model, next, &mut running, stage) {
                 return;
             }
         }
     }
 }
 
-impl Found {
+impl FoundOrder {
     fn next(&self, state: &State, running: &[InstanceId]) -> Option<NodeId> {
         let nodes = &self.model.plan().nodes;
         let fits = |layer: &BTreeSet<FactId>| layer.is_subset(&state.facts);
@@ -108,7 +108,7 @@ impl Found {
 }
 
 /// Returns the last order that the published search finds.
-fn last_order(model: Arc<Model>, state: &State) -> Option<Found> {
+fn last_order(model: Arc<Model>, state: &State) -> Option<FoundOrder> {
     let mut search = LastOrder {
         orders: OrderSearch::new(Arc::clone(&model), SearchSettings::default()),
         network: PrunedNetwork::new(&model, &circumstances(state, &[])).ok()?,
@@ -125,7 +125,7 @@ fn last_order(model: Arc<Model>, state: &State) -> Option<Found> {
         };
         order.layers.iter().map(facts).collect()
     };
-    Some(Found {
+    Some(FoundOrder {
         layers: positive(layers),
         model,
         sequence,

@@ -11,11 +11,13 @@ use elbowroom_probability::{Likelihoods, Semantics};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::{Adaptable, AsPublished, Esterel, Foresighted, NoForesight, UntimedExecutor};
+use super::{
+    Adaptable, Esterel, LookaheadPolicy, NotTabulated, PublishedExecutor, UntimedExecutor,
+};
 
 /// Registry entry of an executor: name, documentation and constructor.
 #[derive(Clone, Copy)]
-pub struct Registered {
+pub struct ExecutorEntry {
     /// Its name. An executor that also exists on a clock has the same name there
     /// ([`executors::EXECUTORS`]).
     pub name: &'static str,
@@ -24,36 +26,36 @@ pub struct Registered {
     /// Its source.
     pub paper: &'static str,
     /// Constructor.
-    make: fn(&Means<'_>) -> Result<Box<dyn UntimedExecutor>, NoForesight>,
+    construct: fn(&ExecutorServices<'_>) -> Result<Box<dyn UntimedExecutor>, NotTabulated>,
 }
 
 /// Services for the construction of an executor.
-pub struct Means<'m> {
+pub struct ExecutorServices<'m> {
     /// The problem.
     pub task: Arc<Task>,
     /// Likelihoods of failures and spontaneous changes.
     pub likelihoods: Arc<Likelihoods>,
     /// The table of the sound world, computed at its first use.
-    pub foresight: &'m dyn Fn() -> Result<Foresighted, NoForesight>,
+    pub foresight: &'m dyn Fn() -> Result<LookaheadPolicy, NotTabulated>,
 }
 
 /// All executors, in the order of the results.
-pub const EXECUTORS: &[Registered] = &[
-    Registered {
+pub const EXECUTORS: &[ExecutorEntry] = &[
+    ExecutorEntry {
         name: "esterel",
         summary: "The baseline: happenings as soon as the network allows, failed starts again \
                   without limit, a new plan when a condition is false.",
         paper: "the Esterel Dispatcher of ROSPlan, in Ribeiro et al. (2021), section 3",
-        make: |means| Ok(Box::new(Esterel::new(Arc::clone(&means.task)))),
+        construct: |means| Ok(Box::new(Esterel::new(Arc::clone(&means.task)))),
     },
-    Registered {
+    ExecutorEntry {
         name: "adaptable",
         summary: "The paper's PGen and PExec. What is under way is ended before a plan is given \
                   up. In a dead end, where there is no other plan, it does what its plan has the \
                   best chance with, relying on spontaneous changes.",
         paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
-        make: |means| {
-            let (task, likelihoods) = means.both();
+        construct: |means| {
+            let (task, likelihoods) = means.task_and_likelihoods();
             Ok(Box::new(Adaptable::new(
                 task,
                 likelihoods,
@@ -61,33 +63,33 @@ pub const EXECUTORS: &[Registered] = &[
             )))
         },
     },
-    Registered {
+    ExecutorEntry {
         name: "as-published",
         summary: "The authors' program: the last order found instead of the best, and no second \
                   search. When its order no longer fits, it does nothing more (theirs did a \
                   little, to no avail).",
         paper: "the program behind the results of Ribeiro et al. (2021)",
-        make: |means| {
-            let (task, likelihoods) = means.both();
-            Ok(Box::new(AsPublished::new(task, likelihoods)))
+        construct: |means| {
+            let (task, likelihoods) = means.task_and_likelihoods();
+            Ok(Box::new(PublishedExecutor::new(task, likelihoods)))
         },
     },
-    Registered {
+    ExecutorEntry {
         name: "lookahead",
         summary: "The optimal policy in the sound world (`docs/probability.md`), without regard to \
                   the plan. It is exact where at most `most_running` actions are under way at once.",
         paper: "goes beyond Ribeiro et al. (2021)",
-        make: |means| Ok(Box::new((means.foresight)()?)),
+        construct: |means| Ok(Box::new((means.foresight)()?)),
     },
 ];
 
-impl Means<'_> {
-    fn both(&self) -> (Arc<Task>, Arc<Likelihoods>) {
+impl ExecutorServices<'_> {
+    fn task_and_likelihoods(&self) -> (Arc<Task>, Arc<Likelihoods>) {
         (Arc::clone(&self.task), Arc::clone(&self.likelihoods))
     }
 }
 
-impl fmt::Debug for Registered {
+impl fmt::Debug for ExecutorEntry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Registered({})", self.name)
     }
@@ -99,21 +101,24 @@ pub struct ExecutorName(usize);
 
 impl ExecutorName {
     /// Returns its registry entry.
-    pub fn registered(self) -> &'static Registered {
+    pub fn entry(self) -> &'static ExecutorEntry {
         &EXECUTORS[self.0]
     }
 
     /// Returns its name.
     pub fn name(self) -> &'static str {
-        self.registered().name
+        self.entry().name
     }
 
     /// Creates the executor.
     ///
     /// # Errors
     /// It needs a table of the world, and there can be none.
-    pub fn build(self, means: &Means<'_>) -> Result<Box<dyn UntimedExecutor>, NoForesight> {
-        (self.registered().make)(means)
+    pub fn build(
+        self,
+        means: &ExecutorServices<'_>,
+    ) -> Result<Box<dyn UntimedExecutor>, NotTabulated> {
+        (self.entry().construct)(means)
     }
 }
 
@@ -167,7 +172,7 @@ mod tests {
     use super::{EXECUTORS, ExecutorName};
 
     #[test]
-    fn names_are_read_as_they_are_written_and_sorted_as_they_are_listed() {
+    fn names_round_trip_and_sort_in_list_order() {
         let names = EXECUTORS.iter().map(|known| known.name);
         let read: Vec<ExecutorName> = names.clone().map(|name| name.parse().unwrap()).collect();
         assert!(read.is_sorted());
@@ -175,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn an_executor_that_needs_a_clock_is_told_from_one_that_nobody_knows() {
+    fn timed_only_and_unknown_executors_are_distinguished() {
         let wrong = |name: &str| name.parse::<ExecutorName>().unwrap_err().to_string();
         assert!(wrong("guarded").contains("`guarded` without a clock"));
         assert!(wrong("gaurded").starts_with("there is no executor `gaurded`; choose one of"));
@@ -183,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_says_of_each_executor_what_the_list_says() {
+    fn page_matches_the_list_of_executors() {
         let path = concat!(
             env!("CARGO_MANIFEST_DIR"),
             "/../../docs/perturbed-worlds.md"

@@ -9,7 +9,7 @@ use elbowroom_model::{State, Task};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::chances::{Chances, EffectChance};
+use super::event_probabilities::{EffectProbability, EventProbabilities};
 use super::rand_c::RandC;
 use elbowroom_sim::draw::{Purpose, keyed};
 
@@ -39,7 +39,7 @@ pub struct Perturbation {
 /// Only the spontaneous changes depend on the seed.
 #[derive(Clone, Debug)]
 pub struct PublishedWorld<'a> {
-    chances: &'a Chances,
+    chances: &'a EventProbabilities,
     perturbed: &'a PerturbedFacts,
     state: State,
     /// True facts, in the order in which they became true.
@@ -63,7 +63,7 @@ pub struct PerturbedFacts {
 
 impl Perturbation {
     /// Returns the facts concerned, with the probabilities of their changes.
-    pub fn facts(self, task: &Task, chances: &Chances) -> PerturbedFacts {
+    pub fn facts(self, task: &Task, chances: &EventProbabilities) -> PerturbedFacts {
         let count = u32::try_from(task.fact_count()).unwrap_or(u32::MAX);
         let atom = |fact| {
             let (predicate, arguments) = task.atom(fact);
@@ -98,7 +98,7 @@ impl Perturbation {
 
 impl<'a> PublishedWorld<'a> {
     /// Creates the world of that seed.
-    pub fn new(chances: &'a Chances, perturbed: &'a PerturbedFacts, seed: u64) -> Self {
+    pub fn new(chances: &'a EventProbabilities, perturbed: &'a PerturbedFacts, seed: u64) -> Self {
         let facts = perturbed.initial.clone();
         Self {
             chances,
@@ -108,7 +108,7 @@ impl<'a> PublishedWorld<'a> {
                 ..State::default()
             },
             facts,
-            starts: RandC::unseeded(),
+            starts: RandC::with_default_seed(),
             effects: BTreeMap::new(),
             started: BTreeSet::new(),
             changes: keyed(seed, "", 0, Purpose::Change),
@@ -132,7 +132,7 @@ impl<'a> PublishedWorld<'a> {
             return;
         };
         let key = (action.schema, action.arguments.clone());
-        let effects: &[EffectChance] = if self.started.remove(&key) {
+        let effects: &[EffectProbability] = if self.started.remove(&key) {
             &chances.end_effects
         } else {
             if action.durative().is_some() {
@@ -142,7 +142,7 @@ impl<'a> PublishedWorld<'a> {
         };
         for effect in effects {
             let rand = self.effects.entry(action.schema);
-            let draw = rand.or_insert_with(RandC::unseeded).share();
+            let draw = rand.or_insert_with(RandC::with_default_seed).share();
             if draw <= effect.probability {
                 self.set(effect.fact, effect.makes_true);
             }

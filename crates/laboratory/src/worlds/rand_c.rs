@@ -13,7 +13,7 @@ pub(super) struct RandC {
 const MODULUS: u64 = 2_147_483_647;
 
 impl RandC {
-    pub(super) fn unseeded() -> Self {
+    pub(super) fn with_default_seed() -> Self {
         let mut seeds = vec![1_u64];
         while seeds.len() < 31 {
             seeds.push(seeds[seeds.len() - 1] * 16_807 % MODULUS);
@@ -48,8 +48,8 @@ mod tests {
     use super::RandC;
 
     #[test]
-    fn the_first_numbers_are_the_well_known_ones() {
-        let mut rand = RandC::unseeded();
+    fn first_numbers_match_glibc() {
+        let mut rand = RandC::with_default_seed();
         let numbers: Vec<u32> = (0..4).map(|_| rand.next()).collect();
         assert_eq!(
             numbers,

@@ -10,8 +10,8 @@ use elbowroom_execution::run::{Report, Verdict};
 use elbowroom_execution::{PlanAnswer, Planner};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Source, read_problem};
-use elbowroom_probability::optimum::Table;
-use elbowroom_probability::{Circumstances, Likelihoods, likelihoods};
+use elbowroom_probability::optimum::PolicyTable;
+use elbowroom_probability::{Likelihoods, SearchState, likelihoods};
 use elbowroom_sim::WorldModel;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -77,8 +77,8 @@ impl Scene {
 
     /// Returns the success probability by the table of `lookahead`, if there is one.
     fn promise(&self) -> Option<f64> {
-        let table = Table::new(&self.task, &self.likelihoods)?;
-        Some(table.value(&Circumstances::initial(&self.task)))
+        let table = PolicyTable::new(&self.task, &self.likelihoods)?;
+        Some(table.value(&SearchState::initial(&self.task)))
     }
 }
 

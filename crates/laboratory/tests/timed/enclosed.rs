@@ -31,7 +31,7 @@ fn enclosing(
 }
 
 #[test]
-fn bounds_enclose_what_a_plain_recursion_finds() {
+fn bounds_enclose_recursion() {
     let mut close = 0;
     for number in 0..200 {
         let mut rng = ChaCha8Rng::seed_from_u64(number);
@@ -53,7 +53,7 @@ fn bounds_enclose_what_a_plain_recursion_finds() {
 /// A policy with a subset of the actions that acts only at events is never better than the optimum.
 /// In some random worlds it is nearly as good.
 #[test]
-fn who_keeps_to_some_actions_is_never_better_than_the_best() {
+fn restricted_agent_is_never_better_than_the_optimum() {
     let mut near = 0;
     for number in 0..60 {
         let mut rng = ChaCha8Rng::seed_from_u64(4000 + number);
@@ -83,7 +83,7 @@ fn who_keeps_to_some_actions_is_never_better_than_the_best() {
 }
 
 #[test]
-fn bounds_enclose_what_a_plain_recursion_finds_where_failures_leave_something_behind() {
+fn bounds_enclose_recursion_with_failure_effects() {
     let (mut close, mut matters) = (0, 0);
     for number in 0..200 {
         let mut rng = ChaCha8Rng::seed_from_u64(2000 + number);
@@ -108,7 +108,7 @@ fn bounds_enclose_what_a_plain_recursion_finds_where_failures_leave_something_be
 
 /// Worlds with amounts that vary; in half of them everything happens at known times.
 #[test]
-fn bounds_enclose_what_a_plain_recursion_finds_where_numbers_change() {
+fn bounds_enclose_recursion_with_numbers() {
     let (mut close, mut matters) = ([0; 2], 0);
     for number in 0..worlds(200) {
         let mut rng = ChaCha8Rng::seed_from_u64(6000 + number);
@@ -135,7 +135,7 @@ fn bounds_enclose_what_a_plain_recursion_finds_where_numbers_change() {
 
 /// Facts and failures, with everything at known times.
 #[test]
-fn bounds_enclose_what_a_plain_recursion_finds_at_known_times() {
+fn bounds_enclose_recursion_at_known_times() {
     let mut close = 0;
     for number in 0..worlds(200) {
         let mut rng = ChaCha8Rng::seed_from_u64(7000 + number);
@@ -158,7 +158,7 @@ fn bounds_enclose_what_a_plain_recursion_finds_at_known_times() {
 }
 
 #[test]
-fn bounds_enclose_what_a_plain_recursion_finds_where_facts_change_at_rates() {
+fn bounds_enclose_recursion_with_rates() {
     // The recursion ignores more than two changes in a second.
     const LEFT_OUT: f64 = 5e-4;
     let mut close = 0;

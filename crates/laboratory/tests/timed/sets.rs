@@ -50,7 +50,7 @@ fn named(names: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn a_set_gets_what_it_needs_of_the_plan_before_and_no_more() {
+fn set_is_completed_with_supporting_actions_only() {
     let task = task(DOMAIN, PROBLEM);
     let world = WorldModel::read(WORLD, task.problem()).expect("it is a world");
     let with = |actions: &[&str], others: &[&str]| {
@@ -73,7 +73,7 @@ fn a_set_gets_what_it_needs_of_the_plan_before_and_no_more() {
 /// The planner's plan casts once, and succeeds in five of six cases. The recovery in the other
 /// cases is not a plan from the beginning.
 #[test]
-fn what_is_done_when_the_plan_has_failed_is_found_in_samples() {
+fn fallback_sets_are_found_in_samples() {
     let task = task(DOMAIN, PROBLEM);
     let world = WorldModel::read(WORLD, task.problem()).expect("it is a world");
     let sets = ActionSets::new(&task, &world, Embedded::default(), &|| true);

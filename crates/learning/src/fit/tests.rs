@@ -2,13 +2,13 @@ use rand::SeedableRng;
 
 use super::*;
 
-fn drawn(distribution: impl rand_distr::Distribution<f64>, count: usize) -> Vec<f64> {
+fn draw_samples(distribution: impl rand_distr::Distribution<f64>, count: usize) -> Vec<f64> {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
     (0..count).map(|_| distribution.sample(&mut rng)).collect()
 }
 
 /// Returns the best point of a fine grid, by exhaustive search.
-fn by_grid(samples: &[Sample], around: (f64, f64)) -> (f64, f64) {
+fn best_on_grid(samples: &[Sample], around: (f64, f64)) -> (f64, f64) {
     let mut best = (f64::NEG_INFINITY, (0.0, 0.0));
     for i in 0..=200 {
         for j in 0..=200 {
@@ -32,8 +32,8 @@ fn by_grid(samples: &[Sample], around: (f64, f64)) -> (f64, f64) {
 }
 
 #[test]
-fn newton_finds_the_best_point_of_a_grid() {
-    let values = drawn(
+fn newton_agrees_with_grid_search() {
+    let values = draw_samples(
         rand_distr::Normal::new(12.0, 3.0).expect("a distribution"),
         60,
     );
@@ -49,15 +49,15 @@ fn newton_finds_the_best_point_of_a_grid() {
             })
             .collect();
         let (mean, deviation, _) = location_and_scale(&samples).expect("a fit");
-        let grid = by_grid(&samples, (mean, deviation));
+        let grid = best_on_grid(&samples, (mean, deviation));
         assert!((grid.0 - mean).abs() <= 0.0101, "{grid:?} {mean}");
         assert!((grid.1 - deviation).abs() <= 0.0051, "{grid:?} {deviation}");
     }
 }
 
 #[test]
-fn what_is_cut_off_counts() {
-    let values = drawn(
+fn censored_samples_affect_the_fit() {
+    let values = draw_samples(
         rand_distr::Normal::new(12.0, 3.0).expect("a distribution"),
         400,
     );
@@ -80,24 +80,24 @@ fn what_is_cut_off_counts() {
 }
 
 #[test]
-fn the_family_is_found_again() {
+fn true_family_is_selected() {
     let of = |values: Vec<f64>| {
         let samples: Vec<Sample> = values.into_iter().map(Sample::observed).collect();
         best(&samples, 0.001).expect("a fit").distribution
     };
     let normal = rand_distr::Normal::new(20.0, 5.0).expect("a distribution");
     assert!(matches!(
-        of(drawn(normal, 300)),
+        of(draw_samples(normal, 300)),
         Distribution::Normal { .. }
     ));
     let lognormal = rand_distr::LogNormal::new(1.0, 0.8).expect("a distribution");
     assert!(matches!(
-        of(drawn(lognormal, 300)),
+        of(draw_samples(lognormal, 300)),
         Distribution::LogNormal { .. }
     ));
     let uniform = rand_distr::Uniform::new(4.0, 9.0).expect("a distribution");
     assert!(matches!(
-        of(drawn(uniform, 300)),
+        of(draw_samples(uniform, 300)),
         Distribution::Uniform { .. }
     ));
     assert_eq!(of(vec![5.0; 10]), Distribution::Constant(5.0));
@@ -113,7 +113,7 @@ fn the_family_is_found_again() {
 }
 
 #[test]
-fn strange_samples_have_an_answer() {
+fn degenerate_samples_are_fitted() {
     assert_eq!(best(&[], 0.001), None);
     assert_eq!(best(&[Sample::censored(4.0)], 0.001), None);
     assert!(best(&[Sample::observed(0.0)], 0.001).is_some());

@@ -9,7 +9,7 @@ use super::{Derivation, Derived, GroundRule, Moment, holds};
 use crate::ground::{Condition, FactId};
 
 /// Evaluates the facts of a stratum. The strata below it have been evaluated.
-pub(super) fn settle<F: Clone>(
+pub(super) fn evaluate_stratum<F: Clone>(
     derivation: &Derivation,
     stratum: &[FactId],
     basic: &dyn Moment<F>,
@@ -20,7 +20,7 @@ pub(super) fn settle<F: Clone>(
         circuit.watchers.insert(fact, Vec::new());
     }
     {
-        let below = derivation.on_top_of(basic, derived);
+        let below = derivation.with_derived_facts(basic, derived);
         for rule in stratum.iter().flat_map(|&fact| derivation.rules_of(fact)) {
             let gate = circuit.gate(1, Output::Head(rule));
             circuit.connect(&rule.body, true, gate, &below);
@@ -39,7 +39,7 @@ pub(super) fn settle<F: Clone>(
         if derived.is_settled(rule.head) {
             return false;
         }
-        let truth = holds(&rule.body, &derivation.on_top_of(basic, derived));
+        let truth = holds(&rule.body, &derivation.with_derived_facts(basic, derived));
         match truth {
             Err(fault) => derived.set_unclear(rule.head, fault),
             Ok(_) => unreachable!("the rule rests on something that says nothing"),
@@ -91,9 +91,9 @@ impl<'a> Circuit<'a> {
                     debug_assert!(sign, "no fact is negated within its stratum");
                     return watchers.push(gate);
                 }
-                return self.supply(&holds(condition, below), sign, gate);
+                return self.add_input(&holds(condition, below), sign, gate);
             }
-            Condition::Compare(..) => return self.supply(&holds(condition, below), sign, gate),
+            Condition::Compare(..) => return self.add_input(&holds(condition, below), sign, gate),
             Condition::And(parts) => (parts, sign),
             Condition::Or(parts) => (parts, !sign),
         };
@@ -107,7 +107,7 @@ impl<'a> Circuit<'a> {
         }
     }
 
-    fn supply<F>(&mut self, truth: &Result<bool, F>, sign: bool, gate: usize) {
+    fn add_input<F>(&mut self, truth: &Result<bool, F>, sign: bool, gate: usize) {
         match truth {
             Ok(truth) if *truth == sign => self.certain.push_back(gate),
             Ok(_) => {}

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{Grounder, Nothing};
+use super::{Grounder, NoKnowledge};
 use crate::autonomous::{Autonomous, GroundEvent, GroundProcess};
 use crate::problem::{
     Body, Change, Condition, Effect, ObjectId, PredicateId, Problem, Term, TimedChange, Variable,
@@ -30,7 +30,7 @@ impl Grounder<'_> {
                 ground.processes.push(GroundProcess {
                     name: problem.apply_name(&process.name, binding),
                     condition: grounder.ground_condition(condition, binding),
-                    effects: grounder.ground_continuous(&process.effects, binding, &Nothing),
+                    effects: grounder.ground_continuous(&process.effects, binding, &NoKnowledge),
                 });
             });
         }
@@ -38,7 +38,7 @@ impl Grounder<'_> {
             let (condition, parameters) = (&event.condition, &event.parameters);
             self.for_possible(&facts, condition, parameters, &mut |grounder, binding| {
                 let name = problem.apply_name(&event.name, binding);
-                let snap = grounder.ground_snap(condition, &event.effects, binding, &Nothing);
+                let snap = grounder.ground_snap(condition, &event.effects, binding, &NoKnowledge);
                 ground.events.push(GroundEvent { name, snap });
             });
         }
@@ -66,7 +66,10 @@ impl Grounder<'_> {
         binding: &mut Vec<ObjectId>,
         action: &mut dyn FnMut(&mut Self, &mut Vec<ObjectId>),
     ) {
-        if conjuncts.iter().any(|part| facts.rule_out(part, binding)) {
+        if conjuncts
+            .iter()
+            .any(|part| facts.is_ruled_out(part, binding))
+        {
             return;
         }
         let Some(next) = parameters.get(binding.len()) else {
@@ -136,7 +139,7 @@ impl<'a> Static<'a> {
 
     /// Returns `true` if the bound parameters are sufficient to make the conjunct false in every
     /// state.
-    fn rule_out(&self, conjunct: &Condition, binding: &[ObjectId]) -> bool {
+    fn is_ruled_out(&self, conjunct: &Condition, binding: &[ObjectId]) -> bool {
         let resolve = |term: &Term| match term {
             Term::Object(object) => Some(*object),
             Term::Variable(position) => binding.get(*position).copied(),

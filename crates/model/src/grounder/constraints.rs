@@ -9,9 +9,9 @@ use crate::problem::{ObjectId, PreferenceId};
 use crate::simplify::Constants;
 
 /// No knowledge of constant facts or values.
-struct Unknowing;
+struct NoStaticKnowledge;
 
-impl Constants for Unknowing {
+impl Constants for NoStaticKnowledge {
     fn truth(&mut self, _: FactId) -> Option<bool> {
         None
     }
@@ -84,7 +84,7 @@ impl Grounder<'_> {
     ) -> Modal<ground::Condition> {
         modal.map(|condition| {
             let ground = self.ground_condition(condition, binding);
-            ground.simplified(&mut Unknowing)
+            ground.simplified(&mut NoStaticKnowledge)
         })
     }
 

@@ -11,7 +11,7 @@ use super::value::Value;
 
 /// Cached results, by position of the fact or fluent.
 #[derive(Default)]
-pub(super) struct Memory {
+pub(super) struct ResultCache {
     facts: Vec<Known<bool>>,
     fluents: Vec<Known<Rational>>,
 }
@@ -19,7 +19,7 @@ pub(super) struct Memory {
 #[derive(Clone, Default)]
 enum Known<T> {
     #[default]
-    NotAsked,
+    NotComputed,
     Varies,
     Always(T),
 }
@@ -28,15 +28,15 @@ enum Known<T> {
 ///
 /// A fact that is only added where it is already true counts as written: the action that adds it
 /// may not do so at the moment when it is read.
-pub(super) struct Unwritten<'u> {
+pub(super) struct UnwrittenSymbols<'u> {
     pub(super) table: &'u Table,
     pub(super) relaxation: &'u Relaxation<'u>,
-    pub(super) memory: &'u mut Memory,
+    pub(super) cache: &'u mut ResultCache,
 }
 
-impl Constants for Unwritten<'_> {
+impl Constants for UnwrittenSymbols<'_> {
     fn truth(&mut self, fact: FactId) -> Option<bool> {
-        remembered(&mut self.memory.facts, fact.index(), || {
+        cached(&mut self.cache.facts, fact.index(), || {
             let (predicate, arguments) = self.table.atom(fact);
             // A derived fact changes with those that its rules mention.
             if self.relaxation.problem.predicates[predicate.index()].is_derived {
@@ -47,7 +47,7 @@ impl Constants for Unwritten<'_> {
     }
 
     fn value(&mut self, fluent: FluentId) -> Option<Rational> {
-        remembered(&mut self.memory.fluents, fluent.index(), || {
+        cached(&mut self.cache.fluents, fluent.index(), || {
             let (function, arguments) = self.table.application(fluent);
             match self.relaxation.constant(*function, arguments) {
                 Value::Number(value) => Some(value),
@@ -57,19 +57,19 @@ impl Constants for Unwritten<'_> {
     }
 }
 
-fn remembered<T: Clone>(
+fn cached<T: Clone>(
     memory: &mut Vec<Known<T>>,
     position: usize,
     find: impl FnOnce() -> Option<T>,
 ) -> Option<T> {
     if memory.len() <= position {
-        memory.resize(position + 1, Known::NotAsked);
+        memory.resize(position + 1, Known::NotComputed);
     }
-    if let Known::NotAsked = memory[position] {
+    if let Known::NotComputed = memory[position] {
         memory[position] = find().map_or(Known::Varies, Known::Always);
     }
     match &memory[position] {
         Known::Always(value) => Some(value.clone()),
-        Known::Varies | Known::NotAsked => None,
+        Known::Varies | Known::NotComputed => None,
     }
 }

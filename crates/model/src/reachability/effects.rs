@@ -7,7 +7,7 @@ use crate::terms::with_arguments;
 
 use super::event::{Event, Symbol};
 use super::fixpoint::Fixpoint;
-use super::waiting::Pending;
+use super::watch_lists::Pending;
 use super::writes;
 
 /// An effect: its schema, one of the schema's lists, and its position in the list.
@@ -101,7 +101,7 @@ impl Fixpoint<'_, '_> {
         let Some((first, rest)) = variables.split_first() else {
             let blockers = self.try_effect(id, binding)?;
             let pending = |binding: &[ObjectId]| Pending::Effect(id, binding.into());
-            return self.wait(blockers, || pending(binding));
+            return self.watch_for(blockers, || pending(binding));
         };
         let domains = self.relaxation().domains;
         for &object in &*domains.objects(&first.types) {
@@ -129,7 +129,7 @@ impl Fixpoint<'_, '_> {
             .all(|part| relaxation.is_possible(part, true, binding, &mut blockers));
         if is_possible {
             with_arguments(effect.terms, binding, |arguments| {
-                self.bring_about(effect.symbol, arguments);
+                self.add_event(effect.symbol, arguments);
             });
         }
         ControlFlow::Continue(blockers)

@@ -16,7 +16,7 @@ use super::event::{Event, Symbol};
 use super::join::{Trigger, join};
 use super::relaxation::Relaxation;
 use super::rule::{Head, Rule};
-use super::waiting::{Pending, Ticket, WaitingRoom};
+use super::watch_lists::{EntryId, Pending, WatchLists};
 use crate::hash::Set;
 
 /// Objects for a schema's parameters.
@@ -51,13 +51,13 @@ pub(super) fn fixpoint<'a>(
 pub(super) struct Fixpoint<'f, 'a> {
     reachable: Reachable<'a>,
     rules: &'f [Rule<'a>],
-    banned: &'f [BTreeSet<Arguments>],
+    excluded: &'f [BTreeSet<Arguments>],
     /// Number of further instances that may be found.
-    room: usize,
+    remaining_instances: usize,
     count: &'f mut dyn FnMut() -> ControlFlow<()>,
     /// For each predicate, the rule atoms that match its facts, without static atoms.
     triggers: Vec<Vec<(usize, usize)>>,
-    waiting: WaitingRoom,
+    waiting: WatchLists,
 }
 
 impl<'f, 'a> Fixpoint<'f, 'a> {
@@ -84,11 +84,11 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
                 can_end: vec![Vec::new(); schema_count],
             },
             rules,
-            banned,
-            room: settings.action_limit,
+            excluded: banned,
+            remaining_instances: settings.action_limit,
             count,
             triggers,
-            waiting: WaitingRoom::new(settings.action_limit),
+            waiting: WatchLists::new(settings.action_limit),
         }
     }
 
@@ -127,7 +127,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         let mut possible: Set<Arguments> = Set::default();
         let mut impossible: Vec<(Arguments, Vec<Event>)> = Vec::new();
         let mut own = Vec::new();
-        let (reachable, banned, room) = (&self.reachable, self.banned, self.room);
+        let (reachable, banned, room) = (&self.reachable, self.excluded, self.remaining_instances);
         let relaxation = &reachable.relaxation;
         join(rule, relaxation, trigger, self.count, &mut |binding| {
             let arguments = &binding[..rule.parameter_count];
@@ -146,7 +146,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
             ControlFlow::Continue(())
         })?;
         for (binding, blockers) in impossible {
-            self.wait(blockers, || Pending::Binding(index, binding))?;
+            self.watch_for(blockers, || Pending::Binding(index, binding))?;
         }
         for arguments in possible {
             self.conclude(rule.head, arguments)?;
@@ -157,7 +157,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
     fn conclude(&mut self, head: Head, arguments: Arguments) -> ControlFlow<()> {
         match head {
             Head::Derived(predicate) => {
-                self.bring_about(Symbol::True(predicate), &arguments);
+                self.add_event(Symbol::True(predicate), &arguments);
                 ControlFlow::Continue(())
             }
             Head::Start { schema, and_end } => self.start(schema, arguments, and_end),
@@ -170,10 +170,10 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         if !is_new {
             return ControlFlow::Continue(());
         }
-        if self.room == 0 {
+        if self.remaining_instances == 0 {
             return ControlFlow::Break(());
         }
-        self.room -= 1;
+        self.remaining_instances -= 1;
         self.reachable.can_end[schema.index()].push(false);
         self.apply_effects(schema, List::Start, &mut binding)?;
         self.apply_effects(schema, List::Continuous, &mut binding)?;
@@ -181,7 +181,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
             return self.end(schema, index);
         }
         let blockers = self.try_to_end(schema, index)?;
-        self.wait(blockers, || Pending::End(schema, index))
+        self.watch_for(blockers, || Pending::End(schema, index))
     }
 
     /// Ends the instance if that is possible. Otherwise returns the events that it waits for.
@@ -217,7 +217,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
     }
 
     /// Retries an entry that waited for an event which has just been reached.
-    fn retry(&mut self, ticket: Ticket) -> ControlFlow<()> {
+    fn retry(&mut self, ticket: EntryId) -> ControlFlow<()> {
         self.count_step()?;
         let Some(pending) = self.waiting.get(ticket).cloned() else {
             return ControlFlow::Continue(());
@@ -227,7 +227,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
             Pending::End(schema, index) => self.try_to_end(*schema, *index)?,
             Pending::Effect(id, binding) => self.try_effect(*id, &mut binding.to_vec())?,
         };
-        self.waiting.go_on(ticket, blockers);
+        self.waiting.requeue(ticket, blockers);
         ControlFlow::Continue(())
     }
 
@@ -238,7 +238,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         let arguments = &binding[..rule.parameter_count];
         let mut blockers = Vec::new();
         let relaxation = &self.reachable.relaxation;
-        if self.reachable.is_new(rule.head, arguments, self.banned)
+        if self.reachable.is_new(rule.head, arguments, self.excluded)
             && rule.are_tests_possible(relaxation, binding, &mut Vec::new(), &mut blockers)
         {
             self.conclude(rule.head, arguments.into())?;
@@ -247,7 +247,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
     }
 
     /// Queues an impossible conclusion until one of the blockers is reached.
-    pub(super) fn wait(
+    pub(super) fn watch_for(
         &mut self,
         blockers: Vec<Event>,
         pending: impl FnOnce() -> Pending,
@@ -255,14 +255,14 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         if blockers.is_empty() {
             return ControlFlow::Continue(());
         }
-        self.waiting.enter(pending(), blockers)
+        self.waiting.enqueue(pending(), blockers)
     }
 
     pub(super) fn relaxation(&self) -> &Relaxation<'a> {
         &self.reachable.relaxation
     }
 
-    pub(super) fn bring_about(&mut self, symbol: Symbol, arguments: &[ObjectId]) {
+    pub(super) fn add_event(&mut self, symbol: Symbol, arguments: &[ObjectId]) {
         self.reachable.relaxation.reached.insert(symbol, arguments);
     }
 

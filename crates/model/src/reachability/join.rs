@@ -121,7 +121,7 @@ impl<'r> Join<'r, '_> {
     fn match_fact(&mut self, atom: usize, event: u32) -> ControlFlow<()> {
         self.count_step()?;
         let rule = self.rule;
-        if !self.is_in_time(atom, event) {
+        if !self.is_first_trigger(atom, event) {
             return ControlFlow::Continue(());
         }
         let mark = self.trail.len();
@@ -136,7 +136,7 @@ impl<'r> Join<'r, '_> {
     }
 
     /// Prevents that a binding is found for several triggers.
-    fn is_in_time(&self, atom: usize, event: u32) -> bool {
+    fn is_first_trigger(&self, atom: usize, event: u32) -> bool {
         let Some(trigger) = self.trigger else {
             return true;
         };

@@ -15,7 +15,7 @@ pub(super) struct Reached {
     relations: Vec<Relation>,
     initial: usize,
     /// For each initial fact, `true` if an effect adds it.
-    added_again: Vec<bool>,
+    is_added_by_effect: Vec<bool>,
 }
 
 /// The true facts of one predicate, as positions in [`Reached::events`], ascending.
@@ -28,7 +28,7 @@ struct Relation {
 
 impl Reached {
     /// Creates the set of facts that are true at time 0.
-    pub(super) fn initially<'a>(
+    pub(super) fn at_time_zero<'a>(
         predicate_count: usize,
         facts: impl Iterator<Item = (PredicateId, &'a [ObjectId])>,
     ) -> Self {
@@ -36,13 +36,13 @@ impl Reached {
             events: Set::default(),
             relations: vec![Relation::default(); predicate_count],
             initial: 0,
-            added_again: Vec::new(),
+            is_added_by_effect: Vec::new(),
         };
         for (predicate, arguments) in facts {
             reached.insert(Symbol::True(predicate), arguments);
         }
         reached.initial = reached.events.len();
-        reached.added_again = vec![false; reached.initial];
+        reached.is_added_by_effect = vec![false; reached.initial];
         reached
     }
 
@@ -50,7 +50,7 @@ impl Reached {
     pub(super) fn insert(&mut self, symbol: Symbol, arguments: &[ObjectId]) {
         let key = EventKey { symbol, arguments };
         if let Some(position) = self.events.get_index_of(&key) {
-            if let Some(again) = self.added_again.get_mut(position) {
+            if let Some(again) = self.is_added_by_effect.get_mut(position) {
                 *again = true;
             }
             return;
@@ -111,7 +111,7 @@ impl Reached {
         }
         match self.position(predicate, arguments) {
             None => Some(false),
-            Some(position) if self.added_again.get(position) == Some(&false) => Some(true),
+            Some(position) if self.is_added_by_effect.get(position) == Some(&false) => Some(true),
             Some(_) => None,
         }
     }

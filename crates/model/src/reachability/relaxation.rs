@@ -8,7 +8,7 @@
 use elbowroom_num::Rational;
 
 use crate::domains::Domains;
-use crate::grounder::Foreknowledge;
+use crate::grounder::StaticKnowledge;
 use crate::problem::{
     Atom, Comparison, Condition, DurationConstraint, Expression, Fluent, FunctionId, ObjectId,
     Problem, Variable,
@@ -34,13 +34,13 @@ pub(super) struct Relaxation<'a> {
 
 impl<'a> Relaxation<'a> {
     /// Creates the relaxation at time 0.
-    pub(super) fn initially(problem: &'a Problem, domains: &'a Domains) -> Self {
+    pub(super) fn at_time_zero(problem: &'a Problem, domains: &'a Domains) -> Self {
         let facts = problem.initial_facts.iter();
         let values = problem.initial_values.iter();
         Self {
             problem,
             domains,
-            reached: Reached::initially(
+            reached: Reached::at_time_zero(
                 problem.predicates.len(),
                 facts.map(|(predicate, arguments)| (*predicate, arguments.as_slice())),
             ),
@@ -271,7 +271,7 @@ impl<'a> Relaxation<'a> {
     }
 
     /// Returns `true` unless the constraints exclude a duration of 0 for all objects.
-    pub(super) fn may_some_take_no_time(&self, constraints: &[DurationConstraint]) -> bool {
+    pub(super) fn can_any_take_no_time(&self, constraints: &[DurationConstraint]) -> bool {
         !constraints.iter().any(|constraint| {
             let bound = &constraint.bound;
             match constraint.comparison {
@@ -346,7 +346,7 @@ impl<'a> Relaxation<'a> {
     }
 }
 
-impl Foreknowledge for Relaxation<'_> {
+impl StaticKnowledge for Relaxation<'_> {
     /// Decides by basic facts and fluents that no reached event writes. Quantifiers are undecided;
     /// their instances are queried one by one.
     fn truth(&self, condition: &Condition, binding: &[ObjectId]) -> Option<bool> {

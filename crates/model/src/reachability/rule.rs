@@ -134,7 +134,7 @@ pub(super) fn rules_of<'a>(
             } => {
                 // With a duration of 0, the over-all condition is vacuous.
                 let may_be_vacuous =
-                    !over_all.is_trivial() && relaxation.may_some_take_no_time(duration);
+                    !over_all.is_trivial() && relaxation.can_any_take_no_time(duration);
                 and_end = is_start_silent(schema) && !may_be_vacuous;
                 drafts.require(at_start, true, &scope);
                 drafts.require_duration(duration, and_end, &scope);

@@ -1,7 +1,7 @@
 //! Comparison with a simple reference implementation, and limits.
 
 mod random;
-mod twin;
+mod reference;
 
 use proptest::prelude::*;
 
@@ -25,7 +25,7 @@ proptest! {
         choices in prop::collection::vec(any::<u8>(), 20..600)
     ) {
         let problem = random::problem(&choices);
-        let expected = twin::ground(&problem);
+        let expected = reference::ground(&problem);
         let (task, grounding) = grounding_of(problem);
         let actions: Vec<_> = grounding.actions.iter().map(|a| a.name.clone()).collect();
         prop_assert_eq!(actions, expected.actions);

@@ -20,17 +20,17 @@ use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
 
+use super::abort::{Abort, EvaluationContext};
 use super::effects;
+use super::evaluate::{Fault, evaluate};
 use super::instant::Instant;
 use super::interference::over;
 use super::judge::Judge;
-use super::piece::{Piece, Stretch};
 use super::polynomial::Polynomial;
-use super::reading::{Fault, evaluate};
-use super::state::{Motion, Now, Rate};
-use super::stop::{Place, Stop};
-use super::timeline::{Group, What};
-use super::violation::{Difficulty, Mistake, Undecided, When};
+use super::segment::{Segment, SegmentPart};
+use super::state::{BasicState, Motion, Rate};
+use super::timeline::{Group, HappeningKind};
+use super::violation::{ConditionTime, Undecided, UndecidedReason, ViolationKind};
 use crate::autonomous::{Autonomous, GroundEvent};
 use crate::ground::{Change, Condition, Expression, FactId, FluentId};
 use crate::interference::Footprint;
@@ -38,14 +38,14 @@ use crate::problem::UpdateOperator;
 use crate::task::Task;
 
 /// Largest number of changes (events, starts and stops of processes) between two happening groups.
-const MOST_CHANGES: usize = 1000;
+const MAX_CHANGES: usize = 1000;
 
 /// Conditions of events have no tolerance, because the plan does not contain the times of events.
 static NO_SLACK: Rational = Rational::ZERO;
 
 /// Record of the events that have happened, as far as it is needed.
 #[derive(Debug)]
-pub(super) struct Nature {
+pub(super) struct EventHistory {
     /// Footprint of each event.
     footprints: Vec<Footprint>,
     /// Events that have happened at the present moment.
@@ -57,7 +57,7 @@ pub(super) struct Nature {
     recent: Vec<(Rational, Instant, usize)>,
 }
 
-impl Nature {
+impl EventHistory {
     /// Returns `None` if the task has neither processes nor events.
     pub(super) fn of(task: &Task) -> Option<Self> {
         let autonomous = task.autonomous();
@@ -98,7 +98,7 @@ impl Flow {
 /// Moment at which a condition is read: at a moment, or right after it, under a motion.
 enum Read<'m> {
     At,
-    After(&'m Now, &'m Motion, &'m Rational),
+    After(&'m BasicState, &'m Motion, &'m Rational),
 }
 
 impl<'a> Judge<'a> {
@@ -108,8 +108,8 @@ impl<'a> Judge<'a> {
 
     /// Fires the events whose conditions hold now, and those whose conditions become true as a
     /// result.
-    pub(super) fn fire_now(&mut self, time: &Rational) -> Result<(), Stop> {
-        if self.nature.is_none() {
+    pub(super) fn fire_now(&mut self, time: &Rational) -> Result<(), Abort> {
+        if self.event_history.is_none() {
             return Ok(());
         }
         self.fire_at(&mut Flow::beginning(time))
@@ -117,20 +117,24 @@ impl<'a> Judge<'a> {
 
     /// Applies processes and events from just after the group at `from` to the arrival at the next
     /// one.
-    pub(super) fn pass_with_nature(&mut self, from: &Rational, to: &Rational) -> Result<(), Stop> {
+    pub(super) fn advance_with_autonomous(
+        &mut self,
+        from: &Rational,
+        to: &Rational,
+    ) -> Result<(), Abort> {
         let mut flow = Flow::beginning(from);
         self.forget_events_before(from);
-        for _ in 0..MOST_CHANGES {
+        for _ in 0..MAX_CHANGES {
             let length = to - &flow.base;
             let is_after = self.settle_after(&mut flow, &length)?;
-            let next = self.next_turn(&flow, &length)?;
+            let next = self.next_switch_time(&flow, &length)?;
             let end = next.clone();
-            let part = Stretch {
+            let part = SegmentPart {
                 from: flow.at.clone(),
                 to: Some(end.unwrap_or_else(|| Instant::exact(length.clone()))),
                 is_after,
             };
-            self.watch(&flow, &length, &part)?;
+            self.check_throughout(&flow, &length, &part)?;
             for running in self.running.values_mut() {
                 running.is_new = false;
             }
@@ -141,33 +145,41 @@ impl<'a> Judge<'a> {
                 return Ok(());
             }
         }
-        let most = MOST_CHANGES;
-        Err(undecided(&flow.time(), Difficulty::ManyChanges { most }))
+        let most = MAX_CHANGES;
+        Err(undecided(
+            &flow.time(),
+            UndecidedReason::ManyChanges { most },
+        ))
     }
 
     /// Checks over-all conditions and constraints throughout a part.
-    fn watch(&mut self, flow: &Flow, length: &Rational, part: &Stretch) -> Result<(), Stop> {
+    fn check_throughout(
+        &mut self,
+        flow: &Flow,
+        length: &Rational,
+        part: &SegmentPart,
+    ) -> Result<(), Abort> {
         self.watch_over_all(&flow.base, &flow.motion, length, Some(part))?;
-        self.watch_course(&flow.base, &flow.motion, length, Some(part))
+        self.record_phases(&flow.base, &flow.motion, length, Some(part))
     }
 
     /// Advances to a later moment.
     fn advance(&mut self, flow: &mut Flow, at: Instant) {
         if let Some(elapsed) = at.as_exact() {
-            flow.motion.carry(&mut self.now, elapsed);
+            flow.motion.advance_state(&mut self.now, elapsed);
             *flow = Flow::beginning(&(&flow.base + elapsed));
         } else {
             flow.at = at;
         }
         self.derived.take();
-        if let Some(nature) = &mut self.nature {
+        if let Some(nature) = &mut self.event_history {
             nature.fired.clear();
             nature.rounds = 0;
         }
     }
 
     /// Fires the events whose conditions hold at the moment.
-    fn fire_at(&mut self, flow: &mut Flow) -> Result<(), Stop> {
+    fn fire_at(&mut self, flow: &mut Flow) -> Result<(), Abort> {
         loop {
             let ready = self.ready(flow, &Read::At)?;
             if ready.is_empty() {
@@ -179,10 +191,10 @@ impl<'a> Judge<'a> {
 
     /// Determines the processes that are active right after the moment, and fires the events whose
     /// conditions hold right after it. Returns `true` if there were any.
-    fn settle_after(&mut self, flow: &mut Flow, length: &Rational) -> Result<bool, Stop> {
+    fn settle_after(&mut self, flow: &mut Flow, length: &Rational) -> Result<bool, Abort> {
         let mut is_after = false;
         loop {
-            let (now, motion) = self.at_work(flow, length)?;
+            let (now, motion) = self.active_motion(flow, length)?;
             let read = Read::After(&now, &motion, length);
             let ready = self.ready(flow, &read)?;
             if ready.is_empty() {
@@ -190,12 +202,12 @@ impl<'a> Judge<'a> {
                 return Ok(is_after);
             }
             if !is_after {
-                let part = Stretch {
+                let part = SegmentPart {
                     from: flow.at.clone(),
                     to: None,
                     is_after: false,
                 };
-                self.watch(flow, length, &part)?;
+                self.check_throughout(flow, length, &part)?;
                 is_after = true;
             }
             self.fire(flow, &ready, &read)?;
@@ -204,7 +216,7 @@ impl<'a> Judge<'a> {
 
     /// Returns the motion of numbers right after the moment, and the state with the values of those
     /// that do not change.
-    fn at_work(&self, flow: &Flow, length: &Rational) -> Result<(Now, Motion), Stop> {
+    fn active_motion(&self, flow: &Flow, length: &Rational) -> Result<(BasicState, Motion), Abort> {
         let processes = &self.autonomous().processes;
         let time = flow.time();
         let mut on = Vec::with_capacity(processes.len());
@@ -223,8 +235,9 @@ impl<'a> Judge<'a> {
                 }));
             }
             let mut now = self.now.clone();
-            let motion = Motion::resumed(&mut now, &flow.motion, &rates, &flow.at)
-                .map_err(|(step, fault)| self.stop(fault, &Place::rate(&time, step)))?;
+            let motion = Motion::continued_from(&mut now, &flow.motion, &rates, &flow.at).map_err(
+                |(step, fault)| self.to_abort(fault, &EvaluationContext::rate(&time, step)),
+            )?;
             let mut then = Vec::with_capacity(processes.len());
             let read = Read::After(&now, &motion, length);
             for process in processes {
@@ -237,18 +250,18 @@ impl<'a> Judge<'a> {
             if !tried.insert(std::mem::replace(&mut on, then)) {
                 let process = turned.map(|index| processes[index].name.clone());
                 let process = process.unwrap_or_default();
-                return Err(undecided(&time, Difficulty::Chattering { process }));
+                return Err(undecided(&time, UndecidedReason::Chattering { process }));
             }
         }
     }
 
     /// Returns the next moment at which, or right after which, an event's condition becomes true or
     /// a process starts or stops.
-    fn next_turn(&self, flow: &Flow, length: &Rational) -> Result<Option<Instant>, Stop> {
-        if flow.motion.is_still() {
+    fn next_switch_time(&self, flow: &Flow, length: &Rational) -> Result<Option<Instant>, Abort> {
+        if flow.motion.is_constant() {
             return Ok(None);
         }
-        let part = Stretch {
+        let part = SegmentPart {
             from: flow.at.clone(),
             to: Some(Instant::exact(length.clone())),
             is_after: true,
@@ -256,10 +269,15 @@ impl<'a> Judge<'a> {
         let piece = self.piece(&self.now, &flow.motion, length, Some(&part));
         let mut next: Option<Instant> = None;
         for condition in self.conditions() {
-            let place = Place::condition(&flow.base, None, When::Course, condition);
+            let place = EvaluationContext::condition(
+                &flow.base,
+                None,
+                ConditionTime::Trajectory,
+                condition,
+            );
             let (_, turn) = piece
                 .turn(condition)
-                .map_err(|fault| self.stop(fault, &place))?;
+                .map_err(|fault| self.to_abort(fault, &place))?;
             if let Some(turn) = turn
                 && next
                     .as_ref()
@@ -280,7 +298,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Returns the events whose conditions hold.
-    fn ready(&self, flow: &Flow, read: &Read<'_>) -> Result<Vec<usize>, Stop> {
+    fn ready(&self, flow: &Flow, read: &Read<'_>) -> Result<Vec<usize>, Abort> {
         let mut ready = Vec::new();
         for (index, event) in self.autonomous().events.iter().enumerate() {
             if self.holds(flow, &event.snap.condition, read)? {
@@ -290,7 +308,7 @@ impl<'a> Judge<'a> {
         Ok(ready)
     }
 
-    fn holds(&self, flow: &Flow, condition: &Condition, read: &Read<'_>) -> Result<bool, Stop> {
+    fn holds(&self, flow: &Flow, condition: &Condition, read: &Read<'_>) -> Result<bool, Abort> {
         let holds = match read {
             Read::At => {
                 let length = Rational::ZERO;
@@ -298,7 +316,7 @@ impl<'a> Judge<'a> {
                 piece.holds_at(condition, &flow.at)
             }
             Read::After(now, motion, length) => {
-                let part = Stretch {
+                let part = SegmentPart {
                     from: flow.at.clone(),
                     to: Some(Instant::exact((*length).clone())),
                     is_after: true,
@@ -309,21 +327,21 @@ impl<'a> Judge<'a> {
         };
         holds.map_err(|fault| {
             let time = flow.time();
-            self.stop(
+            self.to_abort(
                 fault,
-                &Place::condition(&time, None, When::Course, condition),
+                &EvaluationContext::condition(&time, None, ConditionTime::Trajectory, condition),
             )
         })
     }
 
     fn piece<'p>(
         &'p self,
-        now: &'p Now,
+        now: &'p BasicState,
         motion: &'p Motion,
         length: &'p Rational,
-        part: Option<&'p Stretch>,
-    ) -> Piece<'p> {
-        Piece {
+        part: Option<&'p SegmentPart>,
+    ) -> Segment<'p> {
+        Segment {
             now,
             motion,
             length,
@@ -334,24 +352,25 @@ impl<'a> Judge<'a> {
     }
 
     /// Applies simultaneous events.
-    fn fire(&mut self, flow: &mut Flow, ready: &[usize], read: &Read<'_>) -> Result<(), Stop> {
-        self.refuse_endless(flow, ready)?;
+    fn fire(&mut self, flow: &mut Flow, ready: &[usize], read: &Read<'_>) -> Result<(), Abort> {
+        self.reject_repeated_event(flow, ready)?;
         self.refuse_interference(flow, ready)?;
         let changes = self.changes(flow, ready, read)?;
         let time = flow.time();
         for (fluent, value) in changes.values {
-            flow.motion.put(&mut self.now, fluent, value);
+            flow.motion.set_value(&mut self.now, fluent, value);
         }
         for (truth, facts) in [(false, changes.deletes), (true, changes.adds)] {
             for (fact, event) in facts {
                 let old = std::mem::replace(&mut self.now.facts[fact.index()], truth);
                 if old != truth {
-                    self.since.insert(fact, (time.clone(), What::Event(event)));
+                    self.last_changes
+                        .insert(fact, (time.clone(), HappeningKind::Event(event)));
                 }
             }
         }
         self.derived.take();
-        if let Some(nature) = &mut self.nature {
+        if let Some(nature) = &mut self.event_history {
             nature.rounds += 1;
             for &event in ready {
                 nature.fired.insert(event);
@@ -363,14 +382,14 @@ impl<'a> Judge<'a> {
     }
 
     /// Rejects an event that happens twice at a moment.
-    fn refuse_endless(&self, flow: &Flow, ready: &[usize]) -> Result<(), Stop> {
-        let Some(nature) = &self.nature else {
+    fn reject_repeated_event(&self, flow: &Flow, ready: &[usize]) -> Result<(), Abort> {
+        let Some(nature) = &self.event_history else {
             return Ok(());
         };
         let Some(&again) = ready.iter().find(|event| nature.fired.contains(event)) else {
             return Ok(());
         };
-        let mistake = Mistake::EndlessEvent {
+        let mistake = ViolationKind::EndlessEvent {
             event: self.autonomous().events[again].name.clone(),
             is_alone: nature.rounds == 1 && nature.fired.len() == 1,
         };
@@ -378,8 +397,8 @@ impl<'a> Judge<'a> {
     }
 
     /// Rejects simultaneous events that interfere.
-    fn refuse_interference(&self, flow: &Flow, ready: &[usize]) -> Result<(), Stop> {
-        let Some(nature) = &self.nature else {
+    fn refuse_interference(&self, flow: &Flow, ready: &[usize]) -> Result<(), Abort> {
+        let Some(nature) = &self.event_history else {
             return Ok(());
         };
         for (position, &second) in ready.iter().enumerate() {
@@ -389,9 +408,9 @@ impl<'a> Judge<'a> {
                     continue;
                 }
                 let time = flow.time();
-                let mistake = Mistake::Interference {
-                    first: self.occurrence(What::Event(first), &time),
-                    second: self.occurrence(What::Event(second), &time),
+                let mistake = ViolationKind::Interference {
+                    first: self.occurrence(HappeningKind::Event(first), &time),
+                    second: self.occurrence(HappeningKind::Event(second), &time),
                     over: over(self.task, footprints[0], footprints[1]),
                     separation: None,
                 };
@@ -402,7 +421,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Returns the changes of some events, all read in the same state.
-    fn changes(&self, flow: &Flow, ready: &[usize], read: &Read<'_>) -> Result<Changes, Stop> {
+    fn changes(&self, flow: &Flow, ready: &[usize], read: &Read<'_>) -> Result<Changes, Abort> {
         let mut changes = Changes::default();
         let time = flow.time();
         for &event in ready {
@@ -419,11 +438,11 @@ impl<'a> Judge<'a> {
                         fluent,
                         value,
                     } => {
-                        let place = Place::effect(&time, None, value);
+                        let place = EvaluationContext::effect(&time, None, value);
                         let value_of = |fluent| flow.motion.value(&self.now, fluent);
                         let old = changes.values.iter().find(|(known, _)| known == fluent);
                         if old.is_some() && !operator.is_additive() {
-                            let mistake = Mistake::Conflict {
+                            let mistake = ViolationKind::Conflict {
                                 fluent: self.task.fluent_name(*fluent),
                             };
                             return Err(self.violation(&time, None, mistake));
@@ -434,7 +453,7 @@ impl<'a> Judge<'a> {
                         };
                         let new = evaluate(value, None, &value_of)
                             .and_then(|value| updated(*operator, old, value, &flow.at, *fluent))
-                            .map_err(|fault| self.stop(fault, &place))?;
+                            .map_err(|fault| self.to_abort(fault, &place))?;
                         changes.values.retain(|(known, _)| known != fluent);
                         changes.values.push((*fluent, new));
                     }
@@ -446,9 +465,9 @@ impl<'a> Judge<'a> {
 
     /// Checks that happenings of the plan are at least ε after events before them. If no separation
     /// is needed, it is sufficient that the event comes first.
-    pub(super) fn keep_from_events(&self, group: &Group<'a>) -> Result<(), Stop> {
+    pub(super) fn check_separation_from_events(&self, group: &Group<'a>) -> Result<(), Abort> {
         let Some(nature) = self
-            .nature
+            .event_history
             .as_ref()
             .filter(|_| self.settings.needs_separation)
         else {
@@ -457,7 +476,7 @@ impl<'a> Judge<'a> {
         let separation = self.task.epsilon();
         for (base, at, event) in &nature.recent {
             for happening in &group.happenings {
-                let Some(step) = happening.what.step() else {
+                let Some(step) = happening.kind.step() else {
                     continue;
                 };
                 let since = &happening.time - base;
@@ -467,9 +486,9 @@ impl<'a> Judge<'a> {
                     continue;
                 }
                 let time = base + at.near();
-                let mistake = Mistake::Interference {
-                    first: self.occurrence(What::Event(*event), &time),
-                    second: self.occurrence(happening.what, &happening.time),
+                let mistake = ViolationKind::Interference {
+                    first: self.occurrence(HappeningKind::Event(*event), &time),
+                    second: self.occurrence(happening.kind, &happening.time),
                     over: over(self.task, footprint, &happening.footprint),
                     separation: Some(separation.clone()),
                 };
@@ -482,7 +501,7 @@ impl<'a> Judge<'a> {
     /// Removes the events that are too far in the past for later happenings.
     fn forget_events_before(&mut self, time: &Rational) {
         let separation = self.task.epsilon();
-        if let Some(nature) = &mut self.nature {
+        if let Some(nature) = &mut self.event_history {
             let is_close = |(base, at, _): &(Rational, Instant, usize)| {
                 at.order(&Instant::exact(time - base - separation)) == Ordering::Greater
             };
@@ -523,9 +542,9 @@ fn updated(
     })
 }
 
-fn undecided(time: &Rational, difficulty: Difficulty) -> Stop {
-    Stop::Undecided(Box::new(Undecided {
+fn undecided(time: &Rational, difficulty: UndecidedReason) -> Abort {
+    Abort::Undecided(Box::new(Undecided {
         time: Some(time.clone()),
-        difficulty,
+        reason: difficulty,
     }))
 }

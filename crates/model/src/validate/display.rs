@@ -5,7 +5,8 @@ use std::fmt;
 use elbowroom_num::Rational;
 
 use super::violation::{
-    ActionInstance, Difficulty, Mistake, Occurrence, Point, Reason, Undecided, Violation, When,
+    ActionInstance, ConditionTime, Occurrence, Point, Reason, Undecided, UndecidedReason,
+    Violation, ViolationKind,
 };
 use crate::describe::decimal;
 use crate::problem::Comparison;
@@ -43,7 +44,7 @@ impl fmt::Display for Occurrence {
     }
 }
 
-impl fmt::Display for When {
+impl fmt::Display for ConditionTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Now => "precondition",
@@ -51,19 +52,19 @@ impl fmt::Display for When {
             Self::OverAll => "over all",
             Self::End => "at end",
             Self::Goal => "goal",
-            Self::Course => "constraint",
+            Self::Trajectory => "constraint",
         })
     }
 }
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Mistake::Condition {
+        if let ViolationKind::Condition {
             is_after, is_exact, ..
         }
-        | Mistake::Constraint {
+        | ViolationKind::Constraint {
             is_after, is_exact, ..
-        } = &self.mistake
+        } = &self.kind
         {
             let after = if *is_after { "just after" } else { "at" };
             if *is_exact {
@@ -77,11 +78,11 @@ impl fmt::Display for Violation {
         if let Some(action) = &self.action {
             write!(f, "{action} ")?;
         }
-        write!(f, "{}", self.mistake)
+        write!(f, "{}", self.kind)
     }
 }
 
-impl fmt::Display for Mistake {
+impl fmt::Display for ViolationKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooEarly(earliest) => write!(f, "starts before time {}", decimal(earliest)),
@@ -130,9 +131,9 @@ impl fmt::Display for Mistake {
                 ..
             } => {
                 match when {
-                    When::Goal => write!(f, "the goal {condition} does not hold")?,
-                    When::Course => write!(f, "{condition} does not hold")?,
-                    When::Now => write!(f, "needs {condition}")?,
+                    ConditionTime::Goal => write!(f, "the goal {condition} does not hold")?,
+                    ConditionTime::Trajectory => write!(f, "{condition} does not hold")?,
+                    ConditionTime::Now => write!(f, "needs {condition}")?,
                     _ => write!(f, "needs {condition} {when}")?,
                 }
                 for (position, reason) in reasons.iter().enumerate() {
@@ -246,11 +247,11 @@ impl fmt::Display for Undecided {
         if let Some(time) = &self.time {
             write!(f, "at {}: ", clock(time))?;
         }
-        write!(f, "{}", self.difficulty)
+        write!(f, "{}", self.reason)
     }
 }
 
-impl fmt::Display for Difficulty {
+impl fmt::Display for UndecidedReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Open { unknown, within } => {
@@ -278,7 +279,7 @@ impl fmt::Display for Difficulty {
                 "a continuous effect on {fluent} depends on an over-all condition, whose truth \
                  lies in the future"
             ),
-            Self::Past => write!(
+            Self::PastStates => write!(
                 f,
                 "a constraint on the course of the whole plan depends on the states before"
             ),

@@ -4,27 +4,27 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
+use super::abort::{Abort, EvaluationContext};
+use super::evaluate::Fault;
 use super::judge::Judge;
-use super::reading::Fault;
 use super::state::Rate;
-use super::stop::{Place, Stop};
-use super::timeline::{Group, What};
-use super::violation::{Mistake, When};
+use super::timeline::{Group, HappeningKind};
+use super::violation::{ConditionTime, ViolationKind};
 use crate::ground::{Change, Effect, Expression, FactId, FluentId};
 use crate::problem::UpdateOperator;
 
 /// All changes of a group, computed before any of them is applied.
 #[derive(Default)]
 struct Changes<'a> {
-    deletes: Vec<(FactId, What<'a>)>,
-    adds: Vec<(FactId, What<'a>)>,
+    deletes: Vec<(FactId, HappeningKind<'a>)>,
+    adds: Vec<(FactId, HappeningKind<'a>)>,
     updates: BTreeMap<FluentId, Vec<Update<'a>>>,
 }
 
 struct Update<'a> {
     operator: UpdateOperator,
     value: Rational,
-    what: What<'a>,
+    source: HappeningKind<'a>,
 }
 
 /// Returns the active continuous effects.
@@ -52,10 +52,10 @@ pub(super) fn rates<'b>(judge: &Judge<'b>) -> Vec<Rate<'b>> {
 impl<'a> Judge<'a> {
     /// Applies the effects of a group. All read the state on arrival, deletions come before
     /// additions, and actions that end stop running.
-    pub(super) fn apply(&mut self, group: &Group<'a>) -> Result<(), Stop> {
+    pub(super) fn apply(&mut self, group: &Group<'a>) -> Result<(), Abort> {
         let mut changes = Changes::default();
         for happening in &group.happenings {
-            self.collect(happening.what, &group.time, &mut changes)?;
+            self.collect(happening.kind, &group.time, &mut changes)?;
         }
         if self.settings.refuses_equal_writes {
             self.refuse_equal_writes(&changes, &group.time)?;
@@ -67,12 +67,12 @@ impl<'a> Judge<'a> {
         for (&(fact, what), truth) in facts.chain(changes.adds.iter().map(|add| (add, true))) {
             let old = std::mem::replace(&mut self.now.facts[fact.index()], truth);
             if old != truth {
-                self.since.insert(fact, (group.time.clone(), what));
+                self.last_changes.insert(fact, (group.time.clone(), what));
             }
         }
         self.derived.take();
         for happening in &group.happenings {
-            if let What::End(position) = happening.what {
+            if let HappeningKind::End(position) = happening.kind {
                 self.running.remove(&position);
             }
         }
@@ -81,11 +81,11 @@ impl<'a> Judge<'a> {
 
     fn collect(
         &self,
-        what: What<'a>,
+        what: HappeningKind<'a>,
         time: &Rational,
         changes: &mut Changes<'a>,
-    ) -> Result<(), Stop> {
-        if let What::Timed(timed) = what {
+    ) -> Result<(), Abort> {
+        if let HappeningKind::Timed(timed) = what {
             for change in &timed.changes {
                 self.note(change, what, time, changes)?;
             }
@@ -94,24 +94,24 @@ impl<'a> Judge<'a> {
             return Ok(());
         };
         for (index, effect) in snap.effects.iter().enumerate() {
-            if self.takes_place(effect, index, what, time)? {
+            if self.is_effective(effect, index, what, time)? {
                 self.note(&effect.change, what, time, changes)?;
             }
         }
         Ok(())
     }
 
-    fn takes_place(
+    fn is_effective(
         &self,
         effect: &Effect,
         index: usize,
-        what: What<'a>,
+        what: HappeningKind<'a>,
         time: &Rational,
-    ) -> Result<bool, Stop> {
+    ) -> Result<bool, Abort> {
         if effect.guard.is_trivial() {
             return Ok(true);
         }
-        if let What::End(position) = what
+        if let HappeningKind::End(position) = what
             && self
                 .running
                 .get(&position)
@@ -119,18 +119,19 @@ impl<'a> Judge<'a> {
         {
             return Ok(false);
         }
-        let place = Place::condition(time, what.step(), When::Now, &effect.guard.now);
+        let place =
+            EvaluationContext::condition(time, what.step(), ConditionTime::Now, &effect.guard.now);
         self.reads(&effect.guard.now, what.step())
-            .map_err(|fault| self.stop(fault, &place))
+            .map_err(|fault| self.to_abort(fault, &place))
     }
 
     fn note(
         &self,
         change: &Change,
-        what: What<'a>,
+        what: HappeningKind<'a>,
         time: &Rational,
         changes: &mut Changes<'a>,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), Abort> {
         match change {
             Change::Add(fact) => changes.adds.push((*fact, what)),
             Change::Delete(fact) => changes.deletes.push((*fact, what)),
@@ -139,15 +140,15 @@ impl<'a> Judge<'a> {
                 fluent,
                 value,
             } => {
-                let place = Place::effect(time, what.step(), value);
+                let place = EvaluationContext::effect(time, what.step(), value);
                 let value = self
                     .reading(what.step())
                     .value(value)
-                    .map_err(|fault| self.stop(fault, &place))?;
+                    .map_err(|fault| self.to_abort(fault, &place))?;
                 let update = Update {
                     operator: *operator,
                     value,
-                    what,
+                    source: what,
                 };
                 changes.updates.entry(*fluent).or_default().push(update);
             }
@@ -156,14 +157,14 @@ impl<'a> Judge<'a> {
     }
 
     /// Rejects two steps, or a step and a timed initial, that write the same fact.
-    fn refuse_equal_writes(&self, changes: &Changes<'a>, time: &Rational) -> Result<(), Stop> {
-        let mut writers: BTreeMap<FactId, What<'a>> = BTreeMap::new();
+    fn refuse_equal_writes(&self, changes: &Changes<'a>, time: &Rational) -> Result<(), Abort> {
+        let mut writers: BTreeMap<FactId, HappeningKind<'a>> = BTreeMap::new();
         for (fact, what) in changes.deletes.iter().chain(&changes.adds) {
             let first = *writers.entry(*fact).or_insert(*what);
             if first.step() == what.step() {
                 continue;
             }
-            let mistake = Mistake::Interference {
+            let mistake = ViolationKind::Interference {
                 first: self.occurrence(first, time),
                 second: self.occurrence(*what, time),
                 over: self.task.fact_name(*fact),
@@ -180,25 +181,25 @@ impl<'a> Judge<'a> {
         fluent: FluentId,
         updates: &[Update<'a>],
         time: &Rational,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), Abort> {
         let name = || self.task.fluent_name(fluent);
         let violates =
-            |update: &Update<'a>, mistake| Err(self.violation(time, update.what.step(), mistake));
+            |update: &Update<'a>, mistake| Err(self.violation(time, update.source.step(), mistake));
         let mut value = self.now.values[fluent.index()].clone();
         for update in updates {
             if updates.len() > 1 && !update.operator.is_additive() {
-                return violates(update, Mistake::Conflict { fluent: name() });
+                return violates(update, ViolationKind::Conflict { fluent: name() });
             }
             let within = || format!("its effect {} {}", update.operator.name(), name());
             value = match (update.operator, value) {
                 (UpdateOperator::Assign, _) => Some(update.value.clone()),
                 (_, None) if matches!(self.now.value(fluent), Err(Fault::Irrational(_))) => {
                     let value = Expression::Fluent(fluent);
-                    let place = Place::effect(time, update.what.step(), &value);
-                    return Err(self.stop(Fault::Irrational(fluent), &place));
+                    let place = EvaluationContext::effect(time, update.source.step(), &value);
+                    return Err(self.to_abort(Fault::Irrational(fluent), &place));
                 }
                 (_, None) => {
-                    let mistake = Mistake::Undefined {
+                    let mistake = ViolationKind::Undefined {
                         fluent: name(),
                         within: within(),
                     };
@@ -210,7 +211,7 @@ impl<'a> Judge<'a> {
                 (UpdateOperator::ScaleDown, Some(old)) => {
                     let Some(quotient) = old.checked_div(&update.value) else {
                         let divisor = "its value".to_owned();
-                        let mistake = Mistake::DivisionByZero {
+                        let mistake = ViolationKind::DivisionByZero {
                             divisor,
                             within: within(),
                         };

@@ -19,7 +19,7 @@
 //! assert_eq!(execution.reaches(task.goal()), Some(true));
 //! ```
 
-mod course;
+mod present_state;
 mod start;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -28,15 +28,15 @@ use std::sync::Arc;
 use elbowroom_num::{Interval, Rational};
 
 use super::interference::over;
-use super::piece::Piece;
-use super::violation::{ActionInstance, Mistake, Occurrence, Point, Violation};
+use super::segment::Segment;
+use super::violation::{ActionInstance, Occurrence, Point, Violation, ViolationKind};
 use crate::derivation::{Derivation, holds};
 use crate::ground::{Action, Body, Change, Condition, FactId, FluentId, SnapAction};
 use crate::interference::Footprint;
 use crate::situation::Situation;
 use crate::task::Task;
 
-use course::{Course, Lack, Moment, RateOf};
+use present_state::{Indeterminate, Moment, PresentState, RateOf};
 
 /// A measured amount that replaces the domain's `amount` in `(increase fluent amount)`, or in another
 /// update.
@@ -48,7 +48,7 @@ pub struct Execution {
     task: Task,
     /// Rules of derived facts, with the number of facts in the table for which they were computed.
     derivation: (usize, Derivation),
-    course: Course,
+    present: PresentState,
     /// Number of groups of timed initials that have happened.
     timed: usize,
     /// Commanded starts that were neither reported nor refused.
@@ -98,7 +98,7 @@ impl Execution {
     pub fn new(task: &Task) -> Self {
         Self {
             derivation: (0, Derivation::default()),
-            course: Course::of(task, task.initial(), Rational::ZERO),
+            present: PresentState::of(task, task.initial(), Rational::ZERO),
             task: task.clone(),
             timed: 0,
             commanded: BTreeMap::new(),
@@ -112,7 +112,7 @@ impl Execution {
     /// order.
     pub fn from(task: &Task, situation: &Situation, numbers: &[u64]) -> Self {
         let mut execution = Self::new(task);
-        execution.course = Course::of(task, &situation.state, situation.time.clone());
+        execution.present = PresentState::of(task, &situation.state, situation.time.clone());
         let timed = task.timed().iter();
         execution.timed = timed
             .take_while(|timed| timed.time <= situation.time)
@@ -137,7 +137,7 @@ impl Execution {
 
     /// Returns the present time.
     pub fn time(&self) -> &Rational {
-        self.course.time()
+        self.present.time()
     }
 
     /// Returns `true` if no action is running or commanded, other than those that were cancelled.
@@ -155,41 +155,41 @@ impl Execution {
             .filter(|it| it.time <= *to)
             .cloned()
         {
-            self.drift(&timed.time);
-            self.course.begin_group(&timed.time);
+            self.advance_continuous(&timed.time);
+            self.present.begin_group(&timed.time);
             let footprint = Footprint::of_timed(&timed);
             let (deletes, others): (Vec<_>, Vec<_>) =
                 (timed.changes.iter()).partition(|change| matches!(change, Change::Delete(_)));
             for change in deletes.into_iter().chain(others) {
-                self.course.change(change, None, &[]);
+                self.present.change(change, None, &[]);
             }
             self.note_recent(&timed.time, footprint, Point::Timed, None);
             self.timed += 1;
         }
-        self.drift(to);
+        self.advance_continuous(to);
     }
 
     /// Begins the group of the events at `time`. A late report does not turn back time: its event changes the
     /// present state.
     fn arrive(&mut self, time: &Rational) {
-        if time >= self.course.time() {
+        if time >= self.present.time() {
             self.advance(time);
         }
-        self.course.begin_group(time);
+        self.present.begin_group(time);
     }
 
-    fn drift(&mut self, to: &Rational) {
-        let length = to - self.course.time();
+    fn advance_continuous(&mut self, to: &Rational) {
+        let length = to - self.present.time();
         if !length.is_positive() {
             return;
         }
         self.refresh();
         let running = self.running.values();
         let rates: Vec<RateOf<'_>> = running.flat_map(rates_of).collect();
-        let motion = self.course.motion(&rates);
+        let motion = self.present.motion(&rates);
         drop(rates);
-        let piece = Piece {
-            now: self.course.now(),
+        let piece = Segment {
+            now: self.present.now(),
             motion: &motion,
             length: &length,
             derivation: &self.derivation.1,
@@ -199,7 +199,7 @@ impl Execution {
         for running in self.running.values_mut() {
             running.watch(&piece);
         }
-        self.course.pass(to, &motion);
+        self.present.pass(to, &motion);
     }
 
     /// Records a start that the executor commands at the present time.
@@ -217,8 +217,8 @@ impl Execution {
         // The domain's own action, because the executor may have changed it.
         let own = self.task.instantiate(action.schema, &action.arguments);
         let own = own.map_or_else(|_| Arc::clone(action), Arc::new);
-        let time = self.course.time().clone();
-        self.course.begin_group(&time);
+        let time = self.present.time().clone();
+        self.present.begin_group(&time);
         let instance = ActionInstance {
             step: usize::try_from(number).unwrap_or(usize::MAX),
             name: own.name.clone(),
@@ -248,7 +248,7 @@ impl Execution {
             Some(mistake) => Err(Box::new(Violation {
                 time,
                 action: Some(instance),
-                mistake,
+                kind: mistake,
             })),
         }
     }
@@ -301,7 +301,7 @@ impl Execution {
         let Some(body) = running.action.durative() else {
             return;
         };
-        self.trust_end(&running.action);
+        self.mark_end_known(&running.action);
         let duration = time - &running.start;
         self.happen(
             &body.end,
@@ -327,7 +327,7 @@ impl Execution {
         }
         self.cancelled.remove(&number);
         if let Some(running) = self.running.remove(&number) {
-            self.trust_end(&running.action);
+            self.mark_end_known(&running.action);
         }
     }
 
@@ -336,44 +336,44 @@ impl Execution {
         self.cancelled.insert(number);
         if let Some(running) = self.running.get(&number) {
             let action = Arc::clone(&running.action);
-            self.contradict(&action);
+            self.mark_contradicted(&action);
         }
     }
 
     /// Marks the last effects of an action as doubtful, because the reports about it contradict each other or are
     /// missing.
-    pub fn contradict(&mut self, action: &Action) {
+    pub fn mark_contradicted(&mut self, action: &Action) {
         let snap = last_snap(action);
         for effect in &snap.effects {
-            self.course.doubt(&effect.change);
+            self.present.mark_doubtful(&effect.change);
         }
         for effect in action.durative().map_or(&[][..], |body| &body.continuous) {
-            self.course.doubt_value(effect.fluent);
+            self.present.mark_value_doubtful(effect.fluent);
         }
     }
 
     /// Ends the doubt about the effects of an action, because its end is known.
-    fn trust_end(&mut self, action: &Action) {
+    fn mark_end_known(&mut self, action: &Action) {
         for effect in &last_snap(action).effects {
-            self.course.trust(&effect.change);
+            self.present.mark_known(&effect.change);
         }
         for effect in action.durative().map_or(&[][..], |body| &body.continuous) {
-            self.course.trust_value(effect.fluent);
+            self.present.mark_value_known(effect.fluent);
         }
     }
 
     /// Records the truth value of a fact that is seen at `time`.
-    pub fn see_fact(&mut self, time: &Rational, fact: FactId, truth: bool) {
+    pub fn observe_fact(&mut self, time: &Rational, fact: FactId, truth: bool) {
         self.arrive(time);
         if !self.task.is_derived(fact) {
-            self.course.see_fact(fact, truth);
+            self.present.observe_fact(fact, truth);
         }
     }
 
     /// Records the value of a fluent that is seen at `time`.
-    pub fn see_value(&mut self, time: &Rational, fluent: FluentId, value: &Rational) {
+    pub fn observe_value(&mut self, time: &Rational, fluent: FluentId, value: &Rational) {
         self.arrive(time);
-        self.course.see_value(fluent, value);
+        self.present.observe_value(fluent, value);
         // A cancelled action may already have stopped, so it no longer changes the seen value.
         let running = self.running.iter_mut();
         for (_, running) in running.filter(|(number, _)| self.cancelled.contains(number)) {
@@ -389,7 +389,7 @@ impl Execution {
 
     /// Returns whether `goal` holds after all timed initials if no further action starts or ends. Returns `None`
     /// if it reads a doubtful fact or value, or a fluent without a value.
-    pub fn reaches(&self, goal: &Condition) -> Option<bool> {
+    pub fn reaches_goal(&self, goal: &Condition) -> Option<bool> {
         let mut end = self.clone();
         end.running.clear();
         if let Some(last) = end.task.timed().last().map(|timed| timed.time.clone())
@@ -405,7 +405,7 @@ impl Execution {
     pub fn holds(&self, condition: &Condition) -> Option<bool> {
         let mut now = self.clone();
         let time = now.time().clone();
-        now.course.end_group(&time);
+        now.present.end_group(&time);
         now.refresh();
         now.reads(condition, None).ok()
     }
@@ -415,8 +415,8 @@ impl Execution {
         footprint: &Footprint,
         point: Point,
         instance: &ActionInstance,
-    ) -> Option<Mistake> {
-        let time = self.course.time();
+    ) -> Option<ViolationKind> {
+        let time = self.present.time();
         let epsilon = self.task.epsilon();
         let near = |recent: &&Recent| {
             time - &recent.time < *epsilon && recent.footprint.interferes_with(footprint)
@@ -428,7 +428,7 @@ impl Execution {
             action: action.cloned(),
             event: None,
         };
-        Some(Mistake::Interference {
+        Some(ViolationKind::Interference {
             over: over(&self.task, &first.footprint, footprint),
             first: occurrence(&first.time, first.point, first.action.as_ref()),
             second: occurrence(time, point, Some(instance)),
@@ -444,7 +444,7 @@ impl Execution {
         action: Option<(u64, ActionInstance)>,
     ) {
         let (number, action) = action.unzip();
-        let (now, epsilon) = (self.course.time(), self.task.epsilon());
+        let (now, epsilon) = (self.present.time(), self.task.epsilon());
         self.recent.retain(|recent| &recent.time + epsilon > *now);
         self.recent.push_back(Recent {
             time: time.clone(),
@@ -473,14 +473,14 @@ impl Execution {
             .into_iter()
             .partition(|change| matches!(change, Change::Delete(_)));
         for change in deletes.into_iter().chain(others) {
-            self.course.change(change, duration, measured);
+            self.present.change(change, duration, measured);
         }
     }
 
     /// Extends the state to the facts and fluents of the table, and recomputes the rules of derived facts if the
     /// table has grown.
     fn refresh(&mut self) {
-        self.course.fit(&self.task);
+        self.present.extend_to_table(&self.task);
         let count = self.task.fact_count();
         if self.derivation.0 != count {
             let derivation = self.task.derivation().unwrap_or_default();
@@ -489,15 +489,19 @@ impl Execution {
     }
 
     fn moment<'a>(&'a self, duration: Option<&'a Rational>) -> Moment<'a> {
-        self.course.on_arrival(duration)
+        self.present.on_arrival(duration)
     }
 
-    fn reads(&self, condition: &Condition, duration: Option<&Rational>) -> Result<bool, Lack> {
+    fn reads(
+        &self,
+        condition: &Condition,
+        duration: Option<&Rational>,
+    ) -> Result<bool, Indeterminate> {
         let basic = self.moment(duration);
         let (_, derivation) = &self.derivation;
         if derivation.is_read_by(condition) {
             let derived = derivation.derive(&basic);
-            holds(condition, &derivation.on_top_of(&basic, &derived))
+            holds(condition, &derivation.with_derived_facts(&basic, &derived))
         } else {
             holds(condition, &basic)
         }
@@ -506,13 +510,14 @@ impl Execution {
 
 impl Running {
     /// Drops the end effects whose over-all guard fails in a piece of the execution.
-    fn watch(&mut self, piece: &Piece<'_>) {
+    fn watch(&mut self, piece: &Segment<'_>) {
         let includes_start = !std::mem::take(&mut self.is_new);
         let ends = self.action.durative().map_or(&[][..], |it| &it.end.effects);
         for (effect, takes_place) in ends.iter().zip(&mut self.end_guards) {
             let guard = &effect.guard.over_all;
             *takes_place &= guard.is_trivial()
-                || piece.first_break(guard, Some(&self.planned), includes_start) == Ok(None);
+                || piece.first_falsification(guard, Some(&self.planned), includes_start)
+                    == Ok(None);
         }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
 
-use super::reading::Fault;
+use super::evaluate::Fault;
 use super::state::Reading;
 use super::violation::{Occurrence, Reason};
 use crate::derivation::{Moment, holds};
@@ -12,17 +12,17 @@ use crate::ground::{Condition, Expression, FactId};
 use crate::task::Task;
 
 /// Data for an explanation.
-pub(super) struct Witness<'a> {
+pub(super) struct ExplanationContext<'a> {
     pub(super) task: &'a Task,
     /// Numbers at the moment in question.
     pub(super) reading: &'a Reading<'a>,
     /// Facts, derived ones included, at that moment.
     pub(super) moment: &'a dyn Moment<Fault>,
     /// The last change of a fact.
-    pub(super) since: &'a dyn Fn(FactId) -> Option<Occurrence>,
+    pub(super) last_change: &'a dyn Fn(FactId) -> Option<Occurrence>,
 }
 
-impl Witness<'_> {
+impl ExplanationContext<'_> {
     /// Returns the parts of a false condition that prevent it from being true.
     pub(super) fn reasons(&self, condition: &Condition) -> Vec<Reason> {
         let mut reasons = Vec::new();
@@ -39,7 +39,7 @@ impl Witness<'_> {
             Condition::Fact(fact) => reasons.push(Reason::Fact {
                 fact: self.task.fact_name(*fact),
                 is_true,
-                since: (self.since)(*fact),
+                since: (self.last_change)(*fact),
             }),
             Condition::Compare(operator, left, right) => {
                 let value = |side| self.reading.value(side).unwrap_or_default();

@@ -1,23 +1,24 @@
 //! The no-moving-targets rule: minimum separation of interfering happenings.
 
+use super::abort::Abort;
 use super::judge::Judge;
-use super::stop::Stop;
-use super::timeline::{Group, Happening, What};
-use super::violation::Mistake;
+use super::timeline::{Group, Happening, HappeningKind};
+use super::violation::ViolationKind;
 use crate::interference::Footprint;
 use crate::task::Task;
 
 /// Checks the happenings of the last group against each other and against preceding ones that are
 /// close.
-pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), Stop> {
+pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), Abort> {
     let Some((group, earlier)) = groups.split_last() else {
         return Ok(());
     };
-    let touched =
-        |group: &Group<'a>| Touched::by(group.happenings.iter().map(|own| &own.footprint));
+    let touched = |group: &Group<'a>| {
+        AccessIndex::from_footprints(group.happenings.iter().map(|own| &own.footprint))
+    };
     let own = touched(group);
     for (position, second) in group.happenings.iter().enumerate() {
-        let near = own.near(&second.footprint).into_iter();
+        let near = own.candidates(&second.footprint).into_iter();
         for first in near.take_while(|first| *first < position) {
             compare(judge, &group.happenings[first], second)?;
         }
@@ -35,7 +36,7 @@ pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), S
         }
         let own = touched(before);
         for second in &group.happenings {
-            for first in own.near(&second.footprint) {
+            for first in own.candidates(&second.footprint) {
                 let first = &before.happenings[first];
                 if &second.time - &first.time < *separation {
                     compare(judge, first, second)?;
@@ -69,15 +70,15 @@ const AGAINST: [&[usize]; 6] = [
 
 /// Index of the facts and fluents that the happenings of a group access. Of thousands of
 /// simultaneous happenings, most share nothing and need not be compared.
-struct Touched {
+struct AccessIndex {
     count: usize,
     /// Sorted pairs of access, as numbered by [`place`], and position of the happening. `None` if
     /// there are few happenings.
-    by: Option<Vec<(usize, usize)>>,
+    entries: Option<Vec<(usize, usize)>>,
 }
 
-impl Touched {
-    fn by<'a>(footprints: impl ExactSizeIterator<Item = &'a Footprint>) -> Self {
+impl AccessIndex {
+    fn from_footprints<'a>(footprints: impl ExactSizeIterator<Item = &'a Footprint>) -> Self {
         let count = footprints.len();
         let by = (count > FEW).then(|| {
             let mut by = Vec::new();
@@ -88,13 +89,13 @@ impl Touched {
             by.sort_unstable();
             by
         });
-        Self { count, by }
+        Self { count, entries: by }
     }
 
     /// Returns the happenings that may interfere with such a happening, sorted. It may contain
     /// others.
-    fn near(&self, footprint: &Footprint) -> Vec<usize> {
-        let Some(by) = &self.by else {
+    fn candidates(&self, footprint: &Footprint) -> Vec<usize> {
+        let Some(by) = &self.entries else {
             return (0..self.count).collect();
         };
         let mut near = Vec::new();
@@ -138,18 +139,21 @@ fn compare<'a>(
     judge: &Judge<'a>,
     first: &Happening<'a>,
     second: &Happening<'a>,
-) -> Result<(), Stop> {
+) -> Result<(), Abort> {
     // Times of timed initials are no mistake of the plan.
-    let are_both_timed = matches!((first.what, second.what), (What::Timed(_), What::Timed(_)));
+    let are_both_timed = matches!(
+        (first.kind, second.kind),
+        (HappeningKind::Timed(_), HappeningKind::Timed(_))
+    );
     let interfere = first.footprint.interferes_with(&second.footprint);
     if are_both_timed || !interfere || judge.settings.allows_simultaneous_reads {
         return Ok(());
     }
     // The later happening is reported, unless it does not belong to the plan.
-    let blamed = second.what.step().or(first.what.step());
-    let mistake = Mistake::Interference {
-        first: judge.occurrence(first.what, &first.time),
-        second: judge.occurrence(second.what, &second.time),
+    let blamed = second.kind.step().or(first.kind.step());
+    let mistake = ViolationKind::Interference {
+        first: judge.occurrence(first.kind, &first.time),
+        second: judge.occurrence(second.kind, &second.time),
         over: over(judge.task, &first.footprint, &second.footprint),
         separation: (judge.settings.needs_separation).then(|| judge.task.epsilon().clone()),
     };
@@ -214,14 +218,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn those_near_a_happening_are_those_that_interfere_with_it(
+        fn index_returns_all_interfering_happenings(
             all in vec(footprint(), FEW + 1..60),
             one in footprint(),
         ) {
             let interfering = all.iter().enumerate().filter(|(_, other)| other.interferes_with(&one));
             let interfering: Vec<usize> = interfering.map(|(position, _)| position).collect();
-            prop_assert_eq!(Touched::by(all.iter()).near(&one), interfering);
-            let few = Touched::by(all[..FEW].iter()).near(&one);
+            prop_assert_eq!(AccessIndex::from_footprints(all.iter()).candidates(&one), interfering);
+            let few = AccessIndex::from_footprints(all[..FEW].iter()).candidates(&one);
             prop_assert_eq!(few, (0..FEW).collect::<Vec<_>>());
         }
     }

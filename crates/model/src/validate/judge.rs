@@ -5,17 +5,17 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use super::autonomous::Nature;
-use super::explain::Witness;
+use super::abort::{Abort, EvaluationContext};
+use super::autonomous::EventHistory;
+use super::evaluate::Fault;
+use super::explain::ExplanationContext;
 use super::margin::{Demand, Margins};
-use super::piece::{Break, Piece, Stretch};
-use super::preferences::{OfActions, Part};
-use super::reading::Fault;
-use super::state::{Motion, Now, Reading};
-use super::stop::{Place, Stop};
-use super::timeline::{Group, What};
-use super::trajectory::Course;
-use super::violation::{Mistake, Reason, When};
+use super::preferences::{ActionPreferenceMonitor, Part};
+use super::segment::{Falsification, Segment, SegmentPart};
+use super::state::{BasicState, Motion, Reading};
+use super::timeline::{Group, HappeningKind};
+use super::trajectory::TrajectoryMonitor;
+use super::violation::{ConditionTime, Reason, ViolationKind};
 use super::{Settings, effects, interference};
 use crate::derivation::{Derivation, Derived, Moment, holds};
 use crate::ground::{Body, Condition, DurativeBody, FactId, SnapAction};
@@ -31,20 +31,20 @@ pub(super) struct Judge<'a> {
     pub(super) plan: &'a TimeTriggeredPlan,
     pub(super) settings: &'a Settings,
     pub(super) derivation: Derivation,
-    pub(super) now: Now,
+    pub(super) now: BasicState,
     /// Derived facts that hold in `now`, computed on demand.
     pub(super) derived: OnceCell<Derived<Fault>>,
     /// Steps that have started and not ended.
     pub(super) running: BTreeMap<usize, Running>,
     /// Last change of each fact: time and happening.
-    pub(super) since: BTreeMap<FactId, (Rational, What<'a>)>,
+    pub(super) last_changes: BTreeMap<FactId, (Rational, HappeningKind<'a>)>,
     pub(super) margins: Margins,
     /// Constraints on the course; `None` if there are none.
-    pub(super) course: Option<Course<'a>>,
+    pub(super) trajectory: Option<TrajectoryMonitor<'a>>,
     /// Preferences among the conditions of actions.
-    pub(super) preferences: OfActions,
+    pub(super) preferences: ActionPreferenceMonitor,
     /// Processes and events; `None` if there are none.
-    pub(super) nature: Option<Nature>,
+    pub(super) event_history: Option<EventHistory>,
 }
 
 /// A running durative action.
@@ -81,19 +81,19 @@ impl<'a> Judge<'a> {
         &mut self,
         from: Option<&Rational>,
         groups: &[Group<'a>],
-    ) -> Result<(), Stop> {
+    ) -> Result<(), Abort> {
         let mut before = from;
         let begin = from.cloned().unwrap_or_default();
-        self.note_state(&begin)?;
-        if self.nature.is_some() {
+        self.record_state(&begin)?;
+        if self.event_history.is_some() {
             before = Some(&begin);
             self.fire_now(&begin)?;
-            self.note_state(&begin)?;
+            self.record_state(&begin)?;
         }
         for (position, group) in groups.iter().enumerate() {
             if let Some(before) = before.filter(|before| **before < group.time) {
-                if self.nature.is_some() {
-                    self.pass_with_nature(before, &group.time)?;
+                if self.event_history.is_some() {
+                    self.advance_with_autonomous(before, &group.time)?;
                 } else {
                     self.pass(before, &group.time)?;
                 }
@@ -101,41 +101,41 @@ impl<'a> Judge<'a> {
             before = Some(&group.time);
             self.arrive(group)?;
             interference::check(self, &groups[..=position])?;
-            self.keep_from_events(group)?;
+            self.check_separation_from_events(group)?;
             self.apply(group)?;
             self.fire_now(&group.time)?;
-            self.note_state(&group.time)?;
+            self.record_state(&group.time)?;
         }
         let end = before.cloned().unwrap_or_default();
-        if let Some(course) = &self.course {
+        if let Some(course) = &self.trajectory {
             course.violation(self, &end)?;
         }
         let at_end = Group {
             time: end,
             happenings: Vec::new(),
         };
-        self.require(self.task.goal(), When::Goal, None, &at_end)
+        self.require(self.task.goal(), ConditionTime::Goal, None, &at_end)
     }
 
     /// Records the state from `time` on for the constraints on the course.
-    fn note_state(&mut self, time: &Rational) -> Result<(), Stop> {
-        let Some(mut course) = self.course.take() else {
+    fn record_state(&mut self, time: &Rational) -> Result<(), Abort> {
+        let Some(mut course) = self.trajectory.take() else {
             return Ok(());
         };
         course.note(self, time)?;
-        self.course = Some(course);
+        self.trajectory = Some(course);
         Ok(())
     }
 
     /// Advances from just after the group at `from` to the arrival at the next one.
-    fn pass(&mut self, from: &Rational, to: &Rational) -> Result<(), Stop> {
+    fn pass(&mut self, from: &Rational, to: &Rational) -> Result<(), Abort> {
         let rates = effects::rates(self);
         let motion = Motion::from(&self.now, &rates)
-            .map_err(|(step, fault)| self.stop(fault, &Place::rate(from, step)))?;
+            .map_err(|(step, fault)| self.to_abort(fault, &EvaluationContext::rate(from, step)))?;
         let length = to - from;
         self.watch_over_all(from, &motion, &length, None)?;
-        self.watch_course(from, &motion, &length, None)?;
-        motion.carry(&mut self.now, &length);
+        self.record_phases(from, &motion, &length, None)?;
+        motion.advance_state(&mut self.now, &length);
         self.derived.take();
         for running in self.running.values_mut() {
             running.is_new = false;
@@ -145,20 +145,20 @@ impl<'a> Judge<'a> {
 
     /// Records the changes until `length` later for the constraints on the course, in the given
     /// part.
-    pub(super) fn watch_course(
+    pub(super) fn record_phases(
         &mut self,
         from: &Rational,
         motion: &Motion,
         length: &Rational,
-        part: Option<&Stretch>,
-    ) -> Result<(), Stop> {
-        if motion.is_still() && part.is_none() {
+        part: Option<&SegmentPart>,
+    ) -> Result<(), Abort> {
+        if motion.is_constant() && part.is_none() {
             return Ok(());
         }
-        let Some(mut course) = self.course.take() else {
+        let Some(mut course) = self.trajectory.take() else {
             return Ok(());
         };
-        let piece = Piece {
+        let piece = Segment {
             now: &self.now,
             motion,
             length,
@@ -167,7 +167,7 @@ impl<'a> Judge<'a> {
             part,
         };
         course.note_motion(self, &piece, from)?;
-        self.course = Some(course);
+        self.trajectory = Some(course);
         Ok(())
     }
 
@@ -178,30 +178,35 @@ impl<'a> Judge<'a> {
         from: &Rational,
         motion: &Motion,
         length: &Rational,
-        part: Option<&Stretch>,
-    ) -> Result<(), Stop> {
+        part: Option<&SegmentPart>,
+    ) -> Result<(), Abort> {
         let mut running = std::mem::take(&mut self.running);
         let mut margins = std::mem::take(&mut self.margins);
         let mut preferences = std::mem::take(&mut self.preferences);
-        let piece = Piece {
+        let piece = Segment {
             now: &self.now,
             motion,
             length,
             derivation: &self.derivation,
-            slack: self.slack(When::OverAll),
+            slack: self.slack(ConditionTime::OverAll),
             part,
         };
-        let mut first: Option<(Break, Place<'_>)> = None;
+        let mut first: Option<(Falsification, EvaluationContext<'_>)> = None;
         for (&position, state) in &mut running {
             let (step, body) = self.durative(position);
             let duration = step.duration.as_ref();
             let when = (position, duration, state.is_new);
             preferences.watch(&piece, when, (self.task, from));
             for (index, conjunct) in body.over_all.conjuncts().into_iter().enumerate() {
-                let place = Place::condition(from, Some(position), When::OverAll, conjunct);
+                let place = EvaluationContext::condition(
+                    from,
+                    Some(position),
+                    ConditionTime::OverAll,
+                    conjunct,
+                );
                 let broken = piece
-                    .first_break(conjunct, duration, !state.is_new)
-                    .map_err(|fault| self.stop(fault, &place))?;
+                    .first_falsification(conjunct, duration, !state.is_new)
+                    .map_err(|fault| self.to_abort(fault, &place))?;
                 if let Some(broken) = broken
                     && first
                         .as_ref()
@@ -210,24 +215,29 @@ impl<'a> Judge<'a> {
                     first = Some((broken, place));
                 }
                 if let Some(demand) = Demand::of(conjunct) {
-                    let key = (Some(position), When::OverAll, index);
+                    let key = (Some(position), ConditionTime::OverAll, index);
                     margins.watch(key, &demand, &piece, duration, from);
                 }
             }
             for (effect, flag) in body.end.effects.iter().zip(&mut state.end_guards) {
                 let guard = &effect.guard.over_all;
                 if *flag && !guard.is_trivial() {
-                    let place = Place::condition(from, Some(position), When::OverAll, guard);
+                    let place = EvaluationContext::condition(
+                        from,
+                        Some(position),
+                        ConditionTime::OverAll,
+                        guard,
+                    );
                     let broken = piece
-                        .first_break(guard, duration, !state.is_new)
-                        .map_err(|fault| self.stop(fault, &place))?;
+                        .first_falsification(guard, duration, !state.is_new)
+                        .map_err(|fault| self.to_abort(fault, &place))?;
                     *flag = broken.is_none();
                 }
             }
         }
         if let Some((broken, place)) = first {
             let mut then = self.now.clone();
-            motion.carry(&mut then, &broken.witness);
+            motion.advance_state(&mut then, &broken.witness);
             return Err(self.fails(&place, &then, Some(&broken)));
         }
         self.running = running;
@@ -237,30 +247,40 @@ impl<'a> Judge<'a> {
     }
 
     /// Checks the conditions of all happenings of a group, all in the same state.
-    fn arrive(&mut self, group: &Group<'a>) -> Result<(), Stop> {
+    fn arrive(&mut self, group: &Group<'a>) -> Result<(), Abort> {
         for happening in &group.happenings {
             let time = &group.time;
-            match happening.what {
-                What::Timed(_) | What::Event(_) => {}
-                What::Instant(position) => {
+            match happening.kind {
+                HappeningKind::Timed(_) | HappeningKind::Event(_) => {}
+                HappeningKind::Instant(position) => {
                     if let Body::Instantaneous(snap) = &self.plan.steps[position].action.body {
-                        self.require(&snap.condition, When::Now, Some(position), group)?;
-                        self.prefer(position, Part::Start, time);
+                        self.require(&snap.condition, ConditionTime::Now, Some(position), group)?;
+                        self.read_preferences(position, Part::Start, time);
                     }
                 }
-                What::Start(position) => {
+                HappeningKind::Start(position) => {
                     let (_, body) = self.durative(position);
                     self.check_duration(position, false, time)?;
-                    self.require(&body.start.condition, When::Start, Some(position), group)?;
-                    self.prefer(position, Part::Start, time);
+                    self.require(
+                        &body.start.condition,
+                        ConditionTime::Start,
+                        Some(position),
+                        group,
+                    )?;
+                    self.read_preferences(position, Part::Start, time);
                     let running = self.begin(position, time)?;
                     self.running.insert(position, running);
                 }
-                What::End(position) => {
+                HappeningKind::End(position) => {
                     let (_, body) = self.durative(position);
                     self.check_duration(position, true, time)?;
-                    self.require(&body.end.condition, When::End, Some(position), group)?;
-                    self.prefer(position, Part::End, time);
+                    self.require(
+                        &body.end.condition,
+                        ConditionTime::End,
+                        Some(position),
+                        group,
+                    )?;
+                    self.read_preferences(position, Part::End, time);
                 }
             }
         }
@@ -268,19 +288,20 @@ impl<'a> Judge<'a> {
     }
 
     /// Reads the preferences of a step that belong to its start or end.
-    fn prefer(&mut self, position: usize, part: Part, time: &Rational) {
+    fn read_preferences(&mut self, position: usize, part: Part, time: &Rational) {
         let mut preferences = std::mem::take(&mut self.preferences);
         preferences.read(self, position, part, time);
         self.preferences = preferences;
     }
 
     /// Evaluates, at its start, the guards of the effects of an action.
-    fn begin(&self, position: usize, time: &Rational) -> Result<Running, Stop> {
+    fn begin(&self, position: usize, time: &Rational) -> Result<Running, Abort> {
         let (_, body) = self.durative(position);
         let read = |guard: &Condition| {
-            let place = Place::condition(time, Some(position), When::Start, guard);
+            let place =
+                EvaluationContext::condition(time, Some(position), ConditionTime::Start, guard);
             self.reads(guard, Some(position))
-                .map_err(|fault| self.stop(fault, &place))
+                .map_err(|fault| self.to_abort(fault, &place))
         };
         let mut running = Running {
             is_new: true,
@@ -292,14 +313,14 @@ impl<'a> Judge<'a> {
         }
         for effect in &body.continuous {
             if !effect.guard.over_all.is_trivial() {
-                return Err(Stop::continuous_guard(self.task, time, effect.fluent));
+                return Err(Abort::continuous_guard(self.task, time, effect.fluent));
             }
             running.continuous.push(read(&effect.guard.at_start)?);
         }
         Ok(running)
     }
 
-    fn check_duration(&self, position: usize, at_end: bool, time: &Rational) -> Result<(), Stop> {
+    fn check_duration(&self, position: usize, at_end: bool, time: &Rational) -> Result<(), Abort> {
         let (step, body) = self.durative(position);
         let duration = step.duration.clone().unwrap_or_default();
         for constraint in body
@@ -310,12 +331,14 @@ impl<'a> Judge<'a> {
             let value = self
                 .reading(Some(position))
                 .value(&constraint.bound)
-                .map_err(|fault| self.stop(fault, &Place::bound(time, position, constraint)))?;
+                .map_err(|fault| {
+                    self.to_abort(fault, &EvaluationContext::bound(time, position, constraint))
+                })?;
             if !self
                 .settings
                 .allows(constraint.comparison, &duration, &value)
             {
-                let mistake = Mistake::Duration {
+                let mistake = ViolationKind::Duration {
                     duration,
                     comparison: constraint.comparison,
                     bound: self.task.describe_expression(&constraint.bound),
@@ -331,13 +354,13 @@ impl<'a> Judge<'a> {
     fn require(
         &mut self,
         condition: &Condition,
-        when: When,
+        when: ConditionTime,
         step: Option<usize>,
         group: &Group<'a>,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), Abort> {
         let time = &group.time;
         for (index, conjunct) in condition.conjuncts().into_iter().enumerate() {
-            let place = Place::condition(time, step, when, conjunct);
+            let place = EvaluationContext::condition(time, step, when, conjunct);
             match self.reads(conjunct, step) {
                 Ok(true) => {}
                 Ok(false) => {
@@ -353,7 +376,7 @@ impl<'a> Judge<'a> {
                         violation
                     });
                 }
-                Err(fault) => return Err(self.stop(fault, &place)),
+                Err(fault) => return Err(self.to_abort(fault, &place)),
             }
             if let Some(demand) = Demand::of(conjunct) {
                 let mut margins = std::mem::take(&mut self.margins);
@@ -365,9 +388,9 @@ impl<'a> Judge<'a> {
     }
 
     /// Returns the tolerance of comparisons in such a condition.
-    fn slack(&self, when: When) -> &'a Rational {
+    fn slack(&self, when: ConditionTime) -> &'a Rational {
         match when {
-            When::OverAll => &NO_SLACK,
+            ConditionTime::OverAll => &NO_SLACK,
             _ => &self.settings.slack,
         }
     }
@@ -388,7 +411,7 @@ impl<'a> Judge<'a> {
 
     fn reading_of<'b>(
         &'b self,
-        now: &'b Now,
+        now: &'b BasicState,
         (step, slack): (Option<usize>, &'b Rational),
     ) -> Reading<'b> {
         let duration = step.and_then(|position| self.plan.steps[position].duration.as_ref());
@@ -403,7 +426,7 @@ impl<'a> Judge<'a> {
     fn with_moment<T>(
         &self,
         condition: &Condition,
-        (now, derived): (&Now, &OnceCell<Derived<Fault>>),
+        (now, derived): (&BasicState, &OnceCell<Derived<Fault>>),
         (step, slack): (Option<usize>, &Rational),
         look: &dyn Fn(&Reading<'_>, &dyn Moment<Fault>) -> T,
     ) -> T {
@@ -412,7 +435,10 @@ impl<'a> Judge<'a> {
             // Rules cannot read `?duration`.
             let derive = || self.derivation.derive(&self.reading_of(now, (None, slack)));
             let derived = derived.get_or_init(derive);
-            look(&reading, &self.derivation.on_top_of(&reading, derived))
+            look(
+                &reading,
+                &self.derivation.with_derived_facts(&reading, derived),
+            )
         } else {
             look(&reading, &reading)
         }
@@ -422,8 +448,8 @@ impl<'a> Judge<'a> {
     pub(super) fn explain(
         &self,
         condition: &Condition,
-        now: &Now,
-        (step, when): (Option<usize>, When),
+        now: &BasicState,
+        (step, when): (Option<usize>, ConditionTime),
     ) -> Vec<Reason> {
         self.with_moment(
             condition,
@@ -431,14 +457,14 @@ impl<'a> Judge<'a> {
             (step, self.slack(when)),
             &|reading, moment| {
                 let since = |fact| {
-                    let (time, what) = self.since.get(&fact)?;
+                    let (time, what) = self.last_changes.get(&fact)?;
                     Some(self.occurrence(*what, time))
                 };
-                Witness {
+                ExplanationContext {
                     task: self.task,
                     reading,
                     moment,
-                    since: &since,
+                    last_change: &since,
                 }
                 .reasons(condition)
             },
@@ -457,11 +483,11 @@ impl<'a> Judge<'a> {
     }
 
     /// Returns the effects of a happening of the plan; `None` for all others.
-    pub(super) fn snap(&self, what: What<'a>) -> Option<&'a SnapAction> {
+    pub(super) fn snap(&self, what: HappeningKind<'a>) -> Option<&'a SnapAction> {
         let action = &self.plan.steps[what.step()?].action;
         match (&action.body, what) {
             (Body::Instantaneous(snap), _) => Some(snap),
-            (Body::Durative(body), What::End(_)) => Some(&body.end),
+            (Body::Durative(body), HappeningKind::End(_)) => Some(&body.end),
             (Body::Durative(body), _) => Some(&body.start),
         }
     }

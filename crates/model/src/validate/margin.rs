@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use super::piece::Piece;
 use super::polynomial::Polynomial;
+use super::segment::Segment;
 use super::state::Reading;
-use super::violation::{ActionInstance, When};
+use super::violation::{ActionInstance, ConditionTime};
 use crate::ground::{Condition, Expression};
 use crate::problem::Comparison;
 
@@ -17,7 +17,7 @@ pub struct Margin {
     /// The action; `None` for the goal.
     pub action: Option<ActionInstance>,
     /// Condition of the action that contains it.
-    pub when: When,
+    pub when: ConditionTime,
     /// The comparison in PDDL notation.
     pub condition: String,
     /// Difference of the greater and the smaller side at the tightest moment; 0 for equations. For
@@ -75,7 +75,7 @@ fn opposite(comparison: Comparison) -> Option<Comparison> {
 }
 
 /// Step (`None`: the goal), kind, and position among the conjuncts.
-type Key = (Option<usize>, When, usize);
+type Key = (Option<usize>, ConditionTime, usize);
 
 /// Tightest margins until now.
 #[derive(Debug, Default)]
@@ -107,7 +107,7 @@ impl Margins {
         &mut self,
         key: Key,
         demand: &Demand<'_>,
-        piece: &Piece<'_>,
+        piece: &Segment<'_>,
         duration: Option<&Rational>,
         time: &Rational,
     ) {
@@ -141,7 +141,7 @@ impl Margins {
 
 /// Returns the positions of possible minima of a polynomial on a piece. Beyond the second degree,
 /// or if the piece has irrational ends, they are approximated within a millionth.
-fn extremes(polynomial: &Polynomial, piece: &Piece<'_>) -> Vec<Rational> {
+fn extremes(polynomial: &Polynomial, piece: &Segment<'_>) -> Vec<Rational> {
     let (from, to) = piece.ends();
     let mut offsets = vec![from.clone()];
     if polynomial.degree() > 0 {

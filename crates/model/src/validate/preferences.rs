@@ -2,10 +2,10 @@
 
 use elbowroom_num::Rational;
 
+use super::evaluate::Fault;
 use super::judge::Judge;
-use super::piece::Piece;
-use super::reading::Fault;
-use super::violation::{ActionInstance, Difficulty, Undecided};
+use super::segment::Segment;
+use super::violation::{ActionInstance, Undecided, UndecidedReason};
 use crate::grounder::SoftCondition;
 use crate::plan::TimeTriggeredPlan;
 use crate::problem::PreferenceId;
@@ -46,7 +46,7 @@ impl Preferences {
 
 /// Preferences among the conditions of a plan's actions.
 #[derive(Debug, Default)]
-pub(super) struct OfActions {
+pub(super) struct ActionPreferenceMonitor {
     /// By step; empty if no action has any.
     steps: Vec<Vec<Instance>>,
     /// The starts of steps before this one are not part of the plan.
@@ -67,7 +67,7 @@ pub(super) enum Part {
     End,
 }
 
-impl OfActions {
+impl ActionPreferenceMonitor {
     pub(super) fn of(task: &Task, plan: &TimeTriggeredPlan, running: usize) -> Self {
         let preferences = &task.problem().action_preferences;
         if preferences.is_empty() {
@@ -109,7 +109,7 @@ impl OfActions {
     /// Checks the parts that belong to the whole of a running step throughout a piece of time.
     pub(super) fn watch(
         &mut self,
-        piece: &Piece<'_>,
+        piece: &Segment<'_>,
         (step, duration, is_new): (usize, Option<&Rational>, bool),
         (task, from): (&Task, &Rational),
     ) {
@@ -118,7 +118,7 @@ impl OfActions {
             if instance.broken.is_some() || condition.is_trivial() {
                 continue;
             }
-            let found: Result<_, Fault> = piece.first_break(condition, duration, !is_new);
+            let found: Result<_, Fault> = piece.first_falsification(condition, duration, !is_new);
             let broken = match found {
                 Ok(None) => continue,
                 Ok(Some(broken)) => from + broken.at,
@@ -147,7 +147,7 @@ impl OfActions {
                         preference,
                         Undecided {
                             time: None,
-                            difficulty: Difficulty::Past,
+                            reason: UndecidedReason::PastStates,
                         },
                     )),
                     None => {}
@@ -163,7 +163,7 @@ impl<'a> Judge<'a> {
     pub(super) fn preferences_of(&mut self, groups: &[super::timeline::Group<'a>]) -> Preferences {
         let of_actions = std::mem::take(&mut self.preferences);
         let mut preferences = of_actions.into_preferences(self.plan);
-        let Some(course) = &self.course else {
+        let Some(course) = &self.trajectory else {
             return preferences;
         };
         let end = groups.last().map(|group| group.time.clone());

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_num::Rational;
 
+use super::evaluate::{Fault, compare_signs, evaluate};
 use super::instant::Instant;
 use super::polynomial::Polynomial;
-use super::reading::{Fault, compare_signs, evaluate};
 use crate::derivation::Moment;
 use crate::ground::{Expression, FactId, FluentId};
 use crate::problem::Comparison;
@@ -15,14 +15,14 @@ use crate::task::Task;
 
 /// Basic facts and values, by position in the task's tables.
 #[derive(Clone, Debug)]
-pub(super) struct Now {
+pub(super) struct BasicState {
     pub(super) facts: Vec<bool>,
     pub(super) values: Vec<Option<Rational>>,
     /// Fluents with an irrational value, which is not stored: they stopped at an irrational moment.
     irrational: BTreeSet<FluentId>,
 }
 
-impl Now {
+impl BasicState {
     pub(super) fn of(task: &Task, state: &State) -> Self {
         let mut facts = vec![false; task.fact_count()];
         let mut values = vec![None; task.fluent_count()];
@@ -74,7 +74,7 @@ impl Now {
 
 /// Basic facts and numbers as one happening, of an action with this duration, reads them.
 pub(super) struct Reading<'a> {
-    pub(super) now: &'a Now,
+    pub(super) now: &'a BasicState,
     pub(super) duration: Option<&'a Rational>,
     pub(super) slack: &'a Rational,
 }
@@ -119,17 +119,17 @@ pub(super) struct Rate<'a> {
 }
 
 /// Fault of a motion, and the step to report if there is one.
-type Blamed = (Option<usize>, Fault);
+type StepFault = (Option<usize>, Fault);
 
 impl Motion {
     /// Returns the motion from `now` on.
     ///
     /// A rate may itself read fluents that move; the values are then polynomials of a higher
     /// degree. No fluent's rate may depend on the fluent itself.
-    pub(super) fn from(now: &Now, rates: &[Rate<'_>]) -> Result<Self, Blamed> {
+    pub(super) fn from(now: &BasicState, rates: &[Rate<'_>]) -> Result<Self, StepFault> {
         let mut motion = Self::default();
         for (fluent, rates) in in_order(rates)? {
-            let (speed, step) = motion.speed(now, &rates)?;
+            let (speed, step) = motion.total_rate(now, &rates)?;
             let initial = now.value(fluent).map_err(|fault| (step, fault))?;
             let moved = speed.integral(initial.clone());
             motion.0.insert(fluent, moved);
@@ -140,12 +140,12 @@ impl Motion {
     /// Returns the motion from the moment `at` on, the end of the motion `before`, on the same
     /// clock. Fluents that no longer move get their values in `now`. If a coefficient would be
     /// irrational, the fluent has no value any more.
-    pub(super) fn resumed(
-        now: &mut Now,
+    pub(super) fn continued_from(
+        now: &mut BasicState,
         before: &Self,
         rates: &[Rate<'_>],
         at: &Instant,
-    ) -> Result<Self, Blamed> {
+    ) -> Result<Self, StepFault> {
         let ordered = in_order(rates)?;
         let mut motion = Self::default();
         for (&fluent, polynomial) in &before.0 {
@@ -155,7 +155,7 @@ impl Motion {
         }
         for (fluent, rates) in ordered {
             let step = rates[0].step;
-            let parts = motion.speed(now, &rates).and_then(|(speed, _)| {
+            let parts = motion.total_rate(now, &rates).and_then(|(speed, _)| {
                 let before = before.value(now, fluent).map_err(|fault| (step, fault))?;
                 Ok((speed.integral(Rational::ZERO), before))
             });
@@ -175,7 +175,11 @@ impl Motion {
     }
 
     /// Returns the sum of some rates of one fluent, and the last of their steps.
-    fn speed(&self, now: &Now, rates: &[&Rate<'_>]) -> Result<(Polynomial, Option<usize>), Blamed> {
+    fn total_rate(
+        &self,
+        now: &BasicState,
+        rates: &[&Rate<'_>],
+    ) -> Result<(Polynomial, Option<usize>), StepFault> {
         let mut speed = Polynomial::constant(Rational::ZERO);
         let mut step = None;
         for rate in rates {
@@ -188,7 +192,12 @@ impl Motion {
     }
 
     /// Sets a fluent to the value of a polynomial on the clock of the motion.
-    pub(super) fn put(&mut self, now: &mut Now, fluent: FluentId, polynomial: Polynomial) {
+    pub(super) fn set_value(
+        &mut self,
+        now: &mut BasicState,
+        fluent: FluentId,
+        polynomial: Polynomial,
+    ) {
         if let Some(value) = polynomial.as_constant() {
             self.0.remove(&fluent);
             now.set(fluent, Some(value));
@@ -197,7 +206,7 @@ impl Motion {
         }
     }
 
-    pub(super) fn is_still(&self) -> bool {
+    pub(super) fn is_constant(&self) -> bool {
         self.0.is_empty()
     }
 
@@ -206,7 +215,7 @@ impl Motion {
     }
 
     /// Returns the value as a function of the time since `now`.
-    pub(super) fn value(&self, now: &Now, fluent: FluentId) -> Result<Polynomial, Fault> {
+    pub(super) fn value(&self, now: &BasicState, fluent: FluentId) -> Result<Polynomial, Fault> {
         match self.0.get(&fluent) {
             Some(polynomial) => Ok(polynomial.clone()),
             None => Ok(Polynomial::constant(now.value(fluent)?.clone())),
@@ -214,7 +223,7 @@ impl Motion {
     }
 
     /// Advances the state by `elapsed`.
-    pub(super) fn carry(&self, now: &mut Now, elapsed: &Rational) {
+    pub(super) fn advance_state(&self, now: &mut BasicState, elapsed: &Rational) {
         for (fluent, polynomial) in &self.0 {
             now.values[fluent.index()] = Some(polynomial.at(elapsed));
         }
@@ -222,7 +231,9 @@ impl Motion {
 }
 
 /// Returns the rates by fluent, sorted so that those that others read come first.
-fn in_order<'r, 'a>(rates: &'r [Rate<'a>]) -> Result<Vec<(FluentId, Vec<&'r Rate<'a>>)>, Blamed> {
+fn in_order<'r, 'a>(
+    rates: &'r [Rate<'a>],
+) -> Result<Vec<(FluentId, Vec<&'r Rate<'a>>)>, StepFault> {
     let mut terms: BTreeMap<FluentId, Vec<&Rate<'_>>> = BTreeMap::new();
     for rate in rates {
         terms.entry(rate.fluent).or_default().push(rate);

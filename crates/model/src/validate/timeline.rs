@@ -12,7 +12,7 @@ use crate::task::Task;
 
 /// The event of a happening.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum What<'a> {
+pub(super) enum HappeningKind<'a> {
     /// Start of the step at this position.
     Start(usize),
     /// End of the step at this position.
@@ -25,7 +25,7 @@ pub(super) enum What<'a> {
     Event(usize),
 }
 
-impl What<'_> {
+impl HappeningKind<'_> {
     /// Returns the position of the step that it belongs to.
     pub(super) fn step(&self) -> Option<usize> {
         match self {
@@ -38,7 +38,7 @@ impl What<'_> {
 /// A happening with its time and footprint.
 #[derive(Clone, Debug)]
 pub(super) struct Happening<'a> {
-    pub(super) what: What<'a>,
+    pub(super) kind: HappeningKind<'a>,
     pub(super) time: Rational,
     pub(super) footprint: Footprint,
 }
@@ -69,20 +69,20 @@ pub(super) fn timeline<'a>(
             let end = &time + duration;
             if position >= running {
                 happenings.push(Happening {
-                    what: What::Start(position),
+                    kind: HappeningKind::Start(position),
                     time,
                     footprint,
                 });
             }
             let footprint = Footprint::of_end(task, &step.action);
             happenings.push(Happening {
-                what: What::End(position),
+                kind: HappeningKind::End(position),
                 time: end,
                 footprint,
             });
         } else {
             happenings.push(Happening {
-                what: What::Instant(position),
+                kind: HappeningKind::Instant(position),
                 time,
                 footprint,
             });
@@ -97,7 +97,7 @@ pub(super) fn timeline<'a>(
         |timed: &&TimedHappening| situation.is_none_or(|situation| timed.time > situation.time);
     for timed in task.timed().iter().filter(is_to_come) {
         happenings.push(Happening {
-            what: What::Timed(timed),
+            kind: HappeningKind::Timed(timed),
             time: timed.time.clone(),
             footprint: Footprint::of_timed(timed),
         });

@@ -8,26 +8,26 @@
 
 use elbowroom_num::Rational;
 
+use super::abort::{Abort, EvaluationContext};
+use super::constraint_monitor::{ConstraintMonitor, Finding, PhaseStart};
+use super::evaluate::Fault;
 use super::judge::Judge;
-use super::piece::Piece;
-use super::reading::Fault;
-use super::stop::{Place, Stop};
-use super::track::{Beginning, Finding, Track};
-use super::violation::{Difficulty, Mistake, Undecided, When};
+use super::segment::Segment;
+use super::violation::{ConditionTime, Undecided, UndecidedReason, ViolationKind};
 use crate::constraint::{Constraints, Modal};
 use crate::ground::Condition;
 
 /// Phases of all constraints of a task.
 #[derive(Debug)]
-pub(super) struct Course<'a> {
+pub(super) struct TrajectoryMonitor<'a> {
     constraints: &'a Constraints,
-    hard: Vec<Track>,
-    soft: Vec<Vec<Track>>,
+    hard: Vec<ConstraintMonitor>,
+    soft: Vec<Vec<ConstraintMonitor>>,
 }
 
-impl<'a> Course<'a> {
+impl<'a> TrajectoryMonitor<'a> {
     pub(super) fn new(constraints: &'a Constraints) -> Self {
-        let tracks = |count| vec![Track::default(); count];
+        let tracks = |count| vec![ConstraintMonitor::default(); count];
         Self {
             constraints,
             hard: tracks(constraints.hard.len()),
@@ -42,8 +42,8 @@ impl<'a> Course<'a> {
     /// Calls `visit` for each constraint with its track, and `true` if it is hard.
     fn visit(
         &mut self,
-        mut visit: impl FnMut(&'a Modal<Condition>, &mut Track, bool) -> Result<(), Stop>,
-    ) -> Result<(), Stop> {
+        mut visit: impl FnMut(&'a Modal<Condition>, &mut ConstraintMonitor, bool) -> Result<(), Abort>,
+    ) -> Result<(), Abort> {
         for (modal, track) in self.constraints.hard.iter().zip(&mut self.hard) {
             visit(modal, track, true)?;
         }
@@ -56,7 +56,7 @@ impl<'a> Course<'a> {
     }
 
     /// Records the present state, which begins at `time`.
-    pub(super) fn note(&mut self, judge: &Judge<'_>, time: &Rational) -> Result<(), Stop> {
+    pub(super) fn note(&mut self, judge: &Judge<'_>, time: &Rational) -> Result<(), Abort> {
         self.visit(|modal, track, is_hard| {
             let mut holds = [false; 2];
             for (condition, holds) in modal.conditions().into_iter().zip(&mut holds) {
@@ -71,11 +71,11 @@ impl<'a> Course<'a> {
             let now = &judge.now;
             let explain = || match modal.conditions().first() {
                 Some(condition) if is_hard && explains(modal) => {
-                    judge.explain(condition, now, (None, When::Course))
+                    judge.explain(condition, now, (None, ConditionTime::Trajectory))
                 }
                 _ => Vec::new(),
             };
-            track.push(Beginning::at(time), holds, explain);
+            track.push(PhaseStart::at(time), holds, explain);
             Ok(())
         })
     }
@@ -84,26 +84,27 @@ impl<'a> Course<'a> {
     pub(super) fn note_motion(
         &mut self,
         judge: &Judge<'_>,
-        piece: &Piece<'_>,
+        piece: &Segment<'_>,
         from: &Rational,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), Abort> {
         self.visit(|modal, track, is_hard| {
             let conditions = modal.conditions();
-            let place = Place::condition(from, None, When::Course, conditions[0]);
+            let place =
+                EvaluationContext::condition(from, None, ConditionTime::Trajectory, conditions[0]);
             let cells = match piece.course(&conditions) {
                 Ok(cells) => cells,
                 Err(fault @ (Fault::Undefined(_) | Fault::DivisionByZero(_))) if !is_hard => {
                     let _ = fault;
                     return Ok(());
                 }
-                Err(fault) => return Err(judge.stop(fault, &place)),
+                Err(fault) => return Err(judge.to_abort(fault, &place)),
             };
             for cell in cells {
                 let mut holds = [false; 2];
                 for (known, holds) in cell.holds.iter().zip(&mut holds) {
                     *holds = *known;
                 }
-                let beginning = Beginning {
+                let beginning = PhaseStart {
                     time: from + cell.at,
                     is_exact: cell.is_exact,
                     is_after: cell.is_open,
@@ -115,27 +116,27 @@ impl<'a> Course<'a> {
     }
 
     /// Returns the first violation of a hard constraint, for a plan that ends at `end`.
-    pub(super) fn violation(&self, judge: &Judge<'_>, end: &Rational) -> Result<(), Stop> {
-        if self.constraints.is_past_lost && !self.constraints.hard.is_empty() {
-            return Err(undecided(None, Difficulty::Past));
+    pub(super) fn violation(&self, judge: &Judge<'_>, end: &Rational) -> Result<(), Abort> {
+        if self.constraints.depends_on_unknown_past && !self.constraints.hard.is_empty() {
+            return Err(undecided(None, UndecidedReason::PastStates));
         }
-        let mut first: Option<(Beginning, Mistake)> = None;
+        let mut first: Option<(PhaseStart, ViolationKind)> = None;
         let mut unclear = None;
         for (modal, track) in self.constraints.hard.iter().zip(&self.hard) {
             match track.finding(judge.task, modal, end) {
-                Finding::Kept => {}
+                Finding::Satisfied => {}
                 Finding::Unclear(time) => {
                     unclear.get_or_insert_with(|| (time, judge.task.describe_modal(modal)));
                 }
-                Finding::Broken(at, why, reasons) => {
-                    let key = |at: &Beginning| (at.time.clone(), at.is_after);
+                Finding::Violated(at, why, reasons) => {
+                    let key = |at: &PhaseStart| (at.time.clone(), at.is_after);
                     if first
                         .as_ref()
                         .is_some_and(|(earlier, _)| key(earlier) <= key(&at))
                     {
                         continue;
                     }
-                    let mistake = Mistake::Constraint {
+                    let mistake = ViolationKind::Constraint {
                         constraint: judge.task.describe_modal(modal),
                         why,
                         is_after: at.is_after,
@@ -148,9 +149,10 @@ impl<'a> Course<'a> {
         }
         match (first, unclear) {
             (Some((at, mistake)), _) => Err(judge.violation(&at.time, None, mistake)),
-            (None, Some((time, constraint))) => {
-                Err(undecided(Some(time), Difficulty::CloseTimes { constraint }))
-            }
+            (None, Some((time, constraint))) => Err(undecided(
+                Some(time),
+                UndecidedReason::CloseTimes { constraint },
+            )),
             (None, None) => Ok(()),
         }
     }
@@ -164,24 +166,24 @@ impl<'a> Course<'a> {
         let constraints = self.constraints.soft.iter().zip(&self.soft);
         constraints
             .map(|(soft, tracks)| {
-                if self.constraints.is_past_lost {
+                if self.constraints.depends_on_unknown_past {
                     return Err(Undecided {
                         time: None,
-                        difficulty: Difficulty::Past,
+                        reason: UndecidedReason::PastStates,
                     });
                 }
                 let mut unclear = None;
                 for (modal, track) in soft.all.iter().zip(tracks) {
                     let constraint = || judge.task.describe_modal(modal);
                     match track.finding(judge.task, modal, end) {
-                        Finding::Kept => {}
-                        Finding::Broken(at, why, _) => {
+                        Finding::Satisfied => {}
+                        Finding::Violated(at, why, _) => {
                             return Ok(Some((at.time, format!("{}: {why}", constraint()))));
                         }
                         Finding::Unclear(time) => {
                             unclear = Some(Undecided {
                                 time: Some(time),
-                                difficulty: Difficulty::CloseTimes {
+                                reason: UndecidedReason::CloseTimes {
                                     constraint: constraint(),
                                 },
                             });
@@ -194,8 +196,11 @@ impl<'a> Course<'a> {
     }
 }
 
-fn undecided(time: Option<Rational>, difficulty: Difficulty) -> Stop {
-    Stop::Undecided(Box::new(Undecided { time, difficulty }))
+fn undecided(time: Option<Rational>, difficulty: UndecidedReason) -> Abort {
+    Abort::Undecided(Box::new(Undecided {
+        time,
+        reason: difficulty,
+    }))
 }
 
 /// Returns the truth value. An undefined soft condition does not hold.
@@ -205,12 +210,12 @@ fn truth(
     condition: &Condition,
     time: &Rational,
     is_hard: bool,
-) -> Result<bool, Stop> {
+) -> Result<bool, Abort> {
     match read {
         Err(Fault::Undefined(_) | Fault::DivisionByZero(_)) if !is_hard => Ok(false),
-        Err(fault) => Err(judge.stop(
+        Err(fault) => Err(judge.to_abort(
             fault,
-            &Place::condition(time, None, When::Course, condition),
+            &EvaluationContext::condition(time, None, ConditionTime::Trajectory, condition),
         )),
         Ok(truth) => Ok(truth),
     }

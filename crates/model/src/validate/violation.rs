@@ -13,7 +13,7 @@ pub struct Violation {
     /// The responsible action; `None` for the goal.
     pub action: Option<ActionInstance>,
     /// Kind of violation.
-    pub mistake: Mistake,
+    pub kind: ViolationKind,
 }
 
 /// One action of a plan.
@@ -40,7 +40,7 @@ impl ActionInstance {
 
 /// A kind of violation.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Mistake {
+pub enum ViolationKind {
     /// An action starts at this time, before the plan begins.
     TooEarly(Rational),
     /// The plan does not continue this action, which is running when the plan begins.
@@ -72,7 +72,7 @@ pub enum Mistake {
     /// A condition does not hold.
     Condition {
         /// Kind of condition.
-        when: When,
+        when: ConditionTime,
         /// The condition in PDDL notation.
         condition: String,
         /// `true` if it still holds at the given time, and fails right after it.
@@ -142,7 +142,7 @@ pub enum Mistake {
 
 /// Condition of an action, by its time specifier, or the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum When {
+pub enum ConditionTime {
     /// Condition of an instantaneous action.
     Now,
     /// At start.
@@ -154,7 +154,7 @@ pub enum When {
     /// The goal.
     Goal,
     /// Constraint on the course of the plan.
-    Course,
+    Trajectory,
 }
 
 /// Reason why a condition is false: one of its parts.
@@ -221,12 +221,12 @@ pub struct Undecided {
     /// Time at which the difficulty arises; `None` if it is before any happening.
     pub time: Option<Rational>,
     /// The difficulty.
-    pub difficulty: Difficulty,
+    pub reason: UndecidedReason,
 }
 
 /// Reason why the validator cannot evaluate a condition.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Difficulty {
+pub enum UndecidedReason {
     /// An open number is read.
     Open {
         /// Its name.
@@ -260,7 +260,7 @@ pub enum Difficulty {
         fluent: String,
     },
     /// A constraint on the whole course depends on states before the plan begins.
-    Past,
+    PastStates,
     /// A constraint depends on the order of two times that are less than a millionth apart, one of
     /// them irrational.
     CloseTimes {

@@ -17,7 +17,7 @@ const MILLISECONDS: i64 = 1000;
 /// # Errors
 /// A description of the mistake in the name.
 pub(super) fn by_name(name: &str, lower: &Bound, upper: &Bound) -> Result<Duration, String> {
-    let seconds = Named::parse(name)?;
+    let seconds = NamedDistribution::parse(name)?;
     let scaled = seconds.scaled(&Rational::from(MILLISECONDS));
     let contains = |duration: &Duration| {
         let typical = typical(duration);
@@ -56,7 +56,7 @@ fn typical(duration: &Duration) -> Rational {
 }
 
 /// Distribution with the numbers of its name.
-struct Named {
+struct NamedDistribution {
     kind: Kind,
     first: Rational,
     second: Rational,
@@ -70,7 +70,7 @@ enum Kind {
     Gamma,
 }
 
-impl Named {
+impl NamedDistribution {
     fn parse(name: &str) -> Result<Self, String> {
         let wrong = || format!("the distribution `{name}` is not known");
         let (letter, rest) = name.split_once('_').ok_or_else(wrong)?;
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn names_count_in_seconds_and_bounds_in_milliseconds() {
+    fn named_parameters_are_seconds_and_bounds_milliseconds() {
         assert_eq!(
             unbounded("N_12.5_2."),
             Ok(Duration::Normal {
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_that_only_fit_without_the_factor_say_that_there_is_none() {
+    fn bounds_that_fit_unscaled_are_reported() {
         let bounds = |lower, upper| {
             let finite = |number: i64| Bound::Finite(Rational::from(number));
             by_name("U_2_6", &finite(lower), &finite(upper))

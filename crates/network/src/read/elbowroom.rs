@@ -4,12 +4,12 @@
 use elbowroom_num::Rational;
 use elbowroom_stn::NodeId;
 
-use super::{bound, bound_or, list, number, required};
+use super::{bound, list, number, optional_bound, required};
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Correlation, Duration, Format, GivenWait, NetworkFile};
 use crate::json::{Json, Value};
-use crate::mistake::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// The value of the member `format`.
 pub(crate) const FORMAT: &str = "elbowroom-network";
@@ -92,8 +92,8 @@ fn ends(
 }
 
 fn bounds(json: &Json<'_>, report: &mut Report) -> Option<(Bound, Bound)> {
-    let lower = bound_or(json, "lower", Bound::NegativeInfinity, report);
-    let upper = bound_or(json, "upper", Bound::Infinity, report);
+    let lower = optional_bound(json, "lower", Bound::NegativeInfinity, report);
+    let upper = optional_bound(json, "upper", Bound::Infinity, report);
     lower.zip(upper)
 }
 

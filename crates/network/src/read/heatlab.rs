@@ -7,12 +7,12 @@
 
 use elbowroom_stn::NodeId;
 
-use super::{bound_or, distribution, list, point_name, required};
+use super::{distribution, list, optional_bound, point_name, required};
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Duration, Format, NetworkFile};
 use crate::json::Json;
-use crate::mistake::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// Name of the node that serves as time zero.
 const REFERENCE: &str = "0";
@@ -49,8 +49,8 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFi
 /// Adds the bounds on the time of a node, relative to the reference point.
 fn domain(builder: &mut Builder, ends: (NodeId, NodeId), node: &Json<'_>, report: &mut Report) {
     let least = Bound::Finite(elbowroom_num::Rational::ZERO);
-    let lower = bound_or(node, "min_domain", least, report);
-    let upper = bound_or(node, "max_domain", Bound::Infinity, report);
+    let lower = optional_bound(node, "min_domain", least, report);
+    let upper = optional_bound(node, "max_domain", Bound::Infinity, report);
     if let (Some(lower), Some(upper)) = (lower, upper) {
         builder.requirement(ends, (lower, upper), node.at, report);
     }
@@ -64,8 +64,8 @@ fn read_constraint(builder: &mut Builder, constraint: &Json<'_>, report: &mut Re
         builder.named(&name, json.at, report)
     };
     let (first, second) = (end("first_node"), end("second_node"));
-    let lower = bound_or(constraint, "min_duration", Bound::NegativeInfinity, report);
-    let upper = bound_or(constraint, "max_duration", Bound::Infinity, report);
+    let lower = optional_bound(constraint, "min_duration", Bound::NegativeInfinity, report);
+    let upper = optional_bound(constraint, "max_duration", Bound::Infinity, report);
     let (Some(first), Some(second), Some(lower), Some(upper)) = (first, second, lower, upper)
     else {
         return;

@@ -22,14 +22,14 @@
 
 use crate::builder::{Builder, GivenLink};
 use crate::file::{Format, NetworkFile};
-use crate::mistake::Report;
 use crate::number::Bound;
+use crate::report::Report;
 
 /// The section that a line belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Section {
     Kind,
-    Count(What),
+    Count(HeaderCount),
     Names,
     Edges,
     Links,
@@ -37,7 +37,7 @@ enum Section {
 
 /// A count in the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum What {
+enum HeaderCount {
     Points,
     Edges,
     Links,
@@ -54,9 +54,9 @@ impl Section {
         let counts = has("num") || has("number");
         Some(match () {
             () if has("kind") => Self::Kind,
-            () if has("points") && counts => Self::Count(What::Points),
-            () if has("edges") && counts => Self::Count(What::Edges),
-            () if has("links") && counts => Self::Count(What::Links),
+            () if has("points") && counts => Self::Count(HeaderCount::Points),
+            () if has("edges") && counts => Self::Count(HeaderCount::Edges),
+            () if has("links") && counts => Self::Count(HeaderCount::Links),
             () if has("names") => Self::Names,
             () if has("edges") => Self::Edges,
             () if has("links") => Self::Links,
@@ -70,7 +70,7 @@ struct Reader {
     builder: Builder,
     /// Numbers of time points, edges and links that the file declares, with the positions of these
     /// declarations.
-    announced: Vec<(What, usize, usize)>,
+    declared_counts: Vec<(HeaderCount, usize, usize)>,
     edges: usize,
     links: usize,
 }
@@ -78,7 +78,7 @@ struct Reader {
 pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
     let mut reader = Reader {
         builder: Builder::new(Format::Plain),
-        announced: Vec::new(),
+        declared_counts: Vec::new(),
         edges: 0,
         links: 0,
     };
@@ -142,7 +142,7 @@ impl Reader {
                 }
             }
             Some(Section::Count(what)) => match first.parse() {
-                Ok(count) => self.announced.push((what, count, at)),
+                Ok(count) => self.declared_counts.push((what, count, at)),
                 Err(_) => report.mistake(at, "this is no count", "write a whole number"),
             },
             Some(Section::Names) => {
@@ -213,11 +213,11 @@ impl Reader {
     /// Compares the declared counts with the actual ones. A wrong count may mean that the file is
     /// truncated, but the network can still be used, so it is only a remark.
     fn check_counts(&self, report: &mut Report) {
-        for &(what, announced, at) in &self.announced {
+        for &(what, announced, at) in &self.declared_counts {
             let (found, name) = match what {
-                What::Points => (self.builder.nodes().count(), "time points"),
-                What::Edges => (self.edges, "ordinary edges"),
-                What::Links => (self.links, "contingent links"),
+                HeaderCount::Points => (self.builder.nodes().count(), "time points"),
+                HeaderCount::Edges => (self.edges, "ordinary edges"),
+                HeaderCount::Links => (self.links, "contingent links"),
             };
             if found == 0 && announced > 0 {
                 report.mistake(

@@ -61,13 +61,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_came_from_a_float_goes_back(value in any::<f64>()) {
+        fn float_round_trips(value in any::<f64>()) {
             let exact = Rational::from_f64_exactly(value);
             prop_assert_eq!(exact.map(|it| it.to_f64()), Some(value).filter(|it| it.is_finite()));
         }
 
         #[test]
-        fn what_is_written_is_nearer_to_its_float_than_to_any_other(value in any::<f64>()) {
+        fn written_decimal_is_nearest_to_its_float(value in any::<f64>()) {
             let written = Rational::from_f64_as_written(value);
             let exact = Rational::from_f64_exactly(value);
             prop_assert_eq!(written.is_some(), value.is_finite());
@@ -78,7 +78,7 @@ mod tests {
         }
 
         #[test]
-        fn nothing_on_the_grid_is_nearer(
+        fn rounding_gives_nearest_grid_value(
             value in -1e12..1e12_f64,
             (numerator, denominator) in (1..10_000_i64, 1..10_000_i64),
         ) {
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_multiples_rounds_nothing() {
+    fn rounding_to_invalid_grid_is_refused() {
         for grid in [Rational::ZERO, Rational::from(-1)] {
             assert_eq!(Rational::from_f64_rounded(1.0, &grid), None);
         }

@@ -18,7 +18,7 @@ fn decimals_and_fractions_are_read_exactly() {
 }
 
 #[test]
-fn what_is_no_number_is_refused() {
+fn malformed_numbers_are_refused() {
     for text in [
         "",
         "-",
@@ -107,7 +107,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_written_is_read_back(a in any_rational()) {
+    fn formatted_numbers_round_trip(a in any_rational()) {
         prop_assert_eq!(rational(&a.to_string()), a);
     }
 

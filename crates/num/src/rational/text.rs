@@ -65,7 +65,7 @@ const LARGEST_EXPONENT: i32 = 400;
 /// Limit on the bits of numerator and denominator. It ensures that a number that was parsed and
 /// written as a fraction with its sign is no longer than [`LONGEST_NUMERAL`] on either side, and
 /// can be parsed again.
-const MOST_BITS: usize = 1_325;
+const MAX_BITS: usize = 1_325;
 
 /// Reads `12`, `-3.5`, `+.5`, `1e-3` and `p/q` exactly.
 impl FromStr for Rational {
@@ -93,7 +93,7 @@ fn has_few_digits(number: &Rational) -> bool {
     match &number.0 {
         Small(..) => true,
         Big(big) => {
-            big.numerator().bit_len() <= MOST_BITS && big.denominator().bit_len() <= MOST_BITS
+            big.numerator().bit_len() <= MAX_BITS && big.denominator().bit_len() <= MAX_BITS
         }
     }
 }
@@ -145,7 +145,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_read_can_be_written_and_read_again(
+        fn parsed_numbers_round_trip(
             digits in "-?[0-9]{1,420}",
             part in "[0-9]{0,12}",
             exponent in -420..420_i32,

@@ -238,7 +238,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
 
     #[test]
-    fn the_verdict_is_that_of_fourier_and_motzkin_and_comes_with_a_proof(
+    fn verdict_equals_fourier_motzkin_with_proof(
         inequalities in inequalities(1..8),
     ) {
         let mut system = System::new(VARIABLES);
@@ -257,7 +257,7 @@ proptest! {
     }
 
     #[test]
-    fn optima_are_those_of_fourier_and_motzkin(
+    fn optima_equal_fourier_motzkin(
         inequalities in inequalities(1..8),
         objectives in prop::collection::vec(coefficients(), 1..4),
     ) {
@@ -283,7 +283,7 @@ proptest! {
     }
 
     #[test]
-    fn popping_leads_back_to_the_system_as_it_was(
+    fn pop_restores_system(
         base in inequalities(1..5),
         levels in prop::collection::vec(inequalities(1..3), 1..4),
         checks in prop::collection::vec(any::<bool>(), 4),

@@ -10,17 +10,17 @@ use super::tables::ends;
 use crate::document::{Slider, Sliders};
 
 /// Maximum number of sliders.
-const MOST: usize = 100;
+const MAX_SLIDERS: usize = 100;
 
 /// A quantity with its interval, also as text. The text is empty if the interval is unbounded.
-pub(crate) struct Reach<'a> {
+pub(crate) struct SliderInterval<'a> {
     pub(crate) quantity: &'a Quantity,
     pub(crate) lower: Option<&'a Rational>,
     pub(crate) upper: Option<&'a Rational>,
     pub(crate) words: String,
 }
 
-impl<'a> Reach<'a> {
+impl<'a> SliderInterval<'a> {
     /// Returns the quantity's interval in the envelope.
     pub(super) fn of(range: &'a Range) -> Self {
         let (lower, upper) = ends(range);
@@ -36,10 +36,10 @@ impl<'a> Reach<'a> {
 /// Returns sliders for the quantities of a plan; `None` if there are none or too many.
 pub(crate) fn sliders(
     timeline: &Timeline,
-    reaches: &[Reach<'_>],
+    reaches: &[SliderInterval<'_>],
     inequalities: &Inequalities,
 ) -> Option<Sliders> {
-    if reaches.is_empty() || reaches.len() > MOST {
+    if reaches.is_empty() || reaches.len() > MAX_SLIDERS {
         return None;
     }
     let labels = inequalities.times.iter().enumerate();
@@ -71,7 +71,7 @@ pub(crate) fn sliders(
 
 /// Returns a slider from half to five times the nominal value, or slightly beyond the envelope if
 /// that is larger.
-fn slider(reach: &Reach<'_>) -> Slider {
+fn slider(reach: &SliderInterval<'_>) -> Slider {
     let nominal = &reach.quantity.nominal;
     let half = Rational::new(1, 2);
     let size = nominal.abs();

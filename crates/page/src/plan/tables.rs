@@ -1,9 +1,9 @@
 //! Tables of a plan.
 
 use elbowroom::answers::envelope::timeline::{TimedAction, Timeline, WindowAnswer};
-use elbowroom::answers::envelope::{Quantity, Range, Room};
+use elbowroom::answers::envelope::{LimitedRange, Quantity, Range};
 use elbowroom::num::{End, Rational};
-use elbowroom::report::short::{Rounding, between, nearest};
+use elbowroom::report::decimal::{Rounding, nearest, rounded_inwards};
 
 use super::window_words;
 use crate::document::{Table, Text, Texts};
@@ -12,7 +12,7 @@ use crate::document::{Table, Text, Texts};
 pub(super) fn ends(range: &Range) -> (String, String) {
     let nominal = &range.quantity.nominal;
     let end = |end: &End, infinite: &str, rounding| match end.value() {
-        Some(value) => between(value, nominal, rounding),
+        Some(value) => rounded_inwards(value, nominal, rounding),
         None => infinite.to_owned(),
     };
     (
@@ -29,7 +29,7 @@ fn columns(names: &[(&str, bool)]) -> Vec<(String, bool)> {
 }
 
 /// Builds the table of the envelope.
-pub(super) fn rooms(rooms: &[Room], texts: &mut Texts) -> Table {
+pub(super) fn slack_table(rooms: &[LimitedRange], texts: &mut Texts) -> Table {
     let mut limit = |limit: &Option<String>| match limit {
         Some(limit) => texts.share(limit),
         None => "".into(),

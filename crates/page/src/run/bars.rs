@@ -1,14 +1,14 @@
 //! Plans and executed actions, action by action.
 
-mod drawn;
+mod drawing;
 
 use std::collections::{BTreeMap, VecDeque};
 
 use elbowroom::answers::Exact;
 use elbowroom::answers::envelope::timeline::WindowAnswer;
 use elbowroom::num::Rational;
-use elbowroom::report::line::{
-    BoundLine, DecisionLine, ExecutedLine, GivenLine, ObservationLine, PlanLine, WindowLine,
+use elbowroom::report::schema::{
+    BoundLine, DecisionLine, ExecutedLine, IssuedCommandLine, ObservationLine, PlanLine, WindowLine,
 };
 use elbowroom::report::trace::{Line, SnapshotLine};
 
@@ -32,7 +32,7 @@ pub(super) struct Bars {
     /// Starts, by ticket.
     starts: BTreeMap<u64, Start>,
     /// Times at which plans were abandoned, with the reasons.
-    given_up: Vec<(Rational, String)>,
+    abandoned: Vec<(Rational, String)>,
 }
 
 /// A step of a plan, in the world's time.
@@ -72,12 +72,12 @@ impl Bars {
                 }
                 DecisionLine::Replan => {
                     let words = decided.reason.words.clone();
-                    self.given_up.push((decided.now.0.clone(), words));
+                    self.abandoned.push((decided.now.0.clone(), words));
                 }
                 _ => {}
             },
             Line::Command(command) => {
-                if let GivenLine::Start {
+                if let IssuedCommandLine::Start {
                     ticket,
                     action,
                     duration,
@@ -127,13 +127,13 @@ impl Bars {
                 let running = planning.situation.running.iter();
                 self.running = running.map(|running| running.action.clone()).collect();
             }
-            Line::Over(report) => self.executed(&report.executed),
+            Line::Over(report) => self.add_executed_steps(&report.executed),
             _ => {}
         }
     }
 
     /// Adds the starts from a snapshot at a rotation: running and recently ended actions.
-    pub(super) fn known(&mut self, snapshot: &SnapshotLine) {
+    pub(super) fn add_snapshot_starts(&mut self, snapshot: &SnapshotLine) {
         let time = |it: &Option<Exact>| it.as_ref().map(|it| it.0.clone());
         for known in &snapshot.starts {
             let start = Start {
@@ -156,7 +156,7 @@ impl Bars {
     }
 
     /// Adds the executed steps of the run's report, which overrides contradictory observations.
-    pub(super) fn executed(&mut self, executed: &[ExecutedLine]) {
+    pub(super) fn add_executed_steps(&mut self, executed: &[ExecutedLine]) {
         for done in executed {
             let begun = done.start.0.clone();
             let start = self.starts.entry(done.ticket).or_insert_with(|| Start {

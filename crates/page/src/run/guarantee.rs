@@ -1,7 +1,7 @@
 //! Guarantee over the time of a run, with the reasons for its changes.
 
-use elbowroom::report::line::{DecisionLine, ObservationLine, WindowLine};
-use elbowroom::report::short::nearest;
+use elbowroom::report::decimal::nearest;
+use elbowroom::report::schema::{DecisionLine, ObservationLine, WindowLine};
 use elbowroom::report::trace::Line;
 
 use super::bars::Bars;
@@ -56,7 +56,7 @@ impl Guarantees {
                         self.change(at, -1, "none", &words, "");
                     }
                     (_, Some(promise)) => {
-                        let (level, words) = meaning(promise);
+                        let (level, words) = level_and_meaning(promise);
                         self.change(at, level, promise, words, &decided.reason.words);
                     }
                     (_, None) => {
@@ -106,7 +106,7 @@ impl Guarantees {
 }
 
 /// Returns the level and the meaning of a guarantee.
-fn meaning(promise: &str) -> (i8, &'static str) {
+fn level_and_meaning(promise: &str) -> (i8, &'static str) {
     match promise {
         "envelope" => (
             3,

@@ -1,8 +1,8 @@
 //! Log of a trace: each line as text.
 
 use elbowroom::num::Rational;
-use elbowroom::report::line::{DecisionLine, GivenLine, ObservationLine, WindowLine};
-use elbowroom::report::short::nearest;
+use elbowroom::report::decimal::nearest;
+use elbowroom::report::schema::{DecisionLine, IssuedCommandLine, ObservationLine, WindowLine};
 use elbowroom::report::trace::Line;
 
 use super::bars::{Bars, answer};
@@ -45,18 +45,24 @@ impl Log {
             }
             Line::Command(command) => {
                 let what = match &command.command {
-                    GivenLine::Start { action, .. } => format!("start {action}"),
-                    GivenLine::Cancel { ticket } => {
+                    IssuedCommandLine::Start { action, .. } => format!("start {action}"),
+                    IssuedCommandLine::Cancel { ticket } => {
                         format!("cancel {}", bars.action(*ticket).unwrap_or("an action"))
                     }
                 };
-                let due = due(&command.planned);
+                let due = due_text(&command.planned);
                 self.add(&command.now.0, "command", what, due, String::new());
             }
             Line::Observed(observed) => {
                 let (time, what) = observation(&observed.observation, bars);
                 let remark = observed.remark.clone().unwrap_or_default();
-                self.add(time, "observation", what, due(&observed.planned), remark);
+                self.add(
+                    time,
+                    "observation",
+                    what,
+                    due_text(&observed.planned),
+                    remark,
+                );
             }
             Line::Planning(planning) => {
                 let why = planning.reason.words.clone();
@@ -114,20 +120,20 @@ impl Log {
                 self.add(&report.time, "end", what, String::new(), why);
             }
             // Observations in between have their own lines.
-            Line::Passed(passed) => self.passed(&passed.now.0),
-            Line::Looked(looked) => self.passed(&looked.now.0),
+            Line::Passed(passed) => self.advance(&passed.now.0),
+            Line::Looked(looked) => self.advance(&looked.now.0),
             _ => {}
         }
     }
 
-    fn passed(&mut self, time: &Rational) {
+    fn advance(&mut self, time: &Rational) {
         if *time > self.now {
             self.now.clone_from(time);
         }
     }
 
     fn add(&mut self, time: &Rational, kind: &'static str, what: String, due: String, why: String) {
-        self.passed(time);
+        self.advance(time);
         // Keeps rows in order even if something was reported late.
         let last = self.rows.last().map_or(f64::NEG_INFINITY, |row| row.at);
         self.rows.push(Row {
@@ -186,7 +192,7 @@ impl Log {
     }
 }
 
-fn due(window: &WindowLine) -> String {
+fn due_text(window: &WindowLine) -> String {
     window_words(&answer(window)).unwrap_or_default()
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use elbowroom::answers::Exact;
 use elbowroom::answers::envelope::timeline::WindowAnswer;
 use elbowroom::num::Rational;
-use elbowroom::report::line::{BoundLine, NetworkLine, ParameterLine};
+use elbowroom::report::schema::{BoundLine, NetworkLine, ParameterLine};
 use elbowroom::stn::{ConsistentNetwork, Constraint, Network, NodeId};
 
 /// Time windows of a plan's nodes, over all values in its envelope.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use elbowroom_model::problem::{Body, Condition, Schema, SchemaId};
 
 use crate::lower::Reader;
-use crate::lower::effect::{Around, Effects, Moment};
+use crate::lower::effect::{EffectContext, Effects, Moment};
 use crate::lower::scope::Scope;
 use crate::lower::sections::Section;
 use crate::lower::timed::Timed;
@@ -204,7 +204,13 @@ impl Reader {
     ) -> Effects {
         let mut effects = Effects::default();
         if let Some((_, Some(node))) = fields.get(":effect") {
-            self.effect(node, moment, scope, &mut Around::default(), &mut effects);
+            self.effect(
+                node,
+                moment,
+                scope,
+                &mut EffectContext::default(),
+                &mut effects,
+            );
         }
         effects
     }

@@ -64,12 +64,12 @@ impl Reader {
             &mut self.event_spans
         };
         declared.push(span);
-        self.refuse_second(&name, kind, span);
+        self.report_duplicate(&name, kind, span);
     }
 
     /// Reports a second process, or a second event, of the same name. Names must be unique because
     /// the validator's messages use them.
-    fn refuse_second(&mut self, name: &str, kind: &str, span: Span) {
+    fn report_duplicate(&mut self, name: &str, kind: &str, span: Span) {
         let count = if kind == "a process" {
             let names = self.problem.processes.iter().map(|process| &process.name);
             names.filter(|other| *other == name).count()

@@ -30,7 +30,7 @@ const MODALS: &[(&str, &str)] = &[
 const ANONYMOUS: &str = "anonymous";
 
 /// Returns the place where forms of that name belong if they are not conditions on a state.
-pub(super) fn belongs_elsewhere(name: &str) -> Option<&'static str> {
+pub(super) fn proper_place(name: &str) -> Option<&'static str> {
     if name == "preference" {
         return Some("preferences stand among conditions, in goals and under `:constraints`");
     }
@@ -40,7 +40,7 @@ pub(super) fn belongs_elsewhere(name: &str) -> Option<&'static str> {
 
 /// A preference found in a condition.
 #[derive(Debug)]
-pub(super) struct Soft {
+pub(super) struct FoundPreference {
     preference: PreferenceId,
     /// Variables of the enclosing quantifiers.
     variables: Vec<Variable>,
@@ -257,7 +257,7 @@ impl Reader {
         };
         let condition = without_preferences(scope, |scope| read(self, part, scope));
         let variables = scope.variables[scope.parameters..].to_vec();
-        scope.soft.push(Soft {
+        scope.soft.push(FoundPreference {
             preference,
             variables,
             condition,
@@ -265,7 +265,7 @@ impl Reader {
     }
 
     /// Adds the preferences found in an action's conditions.
-    pub(super) fn action_preferences(&mut self, found: Vec<Soft>, schema: SchemaId) {
+    pub(super) fn action_preferences(&mut self, found: Vec<FoundPreference>, schema: SchemaId) {
         for soft in found {
             self.problem.action_preferences.push(ActionPreference {
                 schema,
@@ -279,7 +279,11 @@ impl Reader {
     }
 
     /// Adds the preferences found in the goal, as constraints on the end of the plan.
-    pub(super) fn goal_preferences(&mut self, found: Vec<Soft>, span: crate::source::Span) {
+    pub(super) fn goal_preferences(
+        &mut self,
+        found: Vec<FoundPreference>,
+        span: crate::source::Span,
+    ) {
         for soft in found {
             let at_end = Constraint::Modal(Modal::AtEnd(soft.condition.start));
             let mut constraint = Constraint::Preference(soft.preference, Box::new(at_end));

@@ -5,7 +5,7 @@ use elbowroom_model::problem::{PredicateId, Rule, TypeId, Variable};
 use crate::lower::Reader;
 use crate::lower::scope::Scope;
 use crate::lower::sections::Section;
-use crate::lower::stratify::negative_circles;
+use crate::lower::stratify::negative_cycles;
 use crate::source::Span;
 use crate::syntax::Node;
 
@@ -85,7 +85,7 @@ impl Reader {
                 body,
             });
         }
-        for rule in negative_circles(&self.problem) {
+        for rule in negative_cycles(&self.problem) {
             let name = &self.problem.predicates[self.problem.rules[rule].predicate.index()].name;
             self.report
                 .error(

@@ -65,19 +65,19 @@ impl Reader {
         for section in sections.all(":requirements") {
             self.requirements(section);
         }
-        let types = sections.only(":types", &mut self.report);
+        let types = sections.single(":types", &mut self.report);
         self.types(types);
-        if let Some(section) = sections.only(":constants", &mut self.report) {
+        if let Some(section) = sections.single(":constants", &mut self.report) {
             self.objects(section);
         }
         self.problem.constants = self.problem.objects.len();
-        if let Some(section) = sections.only(":predicates", &mut self.report) {
+        if let Some(section) = sections.single(":predicates", &mut self.report) {
             self.predicates(section);
         }
-        if let Some(section) = sections.only(":functions", &mut self.report) {
+        if let Some(section) = sections.single(":functions", &mut self.report) {
             self.functions(section);
         }
-        if let Some(section) = sections.only(":synth-parameters", &mut self.report) {
+        if let Some(section) = sections.single(":synth-parameters", &mut self.report) {
             self.problem.unknowns = self.unknowns(section.content);
         }
         let heads: Vec<_> = sections
@@ -90,7 +90,7 @@ impl Reader {
                 ":constraints" => self.constraints(section),
                 ":process" | ":event" => self.autonomous(section),
                 ":constraint" => self.global_constraint(section),
-                ":modules" => self.refuse(section),
+                ":modules" => self.report_unsupported(section),
                 keyword if !SECTIONS.contains(&keyword) => self.skip(section, SECTIONS),
                 _ => {}
             }
@@ -120,7 +120,7 @@ impl Reader {
     }
 
     /// Reports a section of another dialect as unsupported, with the name that it declares.
-    fn refuse(&mut self, section: &Section) {
+    fn report_unsupported(&mut self, section: &Section) {
         let feature = Feature::Modules;
         let name = section.content.first().and_then(Node::word);
         let named = name.map_or(String::new(), |name| format!(" `{name}`"));

@@ -6,13 +6,13 @@ use crate::lower::Reader;
 use crate::lower::condition::without_preferences;
 use crate::lower::continuous::mentions_time;
 use crate::lower::scope::Scope;
-use crate::lower::shift::shift;
-use crate::lower::timed::{Time, Timed, both, near_specifier, time_specifier};
+use crate::lower::shift::renumber_variables;
+use crate::lower::timed::{Time, Timed, conjunction, near_specifier, time_specifier};
 use crate::source::Span;
 use crate::syntax::Node;
 
 /// Upper limit on the text copied, over all effects, because it encloses more than one of them.
-const MOST_COPIED: usize = 20_000_000;
+const MAX_COPIED: usize = 20_000_000;
 
 /// The time at which an effect takes place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,9 +39,9 @@ pub(super) struct Effects {
 
 /// The quantifiers and conditions that enclose an effect.
 #[derive(Debug, Default)]
-pub(super) struct Around {
+pub(super) struct EffectContext {
     pub(super) variables: Vec<Variable>,
-    pub(super) whens: Vec<When>,
+    pub(super) conditions: Vec<When>,
 }
 
 #[derive(Debug)]
@@ -60,7 +60,7 @@ impl Reader {
         node: &Node,
         moment: Moment,
         scope: &mut Scope,
-        around: &mut Around,
+        around: &mut EffectContext,
         effects: &mut Effects,
     ) {
         if node.is_empty_list() {
@@ -118,9 +118,9 @@ impl Reader {
             }
             ("when", [condition, part]) => {
                 let when = self.when(condition, moment, scope);
-                around.whens.push(when);
+                around.conditions.push(when);
                 self.effect(part, moment, scope, around, effects);
-                around.whens.pop();
+                around.conditions.pop();
             }
             ("forall" | "when", _) => self.wrong_parts(&head, node),
             _ => self.primitive_effect(&head, node, parts, moment, scope, around, effects),
@@ -157,7 +157,7 @@ impl Reader {
         parts: &[Node],
         moment: Moment,
         scope: &Scope,
-        around: &Around,
+        around: &EffectContext,
         effects: &mut Effects,
     ) {
         if matches!(head, "change" | "assign")
@@ -265,7 +265,7 @@ impl Reader {
         node: &Node,
         parts: &[Node],
         scope: &Scope,
-        around: &Around,
+        around: &EffectContext,
         effects: &mut Effects,
     ) {
         let [fluent, value] = parts else {
@@ -289,14 +289,18 @@ impl Reader {
     /// with a report, if the effect would depend on the future.
     pub(super) fn guard(
         &mut self,
-        around: &Around,
+        around: &EffectContext,
         moment: Moment,
         scope: &Scope,
         node: &Node,
     ) -> Option<Guard> {
-        let size: usize = around.whens.iter().map(|w| w.span.end - w.span.start).sum();
+        let size: usize = around
+            .conditions
+            .iter()
+            .map(|w| w.span.end - w.span.start)
+            .sum();
         self.copied += size + 50 * around.variables.len();
-        if self.copied > MOST_COPIED {
+        if self.copied > MAX_COPIED {
             self.copied = 0;
             self.report
                 .error(
@@ -307,12 +311,12 @@ impl Reader {
             return None;
         }
         let mut guard = Guard::default();
-        for when in &around.whens {
+        for when in &around.conditions {
             let by = scope.variables.len() - when.scope;
             let condition = when
                 .condition
                 .clone()
-                .map(|part| shift(part, when.scope, by));
+                .map(|part| renumber_variables(part, when.scope, by));
             let Timed {
                 start,
                 over_all,
@@ -335,11 +339,11 @@ impl Reader {
                 return None;
             }
             match moment {
-                Moment::Instant | Moment::Start => guard.now = both(guard.now, start),
+                Moment::Instant | Moment::Start => guard.now = conjunction(guard.now, start),
                 Moment::End | Moment::Unspecified | Moment::Process => {
-                    guard.at_start = both(guard.at_start, start);
-                    guard.over_all = both(guard.over_all, over_all);
-                    guard.now = both(guard.now, end);
+                    guard.at_start = conjunction(guard.at_start, start);
+                    guard.over_all = conjunction(guard.over_all, over_all);
+                    guard.now = conjunction(guard.now, end);
                 }
             }
         }

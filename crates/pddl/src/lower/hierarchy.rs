@@ -12,7 +12,7 @@ use crate::source::Span;
 /// all.
 const MOST_PATHS: u64 = 1000;
 /// In larger hierarchies, [`Reader::can_fit`] does not search for common subtypes.
-const MOST_COMPARED: usize = 1000;
+const MAX_COMPARED: usize = 1000;
 /// Maximum length of a path to `object`.
 const HIGHEST: u32 = 200;
 
@@ -161,7 +161,7 @@ impl Reader {
 
     /// Returns `true` if some object can be of one of the types in `own` and of one in `asked`.
     pub(super) fn can_fit(&self, own: &[TypeId], asked: &[TypeId]) -> bool {
-        if self.problem.types.len() > MOST_COMPARED {
+        if self.problem.types.len() > MAX_COMPARED {
             return true;
         }
         let all = (0..self.problem.types.len()).map(TypeId::from);

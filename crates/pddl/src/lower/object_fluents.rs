@@ -12,7 +12,7 @@ use elbowroom_num::Rational;
 
 use crate::feature::Feature;
 use crate::lower::Reader;
-use crate::lower::effect::{Around, Effects, Moment};
+use crate::lower::effect::{EffectContext, Effects, Moment};
 use crate::lower::scope::Scope;
 use crate::source::Span;
 use crate::syntax::Node;
@@ -61,7 +61,7 @@ impl Reader {
     }
 
     /// Reads the value that a function is compared with or gets.
-    fn given_value(&mut self, fluent: &Node, value: &Node, scope: &Scope) -> Option<Term> {
+    fn assigned_value(&mut self, fluent: &Node, value: &Node, scope: &Scope) -> Option<Term> {
         let given = self.term(value, scope)?;
         let (name, arguments) = fluent.form()?;
         let overloads = self.names.object_functions.get(name.as_ref())?;
@@ -137,7 +137,7 @@ impl Reader {
             arguments.push(if is_undefined {
                 Term::Variable(scope.variables.len())
             } else {
-                match reader.given_value(fluent, value, scope) {
+                match reader.assigned_value(fluent, value, scope) {
                     Some(value) => value,
                     None => return Condition::TRUE,
                 }
@@ -174,7 +174,7 @@ impl Reader {
         node: &Node,
         parts: &[Node],
         moment: Moment,
-        (scope, around): (&Scope, &Around),
+        (scope, around): (&Scope, &EffectContext),
         effects: &mut Effects,
     ) {
         let [fluent, value] = parts else {
@@ -187,7 +187,7 @@ impl Reader {
         let value = if value.is(UNDEFINED) {
             Some(None)
         } else {
-            self.given_value(fluent, value, scope).map(Some)
+            self.assigned_value(fluent, value, scope).map(Some)
         };
         let (Some((predicate, arguments)), Some(value)) = (application, value) else {
             return;
@@ -200,7 +200,7 @@ impl Reader {
                 return;
             }
         };
-        self.lose(predicate, &arguments, node, lost, (scope, around), effects);
+        self.delete_values(predicate, &arguments, node, lost, (scope, around), effects);
         let Some(value) = value else {
             return;
         };
@@ -220,13 +220,13 @@ impl Reader {
     }
 
     /// Deletes all values of a function.
-    fn lose(
+    fn delete_values(
         &mut self,
         predicate: PredicateId,
         arguments: &[Term],
         node: &Node,
         moment: Moment,
-        (scope, around): (&Scope, &Around),
+        (scope, around): (&Scope, &EffectContext),
         effects: &mut Effects,
     ) {
         let value = self.value_variable(predicate);
@@ -267,7 +267,7 @@ impl Reader {
         if value.is(UNDEFINED) {
             return Some((predicate, arguments, None));
         }
-        match self.given_value(fluent, value, &scope)? {
+        match self.assigned_value(fluent, value, &scope)? {
             Term::Object(value) => Some((predicate, arguments, Some(value))),
             Term::Variable(_) => None,
         }

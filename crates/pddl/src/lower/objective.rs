@@ -28,10 +28,10 @@ impl Reader {
         for section in sections.all(":requirements") {
             self.requirements(section);
         }
-        if let Some(section) = sections.only(":objects", &mut self.report) {
+        if let Some(section) = sections.single(":objects", &mut self.report) {
             self.objects(section);
         }
-        match sections.only(":init", &mut self.report) {
+        match sections.single(":init", &mut self.report) {
             Some(section) => self.init(section),
             None => {
                 self.report
@@ -39,7 +39,7 @@ impl Reader {
                     .advise("nothing is true at time 0");
             }
         }
-        let goal = sections.only(":goal", &mut self.report);
+        let goal = sections.single(":goal", &mut self.report);
         match goal {
             Some(section) => self.goal(section),
             None => {
@@ -52,7 +52,7 @@ impl Reader {
             self.constraints(section);
         }
         self.check_expansion(goal.map(|section| section.span));
-        if let Some(section) = sections.only(":metric", &mut self.report) {
+        if let Some(section) = sections.single(":metric", &mut self.report) {
             self.metric(section);
         }
         for section in sections.iter() {
@@ -65,7 +65,7 @@ impl Reader {
 
     /// Checks that the problem belongs to this domain.
     fn domain_name(&mut self, sections: &Sections) {
-        let Some(section) = sections.only(":domain", &mut self.report) else {
+        let Some(section) = sections.single(":domain", &mut self.report) else {
             self.report
                 .warning(sections.name_span, "a problem without `:domain`");
             return;

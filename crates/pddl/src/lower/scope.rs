@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_model::problem::{Term, Unknown, Variable};
 
-use crate::lower::constraints::Soft;
+use crate::lower::constraints::FoundPreference;
 
 /// The names that are in scope inside an action, a rule or a goal.
 #[derive(Debug, Default)]
@@ -28,7 +28,7 @@ pub(super) struct Scope {
     /// Number of variables that are parameters of the action.
     pub(super) parameters: usize,
     /// The preferences found.
-    pub(super) soft: Vec<Soft>,
+    pub(super) soft: Vec<FoundPreference>,
 }
 
 impl Scope {

@@ -72,7 +72,7 @@ impl<'t, 's> Sections<'t, 's> {
     }
 
     /// Returns the section of that keyword. Reports a second one.
-    pub(super) fn only(&self, keyword: &str, report: &mut Report) -> Option<&Section<'t, 's>> {
+    pub(super) fn single(&self, keyword: &str, report: &mut Report) -> Option<&Section<'t, 's>> {
         let mut same = self.all(keyword);
         let first = same.next()?;
         for second in same {

@@ -6,14 +6,14 @@
 use elbowroom_model::problem::{Atom, Condition, Expression, Fluent, Term};
 
 /// Returns the condition with the variables from number `first` on increased by `by`.
-pub(super) fn shift(condition: Condition, first: usize, by: usize) -> Condition {
+pub(super) fn renumber_variables(condition: Condition, first: usize, by: usize) -> Condition {
     if by == 0 {
         return condition;
     }
     let each = |parts: Vec<Condition>| {
         parts
             .into_iter()
-            .map(|part| shift(part, first, by))
+            .map(|part| renumber_variables(part, first, by))
             .collect()
     };
     match condition {
@@ -29,14 +29,14 @@ pub(super) fn shift(condition: Condition, first: usize, by: usize) -> Condition 
             shift_expression(left, first, by),
             shift_expression(right, first, by),
         ),
-        Condition::Not(part) => Condition::Not(Box::new(shift(*part, first, by))),
+        Condition::Not(part) => Condition::Not(Box::new(renumber_variables(*part, first, by))),
         Condition::And(parts) => Condition::And(each(parts)),
         Condition::Or(parts) => Condition::Or(each(parts)),
         Condition::Forall(variables, part) => {
-            Condition::Forall(variables, Box::new(shift(*part, first, by)))
+            Condition::Forall(variables, Box::new(renumber_variables(*part, first, by)))
         }
         Condition::Exists(variables, part) => {
-            Condition::Exists(variables, Box::new(shift(*part, first, by)))
+            Condition::Exists(variables, Box::new(renumber_variables(*part, first, by)))
         }
     }
 }

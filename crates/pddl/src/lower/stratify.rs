@@ -4,7 +4,7 @@ use elbowroom_model::Problem;
 use elbowroom_model::problem::Condition;
 
 /// Returns the rules that negate a predicate which depends on the rule's own head.
-pub(super) fn negative_circles(problem: &Problem) -> Vec<usize> {
+pub(super) fn negative_cycles(problem: &Problem) -> Vec<usize> {
     let mut edges: Vec<Vec<usize>> = vec![Vec::new(); problem.predicates.len()];
     let mut negated: Vec<Vec<usize>> = Vec::with_capacity(problem.rules.len());
     for rule in &problem.rules {

@@ -5,7 +5,7 @@ use elbowroom_model::problem::{Atom, Fluent, FunctionId, ObjectId, PredicateId, 
 use elbowroom_num::Rational;
 
 use crate::lower::Reader;
-use crate::lower::constraints::belongs_elsewhere;
+use crate::lower::constraints::proper_place;
 use crate::lower::scope::Scope;
 use crate::source::Span;
 use crate::syntax::Node;
@@ -224,7 +224,7 @@ impl Reader {
                 .advise("compare its value with an object, as in `(= (f) object)`");
             return;
         }
-        if let Some(advice) = belongs_elsewhere(name) {
+        if let Some(advice) = proper_place(name) {
             let message = format!("`{}` does not belong here", node.quote());
             self.report.error(node.head_span(), message).advise(advice);
             return;

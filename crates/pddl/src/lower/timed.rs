@@ -69,7 +69,7 @@ impl Timed {
     }
 
     /// Returns the only moment at which something is read, or `None` if there are several.
-    fn only_time(&self) -> Option<Time> {
+    fn single_time(&self) -> Option<Time> {
         match (
             self.start.is_trivial(),
             self.over_all.is_trivial(),
@@ -84,7 +84,7 @@ impl Timed {
 }
 
 /// Returns the conjunction, without superfluous nesting.
-pub(super) fn both(left: Condition, right: Condition) -> Condition {
+pub(super) fn conjunction(left: Condition, right: Condition) -> Condition {
     match (left, right) {
         (left, right) if right.is_trivial() => left,
         (left, right) if left.is_trivial() => right,
@@ -118,9 +118,9 @@ impl Reader {
                 let mut all = Timed::default();
                 for part in parts {
                     let part = self.timed_condition(part, scope);
-                    all.start = both(all.start, part.start);
-                    all.over_all = both(all.over_all, part.over_all);
-                    all.end = both(all.end, part.end);
+                    all.start = conjunction(all.start, part.start);
+                    all.over_all = conjunction(all.over_all, part.over_all);
+                    all.end = conjunction(all.end, part.end);
                 }
                 all
             }
@@ -143,7 +143,7 @@ impl Reader {
                 Timed::default()
             }
             ("or", _) | ("not", [_]) | ("imply", [_, _]) => {
-                self.at_one_time(&head, node, parts, scope)
+                self.read_at_single_time(&head, node, parts, scope)
             }
             ("exists", [variables, part]) => {
                 let variables = self.variable_list(variables);
@@ -151,9 +151,9 @@ impl Reader {
                 scope.variables.extend(variables.iter().cloned());
                 let part = without_preferences(scope, |scope| self.timed_condition(part, scope));
                 scope.variables.truncate(outside);
-                match part.only_time() {
+                match part.single_time() {
                     Some(time) => {
-                        part.map_only(time, |part| Condition::Exists(variables, Box::new(part)))
+                        part.map_single(time, |part| Condition::Exists(variables, Box::new(part)))
                     }
                     None => self.mixed_times(&head, node),
                 }
@@ -170,7 +170,13 @@ impl Reader {
     }
 
     /// Reads `or`, `not`, `imply` over parts that are all read at the same time.
-    fn at_one_time(&mut self, head: &str, node: &Node, parts: &[Node], scope: &mut Scope) -> Timed {
+    fn read_at_single_time(
+        &mut self,
+        head: &str,
+        node: &Node,
+        parts: &[Node],
+        scope: &mut Scope,
+    ) -> Timed {
         let parts: Vec<Timed> = without_preferences(scope, |scope| {
             parts
                 .iter()
@@ -180,7 +186,7 @@ impl Reader {
         let trivial = Timed::default();
         let mut time = None;
         for part in parts.iter().filter(|part| **part != trivial) {
-            let own = part.only_time();
+            let own = part.single_time();
             if own.is_none() || time.is_some() && time != own {
                 return self.mixed_times(head, node);
             }
@@ -233,7 +239,7 @@ pub(super) fn near_specifier(node: &Node) -> Option<&'static str> {
 }
 
 impl Timed {
-    fn map_only(mut self, time: Time, change: impl FnOnce(Condition) -> Condition) -> Self {
+    fn map_single(mut self, time: Time, change: impl FnOnce(Condition) -> Condition) -> Self {
         let part = std::mem::take(self.part(time));
         Self::at(time, change(part))
     }

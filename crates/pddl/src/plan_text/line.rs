@@ -131,13 +131,13 @@ pub(super) fn line(text: &str, start: usize) -> Line<'_> {
     match steps.as_slice() {
         [] => Line::Noise,
         // ENHSP prints the time that passes between two actions.
-        [step] if step.form == Form::Words && is_waiting(step) => Line::Blank,
+        [step] if step.form == Form::Words && is_wait_action(step) => Line::Blank,
         _ => Line::Steps(steps),
     }
 }
 
 /// Returns `true` for `0.0: -----waiting---- [10.0]`.
-fn is_waiting(step: &RawStep<'_>) -> bool {
+fn is_wait_action(step: &RawStep<'_>) -> bool {
     let name = step.words.first().map_or("", |word| word.text);
     step.words.len() == 1 && name.starts_with("--") && name.trim_matches('-') == "waiting"
 }

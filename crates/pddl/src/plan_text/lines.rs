@@ -8,9 +8,9 @@ use std::ops::Range;
 
 use elbowroom_text::{Source, Span};
 
+use super::action_like_text::{action_beside_heading, classical, possible_action, single_word};
 use super::form::Form;
 use super::line::{Line, RawStep, line};
-use super::near::{action_beside_heading, classical, possible_action, single_word};
 use super::vocabulary::Vocabulary;
 
 /// Steps of the last plan in a text, in their order, and the lines that are not read.
@@ -27,10 +27,10 @@ pub(super) struct LastPlan<'s> {
 /// A line that is not read.
 pub(super) struct Misread {
     pub(super) range: Range<usize>,
-    pub(super) kind: Misreading,
+    pub(super) kind: MisreadKind,
 }
 
-pub(super) enum Misreading {
+pub(super) enum MisreadKind {
     /// It begins like an action. The text is the expected form.
     Broken(&'static str),
     /// It may contain an action.
@@ -63,13 +63,13 @@ pub(super) fn last_plan<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Last
     };
     let mut last = sections.pop().unwrap_or_default();
     name_words_beside_steps(source, &mut last);
-    for entry in without_log(last) {
+    for entry in strip_log_text(last) {
         match entry {
             Entry::Steps(steps) => plan.steps.extend(steps),
             Entry::Misread(misread) => plan.mistakes.push(misread),
             Entry::Rule(range) | Entry::Noise(range) => plan.mistakes.push(Misread {
                 range,
-                kind: Misreading::Between,
+                kind: MisreadKind::Between,
             }),
         }
     }
@@ -80,7 +80,10 @@ pub(super) fn last_plan<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Last
 fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s>>> {
     let text = source.text();
     let mut sections = vec![Vec::new()];
-    for Span { start, end } in source.lines().flat_map(|line| parts(text, line)) {
+    for Span { start, end } in source
+        .lines()
+        .flat_map(|line| split_at_line_breaks(text, line))
+    {
         let shown = text[start..end].trim_end();
         let indent = shown.len() - shown.trim_start().len();
         let range = start + indent..start + shown.len();
@@ -92,7 +95,7 @@ fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s
                     Some(Entry::Steps(vec![step]))
                 } else {
                     sections.push(Vec::new());
-                    beside_heading(text, &range, &own, vocabulary)
+                    action_next_to_heading(text, &range, &own, vocabulary)
                 }
             }
             Line::Rule => Some(Entry::Rule(range)),
@@ -103,7 +106,7 @@ fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s
             Line::Steps(steps) => Some(Entry::Steps(steps)),
             Line::Broken(at, expected) => Some(Entry::Misread(Misread {
                 range: at..at,
-                kind: Misreading::Broken(expected),
+                kind: MisreadKind::Broken(expected),
             })),
         };
         if let Some(section) = sections.last_mut() {
@@ -115,7 +118,7 @@ fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s
 
 /// Splits a line at the other signs that Unicode defines as line breaks. An editor may show a line
 /// break there, so a comment ends there.
-fn parts(text: &str, line: Span) -> Vec<Span> {
+fn split_at_line_breaks(text: &str, line: Span) -> Vec<Span> {
     const BREAKS: [char; 5] = ['\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}'];
     let mut parts = Vec::new();
     let mut start = line.start;
@@ -130,13 +133,13 @@ fn parts(text: &str, line: Span) -> Vec<Span> {
 /// Returns log text, unless it may contain an action.
 fn noise<'s>(text: &'s str, range: Range<usize>, vocabulary: &Vocabulary) -> Entry<'s> {
     match possible_action(&text[range.clone()], vocabulary) {
-        Some(place) => possible(&range, &place),
+        Some(place) => possible_action_entry(&range, &place),
         None => Entry::Noise(range),
     }
 }
 
 /// Returns an action on the line of a heading, next to the heading's `own` words.
-fn beside_heading<'s>(
+fn action_next_to_heading<'s>(
     text: &'s str,
     line: &Range<usize>,
     own: &Range<usize>,
@@ -145,15 +148,15 @@ fn beside_heading<'s>(
     let sides = [line.start..own.start, own.end..line.end];
     sides.into_iter().find_map(|side| {
         let place = action_beside_heading(&text[side.clone()], vocabulary)?;
-        Some(possible(&side, &place))
+        Some(possible_action_entry(&side, &place))
     })
 }
 
 /// Returns a line that may contain an action, at a position relative to the line.
-fn possible<'s>(line: &Range<usize>, place: &Range<usize>) -> Entry<'s> {
+fn possible_action_entry<'s>(line: &Range<usize>, place: &Range<usize>) -> Entry<'s> {
     Entry::Misread(Misread {
         range: line.start + place.start..line.start + place.end,
-        kind: Misreading::Possible,
+        kind: MisreadKind::Possible,
     })
 }
 
@@ -188,13 +191,13 @@ fn name_words_beside_steps(source: &Source, section: &mut [Entry<'_>]) {
             is_untimed(entry) && is_next
         });
         if is_beside {
-            section[index] = possible(&range, &word);
+            section[index] = possible_action_entry(&range, &word);
         }
     }
 }
 
 /// Returns the lines of a plan without log text before the first and after the last step.
-fn without_log(mut section: Vec<Entry<'_>>) -> Vec<Entry<'_>> {
+fn strip_log_text(mut section: Vec<Entry<'_>>) -> Vec<Entry<'_>> {
     let is_step = |entry: &Entry<'_>| matches!(entry, Entry::Steps(_));
     let first = section.iter().position(is_step);
     let last = section.iter().rposition(is_step);

@@ -8,7 +8,7 @@ use elbowroom_num::Rational;
 
 use crate::plan_text::form::Form;
 use crate::plan_text::line::RawStep;
-use crate::plan_text::lines::{LastPlan, Misreading, last_plan};
+use crate::plan_text::lines::{LastPlan, MisreadKind, last_plan};
 use crate::plan_text::printed::{PrintedPlan, PrintedStep};
 use crate::plan_text::step::{StepReader, span};
 use crate::plan_text::timing::{Start, timed};
@@ -95,11 +95,11 @@ fn report_lines(report: &mut Report, lines: &LastPlan<'_>) {
     for misread in &lines.mistakes {
         let place = span(&misread.range);
         match misread.kind {
-            Misreading::Broken(expected) => report
+            MisreadKind::Broken(expected) => report
                 .error(place, "this is not an action of a plan")
                 .label(expected)
                 .advise(EXPECTED),
-            Misreading::Possible => report
+            MisreadKind::Possible => report
                 .error(
                     place,
                     "this line may hold an action, but cannot be read as one",
@@ -107,7 +107,7 @@ fn report_lines(report: &mut Report, lines: &LastPlan<'_>) {
                 .advise(format!(
                     "{EXPECTED}; `;` before the line makes it a comment"
                 )),
-            Misreading::Between => report
+            MisreadKind::Between => report
                 .error(
                     place,
                     "this line between actions is not an action of a plan",

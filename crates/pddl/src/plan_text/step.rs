@@ -33,7 +33,7 @@ pub(super) struct StepReader<'a> {
     /// Functions that change, computed at the first missing duration.
     changing: OnceCell<BTreeSet<FunctionId>>,
     /// `true` if a missing duration has been reported.
-    has_told_missing: bool,
+    has_reported_missing: bool,
 }
 
 impl<'a> StepReader<'a> {
@@ -44,7 +44,7 @@ impl<'a> StepReader<'a> {
             task,
             report: Report::new(source, source),
             changing: OnceCell::new(),
-            has_told_missing: false,
+            has_reported_missing: false,
         }
     }
 
@@ -53,14 +53,14 @@ impl<'a> StepReader<'a> {
         let raw = &timed.raw;
         let (name, arguments) = raw.words.split_first()?;
         let schema = self.schema(name);
-        let (arguments, chosen) = self.apart(schema, arguments);
+        let (arguments, chosen) = self.split_controls(schema, arguments);
         let arguments: Vec<_> = arguments.iter().map(|word| self.object(word)).collect();
         let schema = schema?;
         let controls = self.controls(schema, name, chosen)?;
         let arguments = arguments.into_iter().collect::<Option<Vec<_>>>()?;
         let action = match self.ground(schema, &arguments) {
             Ok(action) if controls.is_empty() => action,
-            Ok(action) => Arc::new(chosen_by_plan(Action::clone(&action), &controls)),
+            Ok(action) => Arc::new(with_controls(Action::clone(&action), &controls)),
             Err(error) => {
                 let expected = self.signature(schema);
                 self.report
@@ -110,7 +110,7 @@ impl<'a> StepReader<'a> {
             ),
             Duration::Missing => match self.only_duration(schema, arguments) {
                 Ok(duration) => {
-                    self.tell_missing(name, &duration);
+                    self.report_missing_duration(name, &duration);
                     return Some(duration);
                 }
                 Err(why) => (why, "write it behind the action: `[10.000]`"),
@@ -142,8 +142,8 @@ impl<'a> StepReader<'a> {
     }
 
     /// Reports the duration from the domain at the first action without a duration.
-    fn tell_missing(&mut self, name: &Word, duration: &Rational) {
-        if std::mem::replace(&mut self.has_told_missing, true) {
+    fn report_missing_duration(&mut self, name: &Word, duration: &Rational) {
+        if std::mem::replace(&mut self.has_reported_missing, true) {
             return;
         }
         let message = format!(
@@ -187,7 +187,7 @@ impl<'a> StepReader<'a> {
     }
 
     /// Splits the words into those for objects and those for `:control` parameters.
-    fn apart<'w, 's>(
+    fn split_controls<'w, 's>(
         &self,
         schema: Option<SchemaId>,
         words: &'w [Word<'s>],
@@ -280,7 +280,7 @@ impl<'a> StepReader<'a> {
 }
 
 /// Returns the action with these numbers in place of its `:control` parameters, and in its name.
-fn chosen_by_plan(action: Action, controls: &[(u32, Rational)]) -> Action {
+fn with_controls(action: Action, controls: &[(u32, Rational)]) -> Action {
     if controls.is_empty() {
         return action;
     }

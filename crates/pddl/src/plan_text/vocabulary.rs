@@ -6,7 +6,7 @@ use elbowroom_model::Task;
 use elbowroom_model::problem::{ObjectId, SchemaId};
 
 /// Maximum number of parts into which words are split.
-const MOST_PARTS: usize = 32;
+const MAX_PARTS: usize = 32;
 
 /// Names of actions and objects, in lower case.
 pub(super) struct Vocabulary {
@@ -69,7 +69,7 @@ impl Vocabulary {
             .map(|(at, _)| at)
             .chain([rest.len()])
             .collect();
-        if ends.len() > MOST_PARTS {
+        if ends.len() > MAX_PARTS {
             return false;
         }
         let mut begins = vec![0];

@@ -6,9 +6,9 @@ use elbowroom_model::{Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 /// Minimum number of digits after the decimal point, as planners print.
-const FEWEST_DIGITS: usize = 3;
+const MIN_DIGITS: usize = 3;
 /// Number of digits tried before a number is written as a fraction.
-const MOST_DIGITS: u32 = 300;
+const MAX_DIGITS: u32 = 300;
 
 /// Returns the plan as text that [`read_plan`](crate::read_plan) reads: one
 /// `0.000: (action argument …) [10.000]` on each line, by start time.
@@ -73,7 +73,7 @@ fn written(
 /// Returns the exact number: in decimals with at least three digits after the point, or as `p/q`.
 pub(super) fn decimal(value: &Rational) -> String {
     let is_exact = |text: &String| text.parse().is_ok_and(|read: Rational| read == *value);
-    let Some(mut text) = [18, MOST_DIGITS]
+    let Some(mut text) = [18, MAX_DIGITS]
         .map(|digits| value.to_decimal(digits))
         .into_iter()
         .find(is_exact)
@@ -86,10 +86,7 @@ pub(super) fn decimal(value: &Rational) -> String {
         text.push('.');
         0
     };
-    text.extend(std::iter::repeat_n(
-        '0',
-        FEWEST_DIGITS.saturating_sub(digits),
-    ));
+    text.extend(std::iter::repeat_n('0', MIN_DIGITS.saturating_sub(digits)));
     text
 }
 

@@ -75,7 +75,7 @@ pub(super) fn ends_of_running(
     let mut happenings = Vec::new();
     for (running, end) in order {
         check_end(situation, running, end)?;
-        let unspeakable = |why: String| WriteProblemError::Unspeakable {
+        let unspeakable = |why: String| WriteProblemError::Inexpressible {
             action: running.action.name.clone(),
             why,
         };

@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_of_nul_bytes_is_one_mistake_unless_it_is_commented_out() {
+    fn run_of_nul_bytes_is_one_error_unless_commented_out() {
         assert_eq!(words("a\0\0b").1, 1);
         assert_eq!(words(";a\0\0b").1, 0);
     }

@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_section_inside_another_shows_where_a_parenthesis_is_missing() {
+    fn nested_section_locates_missing_parenthesis() {
         let (tree, messages) =
             parsed("(define (domain d)\n (:action a :effect (and (p))\n (:action b))");
         assert_eq!(

@@ -6,7 +6,7 @@ use crate::reading::{domain, problem, task};
 use crate::{errors, notes, plan};
 
 #[test]
-fn action_beside_a_heading_is_an_error_with_its_line() {
+fn action_next_to_heading_is_an_error_with_its_line() {
     let plan = ["0: (wait) [2]", "7: (snap b1)"];
     for heading in [
         "Solution found: wait",
@@ -39,7 +39,7 @@ fn action_beside_a_heading_is_an_error_with_its_line() {
 }
 
 #[test]
-fn words_of_a_heading_are_no_actions() {
+fn words_of_heading_are_not_actions() {
     let names = [
         "computed",
         "cost",
@@ -114,7 +114,7 @@ fn last_plan_of_a_log_is_read_with_a_note() {
 }
 
 #[test]
-fn comment_between_two_steps_begins_no_other_plan() {
+fn comment_between_steps_does_not_start_new_plan() {
     for comment in [
         "; new plan",
         ";; plan",

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
 
-use crate::program::{Said, Val, ours, task};
+use crate::program::{PlanVerdict, Val, ours, task};
 use crate::skipped::skipped;
 
 /// Returns the plan with one number of one line changed: the start of an action, or its duration.
@@ -56,9 +56,9 @@ fn compare(
         .iter()
         .filter_map(|(line, is_duration, by)| shifted(plan, *line, *is_duration, by));
     for plan in std::iter::once(plan.to_owned()).chain(shifts) {
-        let theirs = val.says(domain, problem, &plan);
+        let theirs = val.verdict(domain, problem, &plan);
         let (ours, why) = ours(&task, &Source::new("plan", plan.clone()));
-        if ours == Said::Nothing && theirs == Said::Invalid {
+        if ours == PlanVerdict::NoVerdict && theirs == PlanVerdict::Invalid {
             // VAL does not report that it is undecided.
             continue;
         }
@@ -85,7 +85,7 @@ fn all_changes(plan: &str) -> Vec<(usize, bool, Rational)> {
 }
 
 #[test]
-fn our_own_cases_and_what_becomes_of_them_are_judged_alike() {
+fn own_cases_and_mutations_get_same_verdict_as_val() {
     let Some(val) = Val::find("cases") else {
         return;
     };
@@ -118,7 +118,7 @@ fn our_own_cases_and_what_becomes_of_them_are_judged_alike() {
 }
 
 #[test]
-fn processes_and_events_are_judged_alike() {
+fn processes_and_events_get_same_verdict_as_val() {
     let Some(val) = Val::find("processes") else {
         return;
     };
@@ -166,7 +166,7 @@ fn processes_and_events_are_judged_alike() {
 }
 
 #[test]
-fn preferences_are_counted_alike() {
+fn preference_counts_agree_with_val() {
     let Some(val) = Val::find("preferences") else {
         return;
     };
@@ -215,7 +215,7 @@ fn preferences_are_counted_alike() {
 }
 
 #[test]
-fn others_plans_and_what_becomes_of_them_are_judged_alike() {
+fn benchmark_plans_and_mutations_get_same_verdict_as_val() {
     let Some(val) = Val::find("others") else {
         return;
     };
@@ -285,7 +285,7 @@ fn others_plans_and_what_becomes_of_them_are_judged_alike() {
 
 /// The smallest examples for the document's sections on events and divisions.
 #[test]
-fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
+fn document_lists_missed_events_and_divisions_by_zero_of_val() {
     let Some(val) = Val::find("smallest") else {
         return;
     };
@@ -296,7 +296,7 @@ fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
         );
         let task = task(&sources.0, &sources.1).expect("the texts can be read");
         let (ours, _) = ours(&task, &Source::new("plan", plan));
-        (val.says(domain, problem, plan), ours)
+        (val.verdict(domain, problem, plan), ours)
     };
     let basin = "(define (domain basin)
         (:requirements :strips :fluents :time :negative-preconditions)
@@ -311,12 +311,12 @@ fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
     // At 11, the basin holds 10, whatever action is applied then.
     let (theirs, ours) = judged(basin, dry, "1.0: (turn-on)\n11.0: (turn-off)\n");
     assert!(
-        matches!(theirs, Said::Valid(_)) && ours == Said::Invalid,
+        matches!(theirs, PlanVerdict::Valid(_)) && ours == PlanVerdict::Invalid,
         "{theirs:?} {ours:?}"
     );
     let (theirs, ours) = judged(basin, dry, "1.0: (turn-on)\n11.5: (turn-off)\n");
     assert!(
-        theirs == Said::Invalid && ours == Said::Invalid,
+        theirs == PlanVerdict::Invalid && ours == PlanVerdict::Invalid,
         "{theirs:?} {ours:?}"
     );
 
@@ -333,13 +333,13 @@ fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
     assert!(bounded.contains("(< (level) 9)"));
     let (theirs, ours) = judged(&bounded, dry, "1.0: (turn-on)\n20.0: (turn-off)\n");
     assert!(
-        theirs.agrees_with(&ours) && matches!(ours, Said::Valid(_)),
+        theirs.agrees_with(&ours) && matches!(ours, PlanVerdict::Valid(_)),
         "{theirs:?} {ours:?}"
     );
     let looked = "1.0: (turn-on)\n6.0: (look)\n20.0: (turn-off)\n";
     let (theirs, ours) = judged(&bounded, dry, looked);
     assert!(
-        theirs == Said::Invalid && matches!(ours, Said::Valid(_)),
+        theirs == PlanVerdict::Invalid && matches!(ours, PlanVerdict::Valid(_)),
         "{theirs:?} {ours:?}"
     );
 
@@ -357,14 +357,14 @@ fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
     let seen = "(define (problem p) (:domain lamp) (:init) (:goal (seen)))";
     let (theirs, ours) = judged(lamp, seen, "1.0: (switch)\n1.0: (look)\n");
     assert!(
-        theirs == Said::Invalid && matches!(ours, Said::Valid(_)),
+        theirs == PlanVerdict::Invalid && matches!(ours, PlanVerdict::Valid(_)),
         "{theirs:?} {ours:?}"
     );
 
     let nobody = "(define (problem p) (:domain share) (:init (= (people) 0)) (:goal (done)))";
     let (theirs, ours) = judged(share, nobody, "1.0: (divide)\n");
     assert!(
-        matches!(theirs, Said::Valid(_)) && ours == Said::Invalid,
+        matches!(theirs, PlanVerdict::Valid(_)) && ours == PlanVerdict::Invalid,
         "{theirs:?} {ours:?}"
     );
 }

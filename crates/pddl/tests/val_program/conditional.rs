@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 
 use elbowroom_pddl::Source;
 
-use crate::program::{Said, Val, ours, task};
+use crate::program::{PlanVerdict, Val, ours, task};
 
 /// Returns the verdicts of VAL and of the validator on one action `(a)` from 0.5 to 2.5, with these
 /// effects, initial facts and goal.
-fn judged(val: &Val, [effects, initial, goal]: [&str; 3]) -> [Said; 2] {
+fn verdict_of(val: &Val, [effects, initial, goal]: [&str; 3]) -> [PlanVerdict; 2] {
     let domain = format!(
         "(define (domain d)
  (:requirements :adl :durative-actions :fluents :conditional-effects)
@@ -28,16 +28,16 @@ fn judged(val: &Val, [effects, initial, goal]: [&str; 3]) -> [Said; 2] {
         &Source::new("p", problem.as_str()),
     );
     let (own, _) = ours(&read.expect("a problem"), &Source::new("plan", plan));
-    [val.says(&domain, &problem, plan), own]
+    [val.verdict(&domain, &problem, plan), own]
 }
 
-fn is_valid(said: &Said) -> bool {
-    matches!(said, Said::Valid(_))
+fn is_valid(said: &PlanVerdict) -> bool {
+    matches!(said, PlanVerdict::Valid(_))
 }
 
 /// The smallest examples of the disagreements in the document. The validator accepts all of them.
 #[test]
-fn the_document_lists_conditional_effects_that_val_judges_otherwise() {
+fn document_lists_conditional_effects_with_other_verdict_of_val() {
     let Some(val) = Val::find("conditional-known") else {
         return;
     };
@@ -83,7 +83,7 @@ fn the_document_lists_conditional_effects_that_val_judges_otherwise() {
             "(not (done o1))",
         ],
     ] {
-        let [theirs, own] = judged(&val, example);
+        let [theirs, own] = verdict_of(&val, example);
         assert!(is_valid(&own), "{example:?}: {own:?}");
         assert!(!is_valid(&theirs), "{example:?}: VAL {theirs:?}");
     }
@@ -92,7 +92,7 @@ fn the_document_lists_conditional_effects_that_val_judges_otherwise() {
 /// A condition at the start is read before the effects of the action's own start, by VAL and by the
 /// validator.
 #[test]
-fn start_conditions_are_read_before_the_own_start_as_by_val() {
+fn start_conditions_are_read_before_own_start_effects_like_val() {
     let Some(val) = Val::find("conditional-start") else {
         return;
     };
@@ -105,7 +105,7 @@ fn start_conditions_are_read_before_the_own_start_as_by_val() {
         for effect_time in ["at start", "at end"] {
             let effects = format!("{own_start} (when (at start (p)) ({effect_time} (q)))");
             let goal = if holds { "(q)" } else { "(not (q))" };
-            let said = judged(&val, [&effects, initial, goal]);
+            let said = verdict_of(&val, [&effects, initial, goal]);
             assert!(
                 said.iter().all(is_valid),
                 "{effects}, {initial}, {goal}: {said:?}"
@@ -115,9 +115,9 @@ fn start_conditions_are_read_before_the_own_start_as_by_val() {
 }
 
 /// `SplitMix64`.
-struct Dice(u64);
+struct Rng(u64);
 
-impl Dice {
+impl Rng {
     fn below(&mut self, end: u64) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.0;
@@ -138,13 +138,13 @@ impl Dice {
 
 /// Random conditional effects without the known causes: one end effect, and conditions about one time.
 #[test]
-fn other_conditional_effects_are_judged_as_by_val() {
+fn other_conditional_effects_get_same_verdict_as_val() {
     let Some(val) = Val::find("conditional-random") else {
         return;
     };
     let mut counts = [0; 2];
     for seed in 0..150 {
-        let mut dice = Dice(seed);
+        let mut dice = Rng(seed);
         let mut effects = String::new();
         for _ in 0..dice.below(3) {
             let literal = dice.literal();
@@ -163,7 +163,7 @@ fn other_conditional_effects_are_judged_as_by_val() {
         let initial = initial.iter().filter(|(_, holds)| *holds);
         let initial: Vec<&str> = initial.map(|(fact, _)| *fact).collect();
         let goal = dice.literal();
-        let said = judged(&val, [&effects, &initial.join(" "), &goal]);
+        let said = verdict_of(&val, [&effects, &initial.join(" "), &goal]);
         let [theirs, own] = &said;
         assert!(
             own.agrees_with(theirs),

@@ -2,7 +2,7 @@
 
 use elbowroom_pddl::Source;
 
-use crate::program::{Said, Val, ours, task};
+use crate::program::{PlanVerdict, Val, ours, task};
 
 const CONDITIONS: [&str; 6] = [
     "(p)",
@@ -35,7 +35,7 @@ fn domain(action: &str) -> String {
 }
 
 #[test]
-fn equal_actions_at_one_time_are_judged_as_by_val() {
+fn identical_simultaneous_actions_get_same_verdict_as_val() {
     let Some(val) = Val::find("equal") else {
         return;
     };
@@ -62,7 +62,7 @@ fn equal_actions_at_one_time_are_judged_as_by_val() {
                 (lasting("at start", "end"), "1: (a) [2]\n3: (a) [2]\n"),
             ] {
                 let domain = domain(&action);
-                let theirs = val.says(&domain, problem, plan);
+                let theirs = val.verdict(&domain, problem, plan);
                 let read = task(
                     &Source::new("d", domain.as_str()),
                     &Source::new("p", problem),
@@ -73,7 +73,7 @@ fn equal_actions_at_one_time_are_judged_as_by_val() {
                         "VAL {theirs:?}, we {own:?} {why}\n{action}\n{plan}"
                     ));
                 }
-                counts[usize::from(own == Said::Invalid)] += 1;
+                counts[usize::from(own == PlanVerdict::Invalid)] += 1;
             }
         }
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use elbowroom_model::Task;
-use elbowroom_model::validate::{Mistake, Settings, Verdict, validate};
+use elbowroom_model::validate::{Settings, Verdict, ViolationKind, validate};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan, read_problem};
 
@@ -15,15 +15,15 @@ pub(crate) const TOLERANCE: &str = "0.001";
 
 /// Verdict on a plan.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Said {
+pub(crate) enum PlanVerdict {
     /// It is valid, with this metric, if there is one.
     Valid(Option<f64>),
     Invalid,
     /// Domain, problem or plan cannot be read or validated.
-    Nothing,
+    NoVerdict,
 }
 
-impl Said {
+impl PlanVerdict {
     /// Returns `true` if both verdicts are the same, up to rounding of the metrics.
     pub(crate) fn agrees_with(&self, other: &Self) -> bool {
         match (self, other) {
@@ -53,7 +53,7 @@ impl Val {
     }
 
     /// Returns VAL's verdict on texts.
-    pub(crate) fn says(&self, domain: &str, problem: &str, plan: &str) -> Said {
+    pub(crate) fn verdict(&self, domain: &str, problem: &str, plan: &str) -> PlanVerdict {
         let texts = [
             ("domain.pddl", domain),
             ("problem.pddl", problem),
@@ -64,11 +64,11 @@ impl Val {
             std::fs::write(&path, text).expect("the folder can be written to");
             path
         });
-        self.says_of(&domain, &problem, &plan)
+        self.verdict_for(&domain, &problem, &plan)
     }
 
     /// Returns VAL's verdict on files.
-    pub(crate) fn says_of(&self, domain: &Path, problem: &Path, plan: &Path) -> Said {
+    pub(crate) fn verdict_for(&self, domain: &Path, problem: &Path, plan: &Path) -> PlanVerdict {
         let output = Command::new(&self.program)
             .args(["-t", TOLERANCE])
             .args([domain, problem, plan])
@@ -84,19 +84,19 @@ impl Val {
             "Error",
         ];
         if errors.iter().any(|error| text.contains(error)) {
-            Said::Nothing
+            PlanVerdict::NoVerdict
         } else if text.contains("Plan valid") {
             let value = text
                 .lines()
                 .find_map(|line| line.strip_prefix("Final value: "));
-            Said::Valid(value.and_then(|value| value.trim().parse().ok()))
+            PlanVerdict::Valid(value.and_then(|value| value.trim().parse().ok()))
         } else if ["failed to execute", "Plan invalid", "Goal not satisfied"]
             .iter()
             .any(|failure| text.contains(failure))
         {
-            Said::Invalid
+            PlanVerdict::Invalid
         } else {
-            Said::Nothing
+            PlanVerdict::NoVerdict
         }
     }
 }
@@ -108,24 +108,24 @@ pub(crate) fn task(domain: &Source, problem: &Source) -> Option<Task> {
 }
 
 /// Returns the validator's verdict and its reason.
-pub(crate) fn ours(task: &Task, plan: &Source) -> (Said, String) {
+pub(crate) fn ours(task: &Task, plan: &Source) -> (PlanVerdict, String) {
     let Ok((plan, _)) = read_plan(plan, task) else {
-        return (Said::Nothing, "the plan cannot be read".to_owned());
+        return (PlanVerdict::NoVerdict, "the plan cannot be read".to_owned());
     };
     let tolerance: Rational = TOLERANCE.parse().expect("a number");
     match validate(task, &plan, &Settings::like_val(tolerance)) {
         Verdict::Valid(report) => {
             let metric = report.metric(task);
             let value = metric.map(|metric| metric.to_decimal(6).parse().expect("a number"));
-            (Said::Valid(value), String::new())
+            (PlanVerdict::Valid(value), String::new())
         }
         Verdict::Invalid(violation) => {
-            let said = match violation.mistake {
-                Mistake::Undefined { .. } => Said::Nothing,
-                _ => Said::Invalid,
+            let said = match violation.kind {
+                ViolationKind::Undefined { .. } => PlanVerdict::NoVerdict,
+                _ => PlanVerdict::Invalid,
             };
             (said, violation.to_string())
         }
-        Verdict::Undecided(undecided) => (Said::Nothing, undecided.to_string()),
+        Verdict::Undecided(undecided) => (PlanVerdict::NoVerdict, undecided.to_string()),
     }
 }

@@ -36,7 +36,7 @@ pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<
         let (from, to) = nodes[index];
         let original = &times[to] - &times[from];
         // In the original plan, the over-all condition was vacuous and has not been checked.
-        let is_unchecked = original.is_zero() && over_all::has_any(plan, id);
+        let is_unchecked = original.is_zero() && over_all::has_over_all_condition(plan, id);
         let bounds = interval.filter(|_| !is_unchecked).and_then(bounds);
         let (lower, upper, reason) = match bounds {
             Some((lower, upper)) => (lower, upper, Reason::Duration(id)),
@@ -59,7 +59,11 @@ pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<
 
 /// Returns a constraint for the duration of each durative instance: the domain's bounds if they
 /// read no changing fluent, else only that it is not negative.
-pub(crate) fn steady(task: &Task, plan: &StnPlan, footprints: &[Footprint]) -> Vec<Constraint> {
+pub(crate) fn state_independent_bounds(
+    task: &Task,
+    plan: &StnPlan,
+    footprints: &[Footprint],
+) -> Vec<Constraint> {
     let mut changing: BTreeSet<FluentId> = BTreeSet::new();
     for footprint in footprints {
         changing.extend(footprint.shifts.iter().chain(&footprint.assigns));
@@ -160,7 +164,7 @@ fn write_effects(
             Body::Durative(body) => (&body.start.effects, &body.continuous),
         };
     for effect in continuous {
-        values.run(effect.fluent, !is_end);
+        values.set_running(effect.fluent, !is_end);
     }
     for effect in effects {
         values.change(&effect.change, effect.guard.is_trivial(), arrival, duration);
@@ -203,7 +207,7 @@ impl Values {
     }
 
     /// Starts or stops a continuous effect. The value of the fluent becomes unknown.
-    fn run(&mut self, fluent: FluentId, begins: bool) {
+    fn set_running(&mut self, fluent: FluentId, begins: bool) {
         self.known.remove(&fluent);
         let count = self.running.entry(fluent).or_default();
         *count = if begins {

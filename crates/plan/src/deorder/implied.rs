@@ -18,14 +18,15 @@ use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 /// nothing takes time, each constraint has to be compared with the whole plan.
 #[must_use]
 pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {
-    let Drafted { drafts, bounds } = drafted(&plan);
+    let DraftNetwork { drafts, bounds } = build_network(&plan);
     // Integers are several times faster. The other case uses the number type of envelopes, so that
     // the search is compiled for these two types only.
-    let implied = if let Some((drafts, times)) = whole(&drafts, times) {
+    let implied = if let Some((drafts, times)) = scale_to_integers(&drafts, times) {
         implied_in(plan.nodes.len(), drafts, times)
     } else {
         let in_delta = |number: &Rational| Some(Delta::from(number.clone()));
-        let (drafts, times) = in_terms(&drafts, times, &in_delta).expect("each number is one");
+        let (drafts, times) =
+            convert_numbers(&drafts, times, &in_delta).expect("each number is one");
         implied_in(plan.nodes.len(), drafts, times)
     };
     let Some(is_implied) = implied else {
@@ -51,21 +52,21 @@ pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {
 /// A constraint of a network; `true` if it has to be kept.
 struct Draft<W> {
     constraint: elbowroom_stn::Constraint<W>,
-    stays: bool,
+    is_kept: bool,
 }
 
 /// Network of a plan with arbitrary durations and times of timed initials.
-struct Drafted {
+struct DraftNetwork {
     drafts: Vec<Draft<Rational>>,
     /// For each of the plan's constraints, the positions of its two bounds among the drafts.
     bounds: Vec<[Option<usize>; 2]>,
 }
 
-fn drafted(plan: &StnPlan) -> Drafted {
+fn build_network(plan: &StnPlan) -> DraftNetwork {
     let mut drafts = Vec::with_capacity(plan.nodes.len() + plan.constraints.len());
     let staying = |from, to| Draft {
         constraint: elbowroom_stn::Constraint::at_least(from, to, Rational::ZERO),
-        stays: true,
+        is_kept: true,
     };
     let zero = network_node(NodeId::ZERO);
     for (node, _) in plan.nodes().skip(1) {
@@ -82,7 +83,7 @@ fn drafted(plan: &StnPlan) -> Drafted {
         let mut add = |constraint| {
             drafts.push(Draft {
                 constraint,
-                stays: false,
+                is_kept: false,
             });
             drafts.len() - 1
         };
@@ -92,7 +93,7 @@ fn drafted(plan: &StnPlan) -> Drafted {
             .map(|value| add(elbowroom_stn::Constraint::at_most(from, to, value)));
         bounds.push([lower, upper]);
     }
-    Drafted { drafts, bounds }
+    DraftNetwork { drafts, bounds }
 }
 
 fn finite(bound: &Bound) -> Option<Rational> {
@@ -113,9 +114,9 @@ fn implied_in<W: Weight>(
     let mut stays = Vec::with_capacity(drafts.len());
     for draft in drafts {
         network.add(draft.constraint);
-        stays.push(draft.stays);
+        stays.push(draft.is_kept);
     }
-    let network = ConsistentNetwork::by(network, elbowroom_stn::Schedule::new(times))?;
+    let network = ConsistentNetwork::with_schedule(network, elbowroom_stn::Schedule::new(times))?;
     let mut is_implied = vec![false; stays.len()];
     for id in network.implied(|id| stays[id.index()]) {
         is_implied[id.index()] = true;
@@ -125,14 +126,19 @@ fn implied_in<W: Weight>(
 
 /// Multiplies all bounds and times by their common denominator. Returns `None` if a sum of the
 /// results might overflow.
-fn whole(drafts: &[Draft<Rational>], times: &Schedule) -> Option<(Vec<Draft<i128>>, Vec<i128>)> {
+fn scale_to_integers(
+    drafts: &[Draft<Rational>],
+    times: &Schedule,
+) -> Option<(Vec<Draft<i128>>, Vec<i128>)> {
     let bounds = drafts.iter().map(|draft| &draft.constraint.bound);
     let unit = CommonDenominator::of(bounds.chain(times.iter()))?;
-    in_terms(drafts, times, &|number| unit.whole(number).map(i128::from))
+    convert_numbers(drafts, times, &|number| {
+        unit.to_integer(number).map(i128::from)
+    })
 }
 
 /// Converts all bounds and times to another number type, if it can represent them.
-fn in_terms<W>(
+fn convert_numbers<W>(
     drafts: &[Draft<Rational>],
     times: &Schedule,
     number: &dyn Fn(&Rational) -> Option<W>,
@@ -145,7 +151,7 @@ fn in_terms<W>(
                 to: constraint.to,
                 bound: number(&constraint.bound)?,
             },
-            stays: draft.stays,
+            is_kept: draft.is_kept,
         })
     };
     Some((

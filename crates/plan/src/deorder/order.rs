@@ -22,7 +22,13 @@ pub(super) struct Order {
 
 impl Order {
     /// Adds the constraint that `to` comes at least `distance` after `from`.
-    pub(super) fn demand(&mut self, from: NodeId, to: NodeId, distance: Rational, reason: Reason) {
+    pub(super) fn require_distance(
+        &mut self,
+        from: NodeId,
+        to: NodeId,
+        distance: Rational,
+        reason: Reason,
+    ) {
         if from == to {
             return;
         }
@@ -120,7 +126,7 @@ impl<'a> Timeline<'a> {
                             return Err((from, to));
                         }
                         if !(is_fixed(from) && is_fixed(to)) {
-                            order.demand(from, to, epsilon.clone(), Reason::Interference);
+                            order.require_distance(from, to, epsilon.clone(), Reason::Interference);
                         }
                     }
                 }
@@ -135,7 +141,11 @@ impl<'a> Timeline<'a> {
         let writers: Vec<_> = uses.copied().filter(|(_, what)| what.writes()).collect();
         let chunks = writers.chunk_by(|(_, a), (_, b)| a.commutes_with(*b));
         let in_run = |(run, uses): (usize, &'_ [(NodeId, Use)])| {
-            let writer = |&(node, what): &(NodeId, Use)| Writer { node, run, what };
+            let writer = |&(node, what): &(NodeId, Use)| Writer {
+                node,
+                run,
+                access: what,
+            };
             uses.iter().map(writer).collect::<Vec<_>>()
         };
         chunks.enumerate().flat_map(in_run).collect()
@@ -146,18 +156,18 @@ impl<'a> Timeline<'a> {
 pub(super) struct Writer {
     pub(super) node: NodeId,
     pub(super) run: usize,
-    what: Use,
+    access: Use,
 }
 
 impl Writer {
     /// Returns `true` if the fact is true after it. An addition wins over a deletion.
     pub(super) fn makes_true(&self) -> bool {
-        self.what.0 & Use::ADD != 0
+        self.access.0 & Use::ADD != 0
     }
 
     /// Returns `true` if it only increases and decreases the fluent.
     pub(super) fn is_shift(&self) -> bool {
-        self.what.0 == Use::ADD
+        self.access.0 == Use::ADD
     }
 }
 

@@ -46,7 +46,7 @@ pub(super) fn order(
         if has_guards(body) {
             // During an action of duration 0, every condition would hold.
             let duration = timeline.time(end) - timeline.time(start);
-            order.demand(
+            order.require_distance(
                 start,
                 end,
                 duration.min(task.epsilon().clone()),
@@ -59,7 +59,7 @@ pub(super) fn order(
                 .entry(Quantity::Fact(fact))
                 .or_insert_with(|| timeline.writers(Quantity::Fact(fact)));
             let is_so_at_first = task.initial().facts.contains(&fact) == wanted;
-            keep_true(
+            constrain_to_keep_true(
                 writers,
                 wanted,
                 is_so_at_first,
@@ -82,8 +82,8 @@ pub(super) fn order(
                     end,
                     distance,
                 };
-                keep_sides(writers, &action, timeline, &mut |_, from, to, distance| {
-                    order.demand(from, to, distance, Reason::OverAll);
+                constrain_sides(writers, &action, timeline, &mut |_, from, to, distance| {
+                    order.require_distance(from, to, distance, Reason::OverAll);
                 });
             }
         }
@@ -104,15 +104,15 @@ pub(super) fn order(
                 timeline.time(from) < timeline.time(to)
                     && !overlap_in_part(span(from), span(to), timeline)
             };
-            keep_sides(
+            constrain_sides(
                 writers,
                 &action,
                 timeline,
                 &mut |writer, from, to, least| {
                     if writer.is_shift() && !costs_nothing(from, to) {
-                        sides.demand(from, to, least, Reason::Side);
+                        sides.require_distance(from, to, least, Reason::Side);
                     } else {
-                        order.demand(from, to, least, Reason::OverAll);
+                        order.require_distance(from, to, least, Reason::OverAll);
                     }
                 },
             );
@@ -180,7 +180,7 @@ impl Required {
 }
 
 /// Returns `true` if the instance has an over-all condition, or an effect that depends on one.
-pub(super) fn has_any(plan: &StnPlan, id: InstanceId) -> bool {
+pub(super) fn has_over_all_condition(plan: &StnPlan, id: InstanceId) -> bool {
     let body = plan.instance(id).action.durative();
     body.is_some_and(|body| !body.over_all.is_trivial() || has_guards(body))
 }
@@ -212,7 +212,7 @@ struct Span<'a> {
 
 /// Keeps the writers of one quantity on their sides. Runs keep their order, so it is sufficient to
 /// constrain those next to the start and next to the end.
-fn keep_sides(
+fn constrain_sides(
     writers: &[Writer],
     action: &Span<'_>,
     timeline: &Timeline<'_>,
@@ -248,7 +248,7 @@ fn keep_sides(
 /// Writers that establish the value and writers that destroy it keep their order. So it is
 /// sufficient that one writer that establishes it comes before the start, and that the next ones
 /// that destroy it come after the end.
-fn keep_true(
+fn constrain_to_keep_true(
     writers: &[Writer],
     wanted: bool,
     is_so_at_first: bool,
@@ -266,12 +266,12 @@ fn keep_true(
     let own = serving.iter().find(|writer| writer.node == start);
     match own.or(serving.first()) {
         _ if since.is_none() && is_so_at_first => {}
-        Some(first) => order.demand(first.node, start, Rational::ZERO, Reason::OverAll),
+        Some(first) => order.require_distance(first.node, start, Rational::ZERO, Reason::OverAll),
         // The fact has the wrong value. The validator has not read it, because the action has
         // duration 0.
         None => {
             for writer in last_run(before) {
-                order.demand(writer.node, start, Rational::ZERO, Reason::OverAll);
+                order.require_distance(writer.node, start, Rational::ZERO, Reason::OverAll);
             }
         }
     }
@@ -280,7 +280,7 @@ fn keep_true(
     for writer in first_run(&later[spoiling.unwrap_or(later.len())..]) {
         let original = timeline.time(writer.node) - timeline.time(end);
         let least = original.min(Rational::ZERO);
-        order.demand(end, writer.node, least, Reason::OverAll);
+        order.require_distance(end, writer.node, least, Reason::OverAll);
     }
 }
 

@@ -45,7 +45,7 @@ pub fn pin_until_sound(
             plan.constraints.insert(index, pin);
         }
     }
-    Some(with_all_sides(plan))
+    Some(with_permanent_sides(plan))
 }
 
 /// Returns the plan without its [sides](Reason::Side), and the sides.
@@ -61,7 +61,7 @@ pub fn without_sides(mut plan: StnPlan) -> (StnPlan, Vec<Constraint>) {
 
 /// Makes the [sides](Reason::Side) of the plan permanent.
 #[must_use]
-pub fn with_all_sides(mut plan: StnPlan) -> StnPlan {
+pub fn with_permanent_sides(mut plan: StnPlan) -> StnPlan {
     for constraint in &mut plan.constraints {
         if constraint.reason == Reason::Side {
             constraint.reason = Reason::OverAll;
@@ -73,7 +73,7 @@ pub fn with_all_sides(mut plan: StnPlan) -> StnPlan {
 /// Makes the [sides](Reason::Side) of the plan permanent. Of two sides that would make time points
 /// simultaneous, only the first is kept.
 #[must_use]
-pub fn with_sides_one_way(plan: StnPlan) -> StnPlan {
+pub fn with_compatible_sides(plan: StnPlan) -> StnPlan {
     let (mut plan, sides) = without_sides(plan);
     for (index, side) in sides.iter().enumerate() {
         let is_opposite = |other: &Constraint| (other.from, other.to) == (side.to, side.from);
@@ -81,13 +81,13 @@ pub fn with_sides_one_way(plan: StnPlan) -> StnPlan {
             plan.constraints.push(side.clone());
         }
     }
-    with_all_sides(plan)
+    with_permanent_sides(plan)
 }
 
 /// Returns the plan with every time point fixed at its nominal time, for plans whose other
 /// schedules cannot be analysed.
 #[must_use]
-pub fn pinned_to(mut plan: StnPlan, nominal: &Schedule) -> StnPlan {
+pub fn with_fixed_times(mut plan: StnPlan, nominal: &Schedule) -> StnPlan {
     let pins = plan.nodes().skip(1).map(|(node, _)| Constraint {
         from: NodeId::ZERO,
         to: node,

@@ -32,7 +32,7 @@ pub(super) fn order(plan: &StnPlan, times: &Schedule, order: &mut Order) {
             .or_default();
         let has_ended = |other: &Instance| times[other.end] <= times[start];
         for other in earlier.iter().rev().filter(|other| has_ended(other)) {
-            order.demand(other.end, start, Rational::ZERO, Reason::SelfOverlap);
+            order.require_distance(other.end, start, Rational::ZERO, Reason::SelfOverlap);
             if other.is_alone {
                 break;
             }

@@ -4,7 +4,7 @@ use elbowroom_model::Step;
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 
-use super::{DeorderError, Deordered, deorder, pin_until_sound, pinned_to};
+use super::{DeorderError, Deordered, deorder, pin_until_sound, with_fixed_times};
 use crate::format;
 use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::{Bound, NodeId, Reason};
@@ -47,7 +47,7 @@ fn constraints(text: &str) -> String {
 }
 
 #[test]
-fn a_duration_obeys_the_domain_rather_than_the_plan() {
+fn duration_is_bounded_by_domain_and_not_by_plan() {
     assert_eq!(
         constraints("3: collect s1 [15]"),
         "c: n0.end - n0.start in [15, 15];"
@@ -61,7 +61,7 @@ fn a_duration_obeys_the_domain_rather_than_the_plan() {
 }
 
 #[test]
-fn actions_that_do_not_interfere_lose_their_order() {
+fn noninterfering_actions_are_unordered() {
     assert_eq!(
         constraints(
             "0: collect s1 [15]
@@ -74,7 +74,7 @@ c: n1.end - n1.start in [15, 15];"
 }
 
 #[test]
-fn instances_of_one_action_stay_apart_unless_they_overlap_in_the_plan() {
+fn instances_of_one_action_are_ordered_unless_they_overlap_in_plan() {
     let both = "c: n0.end - n0.start in [15, 15];\nc: n1.end - n1.start in [15, 15];";
     assert_eq!(
         constraints(
@@ -93,7 +93,7 @@ fn instances_of_one_action_stay_apart_unless_they_overlap_in_the_plan() {
 }
 
 #[test]
-fn a_writer_of_an_over_all_condition_stays_outside() {
+fn writer_of_over_all_condition_is_kept_outside_interval() {
     assert_eq!(
         constraints(
             "0: navigate [7]
@@ -141,7 +141,7 @@ fn the_nominal_schedule_is_the_original_plan() {
 }
 
 #[test]
-fn rounded_times_are_mended_in_the_nominal_schedule() {
+fn rounded_times_are_repaired_in_nominal_schedule() {
     // The duration is one ten-thousandth too long, the gap half a thousandth.
     let text = "0: refuel s1 [10.0001]
                 10.0005: refuel s2 [10]";
@@ -179,7 +179,7 @@ fn a_plan_past_its_deadline_has_no_schedule() {
 }
 
 #[test]
-fn pins_are_as_few_as_the_oracle_needs() {
+fn number_of_pins_is_minimal_for_oracle() {
     let text = "0: collect s1 [15]
                 3: collect s2 [15]";
     let Deordered { plan, nominal, .. } = deordered(text);
@@ -209,9 +209,9 @@ fn pins_are_as_few_as_the_oracle_needs() {
 }
 
 #[test]
-fn an_oracle_that_is_never_content_gets_the_nominal_schedule_and_then_nothing() {
+fn oracle_that_rejects_everything_is_offered_nominal_schedule_then_none() {
     let Deordered { plan, nominal, .. } = deordered("0: collect s1 [15]\n3: navigate [7]");
-    let rigid = pinned_to(plan.clone(), &nominal).network(&Valuation::default());
+    let rigid = with_fixed_times(plan.clone(), &nominal).network(&Valuation::default());
     assert!(elbowroom_stn::Schedule::from(nominal.clone()).holds_in(&rigid));
     let mut asked = 0;
     let nothing = pin_until_sound(plan, &nominal, &mut |_| {

@@ -59,7 +59,7 @@ pub(super) fn open_numbers(
     mistakes: &mut Report,
 ) -> BTreeMap<OpenNumber, ParameterId> {
     let nowhere = Span { start: 0, end: 0 };
-    if unknowns::occur_in_rules(task) {
+    if unknowns::do_rules_mention_unknowns(task) {
         let message = "a derived predicate depends on `:synth-parameters`, which is not supported";
         mistakes.mistake(nowhere, message, None);
     }

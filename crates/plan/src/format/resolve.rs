@@ -55,12 +55,12 @@ pub(super) fn resolve(
     let open = parameters::open_numbers(file, task, &plan, mistakes);
     let parameters = parameters::parameters(file, task, &plan, kinds, &open, mistakes)?;
     let mut goal = task.goal().clone();
-    unknowns::fill(&mut plan, &mut goal, &open);
+    unknowns::substitute_unknowns(&mut plan, &mut goal, &open);
     let plan = ParametrizedPlan {
         plan,
         parameters,
         initial: BTreeMap::new(),
-        told: BTreeMap::new(),
+        commanded_durations: BTreeMap::new(),
         goal,
     };
     Some(plan.with_planned_durations())

@@ -31,7 +31,7 @@ fn refused(text: &str) -> String {
 }
 
 #[test]
-fn everything_the_format_has_is_read() {
+fn all_elements_of_format_are_read() {
     let plan = parsed(PAPER);
     let labels: Vec<_> = plan.plan.instances.iter().map(|i| &i.label[..]).collect();
     assert_eq!(labels, ["n0", "cs1", "b"]);
@@ -52,7 +52,7 @@ fn everything_the_format_has_is_read() {
 }
 
 #[test]
-fn a_free_duration_is_no_longer_bound_by_the_domain() {
+fn free_duration_ignores_bounds_of_domain() {
     let plan = parsed(PAPER);
     let durations = |index: usize| {
         plan.plan.instances[index]
@@ -66,7 +66,7 @@ fn a_free_duration_is_no_longer_bound_by_the_domain() {
 }
 
 #[test]
-fn the_domains_open_number_becomes_the_parameter() {
+fn open_number_of_domain_becomes_parameter() {
     let plan = parsed(PAPER);
     let navigate = plan.plan.instances[0].action.durative().unwrap();
     assert_eq!(
@@ -76,7 +76,7 @@ fn the_domains_open_number_becomes_the_parameter() {
 }
 
 #[test]
-fn an_actions_open_number_is_one_per_instance() {
+fn open_number_of_action_is_separate_for_each_instance() {
     let plan = parsed(
         "durative-action instance a : (refuel s1); durative-action instance b : (refuel s2);
          parameter a.?r default 4; parameter B.?R default 5;",
@@ -161,7 +161,7 @@ fn a_mistake_shows_its_line() {
 }
 
 #[test]
-fn names_of_the_file_are_checked_and_near_ones_offered() {
+fn unknown_name_is_reported_with_similar_names() {
     let text = "
 action instance b : (beep); action instance b : (beep); durative-action instance n : (collect s1);
 parameter speed default 1; parameter speed default 2; parameter 7 default 1;
@@ -182,7 +182,7 @@ text:5:24: error: this infinity is on the wrong side: nothing could satisfy it"
 }
 
 #[test]
-fn open_numbers_of_the_domain_need_a_value() {
+fn missing_value_of_open_number_is_refused() {
     let navigate = "durative-action instance n0 : (navigate);";
     assert_eq!(
         refused(navigate),
@@ -200,7 +200,7 @@ fn open_numbers_of_the_domain_need_a_value() {
 }
 
 #[test]
-fn what_is_written_is_what_was_read() {
+fn written_plan_equals_read_plan() {
     let task = rover();
     let plan = parsed(PAPER);
     let text = write(&task, &plan).unwrap();
@@ -255,7 +255,7 @@ c: b - .zero in [100.001, 107];
 }
 
 #[test]
-fn what_the_format_cannot_say_is_refused() {
+fn inexpressible_plan_is_refused() {
     let task = rover();
     let mut plan = parsed("action instance a : (beep);");
     plan.parameters.push(Parameter {
@@ -277,7 +277,7 @@ fn what_the_format_cannot_say_is_refused() {
 }
 
 #[test]
-fn a_bound_that_nothing_satisfies_is_shown_where_it_stands() {
+fn unsatisfiable_bound_is_reported_at_its_position() {
     let text = "action instance b : (beep);
 c: b - .zero in [9, 8];";
     assert_eq!(

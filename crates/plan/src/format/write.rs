@@ -98,7 +98,7 @@ fn merged(task: &Task, plan: &StnPlan) -> Vec<Difference> {
     let mut all: Vec<Difference> = Vec::new();
     let mut numeric: BTreeMap<(NodeId, NodeId), usize> = BTreeMap::new();
     for constraint in &plan.constraints {
-        let Some(new) = without_timed(task, plan, constraint) else {
+        let Some(new) = remove_timed(task, plan, constraint) else {
             continue;
         };
         let has_parameter = [&new.lower, &new.upper]
@@ -128,7 +128,7 @@ fn tighter(old: &Bound, new: &Bound, excludes: fn(&Rational, &Rational) -> bool)
 
 /// Returns the constraint with `.zero` in place of a timed initial, or `None` if it is only about
 /// fixed times.
-fn without_timed(task: &Task, plan: &StnPlan, constraint: &Constraint) -> Option<Difference> {
+fn remove_timed(task: &Task, plan: &StnPlan, constraint: &Constraint) -> Option<Difference> {
     let time = |node: NodeId| match plan.nodes[node.index()] {
         Node::Timed(index) => Some(task.timed()[index].time.clone()),
         _ => None,

@@ -49,7 +49,7 @@ pub(super) fn fluents(task: &Task, action: &Action, place: Place) -> Vec<FluentI
 }
 
 /// Returns the action with the parameter in place of the constant there.
-pub(super) fn opened(
+pub(super) fn with_parameter(
     task: &Task,
     action: &Action,
     place: Place,

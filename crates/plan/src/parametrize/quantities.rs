@@ -9,14 +9,14 @@ use elbowroom_model::ground::FluentId;
 use elbowroom_model::problem::{Comparison, FunctionId};
 use elbowroom_num::{End, Interval, Rational};
 
+use super::builder::{ParametrizationBuilder, Quantity};
 use super::constants::{self, Place};
-use super::opening::{Opening, Quantity};
-use super::{ConstantTarget, ParametrizeError, VarySpec, nothing, select};
+use super::{ConstantTarget, ParametrizeError, VarySpec, nothing_matches, select};
 use crate::parameter::ParameterKind;
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, NodeId, Reason};
 use crate::valuation::ParameterId;
 
-impl Opening<'_> {
+impl ParametrizationBuilder<'_> {
     pub(super) fn open_durations(
         &mut self,
         spec: &VarySpec,
@@ -32,13 +32,17 @@ impl Opening<'_> {
             let instance = plan.instance(id);
             if instance.action.durative().is_none() {
                 let why = format!("`{}` is instantaneous", instance.action.name);
-                return Err(nothing(spec, why));
+                return Err(nothing_matches(spec, why));
             }
             let (start, end) = (plan.start(id), plan.end(id));
             if let Some(&known) = known.get(&id) {
-                self.opened.entry(Quantity::Duration(id)).or_insert(known);
+                self.parameter_of_quantity
+                    .entry(Quantity::Duration(id))
+                    .or_insert(known);
             }
-            let is_new = !self.opened.contains_key(&Quantity::Duration(id));
+            let is_new = !self
+                .parameter_of_quantity
+                .contains_key(&Quantity::Duration(id));
             let number = instance.label.strip_prefix('n').unwrap_or(&instance.label);
             let name = format!("dur_{number}");
             let nominal = &self.nominal[end] - &self.nominal[start];
@@ -145,11 +149,13 @@ impl Opening<'_> {
                     let read = constants::fluents(self.task, &instance.action, place);
                     // A read of the function itself does not determine the amount of its change.
                     let mut others = read.into_iter();
-                    if let Some(other) = others.find(|fluent| self.names_other(*fluent, target)) {
+                    if let Some(other) =
+                        others.find(|fluent| self.is_other_function(*fluent, target))
+                    {
                         let name = self.task.fluent_name(other);
                         why = format!("{why}; {name} says how much: `initial {name}`");
                     }
-                    return Err(nothing(spec, why));
+                    return Err(nothing_matches(spec, why));
                 }
                 (None, several) => {
                     return Err(ParametrizeError::Ambiguous {
@@ -170,7 +176,7 @@ impl Opening<'_> {
             };
             if target.is_shared && shared.as_ref().is_some_and(|other| *other != value) {
                 let why = "the number is not the same in all of them".to_owned();
-                return Err(nothing(spec, why));
+                return Err(nothing_matches(spec, why));
             }
             let quantity = if target.is_shared {
                 Quantity::Constant(spec.text.clone())
@@ -179,20 +185,21 @@ impl Opening<'_> {
             };
             shared = Some(value.clone());
             let parameter = self.parameter(spec, quantity, name, kind, value.clone())?;
-            let opened = constants::opened(self.task, &instance.action, place, &value, parameter);
+            let opened =
+                constants::with_parameter(self.task, &instance.action, place, &value, parameter);
             self.plan.plan.instances[id.index()].action = Arc::new(opened);
         }
         Ok(())
     }
 
     /// Returns `true` if the fluent belongs to another function than the target's.
-    fn names_other(&self, fluent: FluentId, target: &ConstantTarget) -> bool {
+    fn is_other_function(&self, fluent: FluentId, target: &ConstantTarget) -> bool {
         let function = self.task.problem().function(&target.function);
         Some(self.task.function_of(fluent)) != function
     }
 
     /// Returns an action whose duration is the value of the fluent at time 0.
-    fn lasts(&self, fluent: FluentId) -> Option<&str> {
+    fn action_with_duration(&self, fluent: FluentId) -> Option<&str> {
         let mut instances = self.plan.plan.instances.iter();
         let reads = |instance: &&Instance| {
             instance.action.durative().is_some_and(|body| {
@@ -215,14 +222,14 @@ impl Opening<'_> {
         let fluent = select::fluent(self.task, spec, atom)?;
         let Some(value) = self.task.initial().values.get(&fluent).cloned() else {
             let why = format!("{} has no initial value", self.task.fluent_name(fluent));
-            return Err(nothing(spec, why));
+            return Err(nothing_matches(spec, why));
         };
-        if let Some(action) = self.lasts(fluent) {
+        if let Some(action) = self.action_with_duration(fluent) {
             let why = format!(
                 "the duration of {action} is {}, and the plan fixes it; vary `duration {action}`",
                 self.task.fluent_name(fluent)
             );
-            return Err(nothing(spec, why));
+            return Err(nothing_matches(spec, why));
         }
         let name = format!("initial_{}", joined(atom));
         let kind = ParameterKind::Initial(fluent);
@@ -240,7 +247,9 @@ impl Opening<'_> {
         let groups = select::timed(self.task, spec, atom, only_deletions)?;
         let word = if only_deletions { "deadline" } else { "timed" };
         for group in groups {
-            let is_new = !self.opened.contains_key(&Quantity::Timed(group));
+            let is_new = !self
+                .parameter_of_quantity
+                .contains_key(&Quantity::Timed(group));
             let name = format!("{word}_{}", joined(atom));
             let time = self.task.timed()[group].time.clone();
             let kind = ParameterKind::Timed(group);

@@ -5,7 +5,7 @@ use elbowroom_model::ground::{Change, FluentId};
 use elbowroom_model::problem::{FunctionId, ObjectId};
 use elbowroom_num::Rational;
 
-use super::{ParametrizeError, Selection, VarySpec, nothing};
+use super::{ParametrizeError, Selection, VarySpec, nothing_matches};
 use crate::stn_plan::{InstanceId, StnPlan};
 use elbowroom_text::nearest;
 
@@ -72,7 +72,10 @@ pub(super) fn instances(
 
 fn some(spec: &VarySpec, found: Vec<InstanceId>) -> Result<Vec<InstanceId>, ParametrizeError> {
     if found.is_empty() {
-        return Err(nothing(spec, "the plan has no such action".to_owned()));
+        return Err(nothing_matches(
+            spec,
+            "the plan has no such action".to_owned(),
+        ));
     }
     Ok(found)
 }
@@ -111,7 +114,7 @@ pub(super) fn fluent(
     let function = function(task, spec, name)?;
     let objects = objects(task, spec, arguments)?;
     let found = task.find_fluent(function, &objects);
-    found.ok_or_else(|| nothing(spec, "nothing mentions such a fluent".to_owned()))
+    found.ok_or_else(|| nothing_matches(spec, "nothing mentions such a fluent".to_owned()))
 }
 
 /// Returns the groups of timed initials that change the fact or fluent; at least one.
@@ -148,7 +151,7 @@ pub(super) fn timed(
         } else {
             "changes it"
         };
-        return Err(nothing(spec, format!("no timed initial {what}")));
+        return Err(nothing_matches(spec, format!("no timed initial {what}")));
     }
     Ok(found)
 }

@@ -68,7 +68,7 @@ fn durations_are_chosen_by_action_arguments_or_label() {
 }
 
 #[test]
-fn a_varied_duration_replaces_what_the_domain_says() {
+fn varied_duration_replaces_bounds_of_domain() {
     let plan = varied(&["n1 weight 3 in [10, inf]", "?r=4"]).unwrap();
     let parameter = &plan.parameters[0];
     assert_eq!(parameter.kind, ParameterKind::Duration(InstanceId(1)));
@@ -148,7 +148,7 @@ fn open_numbers_need_a_nominal_value() {
 }
 
 #[test]
-fn mistakes_say_what_would_have_been_right() {
+fn error_messages_name_the_expected_form() {
     let cases = [
         (
             "duration colect",

@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ratio_of_states_is_a_geometric_mean_over_what_both_answer() {
+    fn state_ratio_is_geometric_mean_over_common_instances() {
         // Ratios 8 : 1, 1 : 2 and 4 : 4, with one state more each; the cubic root of 4.
         let variant = [answered(7, 30), answered(0, 10), answered(3, 20), None];
         let base = [
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn what_one_of_them_does_not_answer_is_lost_or_gained() {
+    fn instance_answered_by_one_side_counts_as_lost_or_gained() {
         let variant = [None, None, answered(5, 1), None, None];
         let base = [answered(5, 1), answered(6, 1), None, None, None];
         let found = Comparison::of(&variant, &base);

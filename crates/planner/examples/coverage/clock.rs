@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 /// Stopwatch that starts at its creation.
 pub(crate) struct Clock {
-    begin: Instant,
+    start: Instant,
     /// Processor time at the start, if processor time is measured.
     spent: Option<Duration>,
 }
@@ -13,7 +13,7 @@ impl Clock {
     /// Starts the clock. Measures processor time if requested and available on the system.
     pub(crate) fn now(counts_processor_time: bool) -> Self {
         Self {
-            begin: Instant::now(),
+            start: Instant::now(),
             spent: processor_time().filter(|_| counts_processor_time),
         }
     }
@@ -21,7 +21,7 @@ impl Clock {
     pub(crate) fn elapsed(&self) -> Duration {
         let spent = self.spent.zip(processor_time());
         spent.map_or_else(
-            || self.begin.elapsed(),
+            || self.start.elapsed(),
             |(begin, now)| now.saturating_sub(begin),
         )
     }

@@ -33,7 +33,7 @@ use std::time::{Duration, Instant};
 
 use clock::Clock;
 use elbowroom_model::Situation;
-use elbowroom_planner::{Answer, Found, Progress, Settings, TuningError, plan};
+use elbowroom_planner::{Answer, FoundPlan, Progress, Settings, TuningError, plan};
 use instances::{Instance, Selection, instances, task};
 
 struct Options {
@@ -139,7 +139,7 @@ fn run(options: &Options, instance: &Instance) {
     let situation = Situation::initial(&task);
     let begin = Clock::now(options.counts_processor_time);
     let mut first: Option<(f64, String, String)> = None;
-    let metric = |found: &Found| found.metric.as_ref().map(|metric| metric.to_decimal(3));
+    let metric = |found: &FoundPlan| found.metric.as_ref().map(|metric| metric.to_decimal(3));
     let mut prepared = 0.0;
     let mut observe = |progress: &Progress| {
         if progress.counts.evaluated == 0 {

@@ -68,7 +68,7 @@ pub struct Progress {
     /// Number of generated and evaluated states.
     pub counts: Counts,
     /// The best plan so far, if this report is about a new best plan.
-    pub plan: Option<Found>,
+    pub plan: Option<FoundPlan>,
     /// The objective's value of the best plan so far; smaller is better. Values to be maximized are
     /// negated.
     pub best: Option<Rational>,
@@ -108,7 +108,7 @@ pub struct Counts {
 
 /// A valid plan and its values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct FoundPlan {
     /// The plan. If it begins in a situation, its first steps continue the running actions.
     pub plan: TimeTriggeredPlan,
     /// The time of its last happening, on the task's clock.
@@ -126,7 +126,7 @@ pub enum Answer {
     /// A plan that the validator has accepted.
     Plan {
         /// The best plan found.
-        found: Found,
+        found: FoundPlan,
         /// Reason for the end of the search.
         stopped: Stopped,
         /// Statistics.
@@ -165,7 +165,7 @@ impl Answer {
     }
 
     /// Returns the plan, if one was found.
-    pub fn found(&self) -> Option<&Found> {
+    pub fn found(&self) -> Option<&FoundPlan> {
         match self {
             Self::Plan { found, .. } => Some(found),
             _ => None,

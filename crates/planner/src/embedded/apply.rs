@@ -3,7 +3,7 @@
 mod conditions;
 mod durations;
 pub(super) mod effects;
-mod places;
+mod placement;
 
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
@@ -13,12 +13,12 @@ use super::compile::{Compiled, Macro, NONE};
 use super::expressions::{Form, Moment};
 use super::formula::set;
 use super::network::{NodeId, SETTLED};
-use super::state::{Joint, Open, State};
+use super::state::{JointMoment, OpenAction, State};
 use super::symbolic;
 use super::time::{NEVER, Ticks};
 use conditions::Side;
 use durations::demand_duration;
-use places::{forget_past, insert, keep_within, reach_foreseen_end, reach_timed, settle};
+use placement::{insert, keep_within, place_known_end, place_timed, project_past, settle};
 
 /// A choice of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -77,7 +77,7 @@ pub(crate) struct Stepper<'a> {
 }
 
 /// Maximum number of happenings that are joined at one moment.
-const MOST_JOINED: u8 = 6;
+const MAX_JOINED: u8 = 6;
 
 /// The exact data of a network's nodes, whose times are rounded to ticks.
 #[derive(Clone, Debug, Default)]
@@ -120,7 +120,7 @@ impl<'a> Stepper<'a> {
                 let reads_duration = self.compiled.tests[test as usize]
                     .difference
                     .reads_duration();
-                !reads_duration && !state.passes(self.compiled, test, None)
+                !reads_duration && !state.test_holds(self.compiled, test, None)
             };
             if state.symbolic.is_none() && snap.condition.tests.iter().any(fails) {
                 return None;
@@ -143,7 +143,7 @@ impl<'a> Stepper<'a> {
             }
             Step::Compressed(action) => {
                 let place = self.start(state, action)?;
-                self.keeps_conditions(state)?;
+                self.preserves_conditions(state)?;
                 self.end(state, place)?;
             }
             Step::Macro(_) => {
@@ -154,10 +154,10 @@ impl<'a> Stepper<'a> {
             Step::End(place) => self.end(state, place as usize)?,
             Step::Timed => self.timed(state)?,
         }
-        if self.settles(state) && self.is_chronological {
-            forget_past(state, self.compiled.longest_distance);
+        if self.can_settle(state) && self.is_chronological {
+            project_past(state, self.compiled.longest_distance);
         }
-        self.keeps_conditions_or_joins(state)?;
+        self.preserves_conditions_or_joins(state)?;
         let is_in_time = state.earliest_end() <= self.horizon;
         (is_in_time && self.has_times(state)).then_some(())
     }
@@ -172,24 +172,24 @@ impl<'a> Stepper<'a> {
     }
 
     /// Returns `true` if happenings may leave the network.
-    fn settles(&self, state: &State) -> bool {
+    fn can_settle(&self, state: &State) -> bool {
         self.log.is_none() && state.symbolic.is_none() && !self.joins
     }
 
     /// Returns `Some` if all over-all conditions hold, or further happenings of the same moment may
     /// still satisfy them.
-    fn keeps_conditions_or_joins(&self, state: &mut State) -> Option<()> {
+    fn preserves_conditions_or_joins(&self, state: &mut State) -> Option<()> {
         let before = state.joint.take();
-        let is_kept = self.keeps_conditions(state);
+        let is_kept = self.preserves_conditions(state);
         if is_kept.is_some() || !self.joins || self.newest == SETTLED {
             return is_kept;
         }
         let count = before.map_or(1, |joint| joint.count + 1);
-        state.joint = Some(Joint {
+        state.joint = Some(JointMoment {
             node: self.newest,
             count,
         });
-        (count < MOST_JOINED).then_some(())
+        (count < MAX_JOINED).then_some(())
     }
 
     /// Starts a durative action and returns its index among the running actions, or applies an
@@ -202,8 +202,8 @@ impl<'a> Stepper<'a> {
         let snap = self.compiled.snap(action.start);
         if action.end == NONE {
             let mut place = self.place(state, snap);
-            let node = insert(state, self.settles(state), snap, &mut place, false)?;
-            self.note_last(state, node, &place)?;
+            let node = insert(state, self.can_settle(state), snap, &mut place, false)?;
+            self.record_last(state, node, &place)?;
             let moment = moment(state, || (Form::node(node), None));
             self.demand(state, &snap.condition, None, &moment)?;
             self.take_effect(state, snap, u64::MAX, None, &moment)?;
@@ -217,9 +217,9 @@ impl<'a> Stepper<'a> {
             let time = self.compiled.timed[timed as usize].time;
             place.latest = place.latest.min(time - least);
         }
-        let node = insert(state, self.settles(state), snap, &mut place, true)?;
+        let node = insert(state, self.can_settle(state), snap, &mut place, true)?;
         keep_within(state, action, [node, node], least)?;
-        self.note_last(state, node, &place)?;
+        self.record_last(state, node, &place)?;
         let mut end = SETTLED;
         if state.symbolic.is_some() {
             let after = [(node, least)];
@@ -252,9 +252,9 @@ impl<'a> Stepper<'a> {
         self.take_effect(state, snap, guards, duration.as_ref(), &moment)?;
         for (fluent, rate) in &flows {
             symbolic::flow(state, *fluent, rate, &moment.time)?;
-            self.watch(state, &[*fluent], (Side::After, &moment))?;
+            self.recheck_over_all(state, &[*fluent], (Side::After, &moment))?;
         }
-        let mut open = Open {
+        let mut open = OpenAction {
             action: number,
             node,
             start: state.network.earliest(node),
@@ -267,8 +267,8 @@ impl<'a> Stepper<'a> {
             beginnings: Vec::new(),
             chosen: Vec::new(),
         };
-        self.watch_all(state, &mut open, (Side::Beginning, &moment))?;
-        self.nest(state, &open)?;
+        self.recheck_all(state, &mut open, (Side::Beginning, &moment))?;
+        self.constrain_nested_ends(state, &open)?;
         let place = state.open.partition_point(|other| other.action <= number);
         state.open.insert(place, open);
         Some(place)
@@ -289,24 +289,24 @@ impl<'a> Stepper<'a> {
         }
         let mut when = self.place(state, snap);
         let node = if open.end != SETTLED {
-            reach_foreseen_end(state, snap, &when, open.end)?;
+            place_known_end(state, snap, &when, open.end)?;
             open.end
         } else if open.node == SETTLED {
             when.earliest = when.earliest.max(open.start + open.least);
             if open.most < NEVER {
                 when.latest = when.latest.min(open.start + open.most);
             }
-            insert(state, self.settles(state), snap, &mut when, false)?
+            insert(state, self.can_settle(state), snap, &mut when, false)?
         } else {
             when.after.push((open.node, open.least));
-            let node = insert(state, self.settles(state), snap, &mut when, true)?;
+            let node = insert(state, self.can_settle(state), snap, &mut when, true)?;
             keep_within(state, action, [open.node, node], 0)?;
             if open.most < NEVER {
                 state.network.add_edge(node, open.node, -open.most).ok()?;
             }
             node
         };
-        self.note_last(state, node, &when)?;
+        self.record_last(state, node, &when)?;
         if open.node != SETTLED {
             self.note_end(&open, node);
         }
@@ -321,19 +321,19 @@ impl<'a> Stepper<'a> {
         });
         self.demand(state, &snap.condition, open.duration.as_ref(), &moment)?;
         if state.symbolic.is_some() {
-            self.watch_all(state, &mut open, (Side::Arrival, &moment))?;
+            self.recheck_all(state, &mut open, (Side::Arrival, &moment))?;
             demand_duration(state, action, true, &moment)?;
             for (fluent, _) in &open.flows {
-                self.watch(state, &[*fluent], (Side::Arrival, &moment))?;
+                self.recheck_over_all(state, &[*fluent], (Side::Arrival, &moment))?;
             }
         }
         state.open.remove(place);
         self.take_effect(state, snap, open.guards, open.duration.as_ref(), &moment)?;
         for (fluent, rate) in &open.flows {
             symbolic::flow(state, *fluent, &-rate, &moment.time)?;
-            self.watch(state, &[*fluent], (Side::After, &moment))?;
+            self.recheck_over_all(state, &[*fluent], (Side::After, &moment))?;
         }
-        if self.settles(state) && !self.is_chronological {
+        if self.can_settle(state) && !self.is_chronological {
             settle(state);
         }
         Some(())
@@ -341,8 +341,8 @@ impl<'a> Stepper<'a> {
 
     /// Returns the start time of an action that was running in the situation. The value is rounded
     /// to ticks, as all times of the search, but exact while a plan is extracted.
-    fn start_of_running(&self, open: &Open) -> Rational {
-        let running = self.compiled.beginning.running.get(open.action as usize);
+    fn start_of_running(&self, open: &OpenAction) -> Rational {
+        let running = self.compiled.initial.running.get(open.action as usize);
         let exact = running.filter(|_| self.log.is_some());
         exact.map_or_else(
             || self.compiled.scale.units(open.start),
@@ -351,7 +351,7 @@ impl<'a> Stepper<'a> {
     }
 
     /// Records the exact duration for the times of the plan.
-    fn note_end(&mut self, open: &Open, node: NodeId) {
+    fn note_end(&mut self, open: &OpenAction, node: NodeId) {
         let scale = self.compiled.scale;
         let Some(log) = &mut self.log else { return };
         let (least, most) = if let Some(duration) = &open.duration {
@@ -367,7 +367,7 @@ impl<'a> Stepper<'a> {
         let timed = self.compiled.timed.get(state.timed as usize)?;
         state.timed += 1;
         if self.is_chronological {
-            reach_timed(state, timed.time)?;
+            place_timed(state, timed.time)?;
         }
         if self.joins {
             let node = state.network.add_node(timed.time, timed.time, &[]).ok()?;
@@ -385,10 +385,10 @@ impl<'a> Stepper<'a> {
         };
         for (fluent, value) in &timed.assigns {
             if state.symbolic.is_some() {
-                self.watch(state, &[*fluent], (Side::Arrival, &moment))?;
+                self.recheck_over_all(state, &[*fluent], (Side::Arrival, &moment))?;
                 let value = Form::constant(value.clone());
                 symbolic::update(state, *fluent, UpdateOperator::Assign, &value, &moment)?;
-                self.watch(state, &[*fluent], (Side::After, &moment))?;
+                self.recheck_over_all(state, &[*fluent], (Side::After, &moment))?;
             } else {
                 state.values[*fluent as usize] = Some(value.clone());
             }

@@ -65,14 +65,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_spent_is_left_for_time() {
+    fn unspent_metric_is_available_for_time() {
         assert_eq!(latest(2, false, 1), Some(2));
         assert_eq!(latest(2, true, 1), Some(3));
         assert_eq!(latest(2, false, 2), Some(2));
     }
 
     #[test]
-    fn without_time_the_limit_may_be_met_or_not() {
+    fn timeless_limit_can_be_inclusive_or_exclusive() {
         assert_eq!(latest(0, false, 6), Some(NEVER));
         assert_eq!(latest(0, false, 7), None);
         assert_eq!(latest(0, true, 7), Some(NEVER));

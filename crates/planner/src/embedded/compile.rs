@@ -8,7 +8,6 @@
 //! PDDL's no-moving-targets rule and by over-all conditions is computed once, and the search only
 //! takes maxima.
 
-mod beginning;
 mod builder;
 mod calendars;
 mod completeness;
@@ -17,14 +16,15 @@ mod compression;
 mod directions;
 mod exclusive;
 mod fixed_durations;
+mod full_form;
 mod guarded;
+mod initial_state;
 mod interference;
 mod macros;
 mod metric;
 mod own_start;
 mod reads;
 mod rules;
-mod shortened;
 mod symbols;
 mod times;
 mod unfolded;
@@ -38,9 +38,9 @@ use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
 use elbowroom_num::Rational;
 
-pub(crate) use beginning::Beginning;
-pub(crate) use builder::{Failure, Wanted, compile};
+pub(crate) use builder::{CompileInput, Failure, compile};
 pub(crate) use calendars::{Calendar, Dates, spans};
+pub(crate) use initial_state::InitialState;
 pub(crate) use macros::Macro;
 pub(crate) use metric::Metric;
 pub use unsupported::Unsupported;
@@ -101,7 +101,7 @@ pub(crate) struct Compiled {
     pub(crate) strata: Vec<Vec<Rule>>,
     /// The derived facts, by stratum.
     pub(crate) derived: Vec<Vec<u32>>,
-    pub(crate) beginning: Beginning,
+    pub(crate) initial: InitialState,
     /// `true` if the compilation is exact. Only then does an exhausted search prove that no plan
     /// exists.
     pub(crate) is_exact: bool,
@@ -273,7 +273,7 @@ impl Compiled {
     /// time.
     pub(crate) fn earliest(&self, tick: Ticks) -> Rational {
         if tick == self.now {
-            self.beginning.time.clone()
+            self.initial.time.clone()
         } else {
             self.scale.units(tick)
         }
@@ -285,7 +285,7 @@ impl Compiled {
         let list = self.action(action).dates.windows?;
         let intervals = self.windows.as_ref()?.list(list);
         let current = intervals.iter().find(|(begin, _)| *begin <= self.now);
-        let is_on_grid = self.scale.exactly(&self.beginning.time).is_some();
+        let is_on_grid = self.scale.exactly(&self.initial.time).is_some();
         let at_once = self.now + Ticks::from(!is_on_grid);
         let end = current.map_or(at_once, |&(_, end)| end);
         (end < NEVER).then_some(end)

@@ -16,7 +16,7 @@ pub(crate) struct Form {
 
 /// A number that changes continuously: `base + rate · now`.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Course {
+pub(crate) struct LinearFunction {
     pub(crate) base: Form,
     pub(crate) rate: Rational,
 }
@@ -25,7 +25,7 @@ pub(crate) struct Course {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Symbolic {
     /// By fluent. These fluents have no value in `State::values`.
-    pub(crate) courses: Vec<(u32, Course)>,
+    pub(crate) functions: Vec<(u32, LinearFunction)>,
     /// `form comparison 0`.
     pub(crate) demands: Vec<(Form, Comparison)>,
     /// Times of the happenings in the demands from the last solution, as a starting point for the
@@ -35,7 +35,7 @@ pub(crate) struct Symbolic {
 
 impl PartialEq for Symbolic {
     fn eq(&self, other: &Self) -> bool {
-        (&self.courses, &self.demands) == (&other.courses, &other.demands)
+        (&self.functions, &self.demands) == (&other.functions, &other.demands)
     }
 }
 
@@ -93,14 +93,16 @@ impl Form {
 }
 
 impl Symbolic {
-    pub(crate) fn course(&self, fluent: u32) -> Option<&Course> {
-        let place = self.courses.binary_search_by_key(&fluent, |entry| entry.0);
-        place.ok().map(|place| &self.courses[place].1)
+    pub(crate) fn linear_function(&self, fluent: u32) -> Option<&LinearFunction> {
+        let place = self
+            .functions
+            .binary_search_by_key(&fluent, |entry| entry.0);
+        place.ok().map(|place| &self.functions[place].1)
     }
 
     /// Returns `true` if the fluent's value depends on times.
-    pub(crate) fn governs(&self, fluent: u32) -> bool {
-        self.course(fluent).is_some()
+    pub(crate) fn is_time_dependent(&self, fluent: u32) -> bool {
+        self.linear_function(fluent).is_some()
     }
 
     /// Demands `form comparison 0`. Of two demands that differ only in the constant, the stronger
@@ -131,7 +133,7 @@ impl Symbolic {
     /// Returns an estimate of the memory, in bytes.
     pub(crate) fn size(&self) -> usize {
         let term = size_of::<(NodeId, Rational)>();
-        let forms = self.courses.iter().map(|(_, course)| &course.base);
+        let forms = self.functions.iter().map(|(_, course)| &course.base);
         let forms = forms.chain(self.demands.iter().map(|(form, _)| form));
         let forms: usize = forms.map(|form| 80 + term * form.terms.capacity()).sum();
         forms + term * self.times.capacity()

@@ -89,7 +89,7 @@ impl<'a> Replay<'a> {
         let mut stepper = Stepper::new(compiled);
         stepper.log = Some(Log::default());
         stepper.joins = compiled.needs_joining;
-        let under_way = compiled.beginning.running.len();
+        let under_way = compiled.initial.running.len();
         let timings = (0..).take(under_way).map(|action| Timing {
             action,
             start: None,
@@ -184,7 +184,7 @@ fn exact_distances(log: &Log) -> Vec<(NodeId, NodeId, Rational)> {
 fn known_ends(situation: &Situation, compiled: &Compiled, timings: &[Timing]) -> Vec<KnownEnd> {
     let tick = compiled.scale.units(1);
     let each = situation.running.iter().zip(timings);
-    let ends = each.zip(&compiled.beginning.running);
+    let ends = each.zip(&compiled.initial.running);
     ends.filter_map(|((running, timing), rounded)| {
         let earliest = match &running.duration.lower {
             End::Closed(least) => &running.start + least,

@@ -22,7 +22,7 @@ mod tests;
 use super::compile::{Compiled, NONE};
 use super::formula::{Literal, is_set, set};
 use super::relaxed::{Graph, Labels};
-use super::state::{Open, State};
+use super::state::{OpenAction, State};
 
 /// A proposition that must be true at some time.
 #[derive(Clone, Debug)]
@@ -43,13 +43,13 @@ pub(crate) struct Landmarks {
     pub(crate) list: Vec<Landmark>,
     first_test: u32,
     /// Number of landmarks that are not goals and did not hold in the initial state.
-    pub(crate) on_the_way: usize,
+    pub(crate) intermediate_count: usize,
 }
 
 impl Landmarks {
     /// Returns the landmarks from a state for the goal and for the ends of the running actions,
     /// given the labels of the state. Returns `None` if they are unreachable.
-    pub(crate) fn of(graph: &Graph, labels: &Labels, open: &[Open]) -> Option<Self> {
+    pub(crate) fn of(graph: &Graph, labels: &Labels, open: &[OpenAction]) -> Option<Self> {
         let mut wanted = graph.goal.clone();
         for open in open {
             let end = &graph.operators[graph.end_of[open.action as usize] as usize];
@@ -62,7 +62,7 @@ impl Landmarks {
         let goals = graph.goal.iter().copied();
         let held = goals.chain(needs.iter().flatten().copied());
         let mut all: Vec<u32> = held
-            .filter(|&held| graph.is_listed(held) && labels.held(held))
+            .filter(|&held| graph.is_listed(held) && labels.held_initially(held))
             .chain(to_reach.iter().copied())
             .collect();
         all.sort_unstable();
@@ -101,7 +101,7 @@ impl Landmarks {
         Some(Self {
             list,
             first_test,
-            on_the_way,
+            intermediate_count: on_the_way,
         })
     }
 
@@ -140,7 +140,7 @@ impl Landmarks {
     fn is_true(&self, compiled: &Compiled, state: &State, proposition: u32) -> bool {
         match proposition.checked_sub(self.first_test) {
             None => Literal(proposition).holds(&state.facts),
-            Some(test) => state.passes(compiled, test, None),
+            Some(test) => state.test_holds(compiled, test, None),
         }
     }
 }

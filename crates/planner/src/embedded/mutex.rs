@@ -17,7 +17,7 @@ use super::hash::Map;
 use super::state::State;
 
 /// Maximum number of choices tried for each initial atom.
-const MOST_TRIES: usize = 16;
+const MAX_TRIES: usize = 16;
 
 /// A start, an end, an instant or timed initials.
 #[derive(Debug, Default)]
@@ -165,7 +165,7 @@ impl Finder {
     /// Returns a group with that atom, if one is found.
     fn group_with(&mut self, seed: u32) -> Option<Vec<u32>> {
         let mut choices = Choices::new();
-        for _ in 0..MOST_TRIES {
+        for _ in 0..MAX_TRIES {
             let mut members = Vec::new();
             let is_balanced = self.grow(&mut members, seed, &mut choices);
             if is_balanced {
@@ -207,7 +207,7 @@ impl Finder {
                     if self.grow(members, candidate, choices) {
                         break;
                     }
-                    self.cut(members, before.0);
+                    self.truncate_members(members, before.0);
                     choices.truncate(before.1);
                 }
             }
@@ -215,7 +215,7 @@ impl Finder {
     }
 
     /// Removes all members beyond the first `count`.
-    fn cut(&mut self, members: &mut Vec<u32>, count: usize) {
+    fn truncate_members(&mut self, members: &mut Vec<u32>, count: usize) {
         for member in members.drain(count..) {
             self.is_member[member as usize] = false;
         }
@@ -310,7 +310,7 @@ mod tests {
 
     use super::*;
     use crate::embedded::apply::Stepper;
-    use crate::embedded::pairs::tests::drafts;
+    use crate::embedded::h2::tests::drafts;
     use crate::embedded::root::root;
     use crate::embedded::testing::{choices, compiled};
 

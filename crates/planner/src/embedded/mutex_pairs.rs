@@ -91,11 +91,11 @@ struct Finder<'a> {
     /// Buffer: atoms that may hold together with the preconditions of an operator.
     context: Vec<u64>,
     /// Buffer: atoms of the context that are compatible with its effects.
-    kept: Vec<u64>,
+    retained: Vec<u64>,
     budget: work::Budget,
-    goes_on: &'a mut dyn FnMut() -> bool,
+    should_continue: &'a mut dyn FnMut() -> bool,
     /// Work done before the last call of `goes_on`.
-    asked: u64,
+    work_at_last_call: u64,
 }
 
 /// Work between two calls of `goes_on`: some milliseconds.
@@ -109,10 +109,10 @@ impl<'a> Finder<'a> {
             evaluated: vec![0; model.operators.len()],
             is_live: vec![false; model.operators.len()],
             context: vec![0; words],
-            kept: vec![0; words],
+            retained: vec![0; words],
             budget: work::Budget::new(most_work),
-            goes_on,
-            asked: 0,
+            should_continue: goes_on,
+            work_at_last_call: 0,
         }
     }
 
@@ -159,9 +159,9 @@ impl<'a> Finder<'a> {
             for operator in 0..self.model.operators.len() {
                 has_changed |= evaluate(self, table, operator, round);
                 let used = self.budget.used();
-                if used - self.asked >= WORK_BETWEEN_CALLS {
-                    self.asked = used;
-                    if !(self.goes_on)() {
+                if used - self.work_at_last_call >= WORK_BETWEEN_CALLS {
+                    self.work_at_last_call = used;
+                    if !(self.should_continue)() {
                         return None;
                     }
                 }
@@ -242,7 +242,7 @@ impl<'a> Finder<'a> {
         self.is_live[number] = true;
         let with_after = live.all_of(&after);
         let kept = self
-            .kept
+            .retained
             .iter_mut()
             .zip(self.context.iter().zip(&with_after));
         for (kept, (context, with_after)) in kept {
@@ -253,11 +253,11 @@ impl<'a> Finder<'a> {
         lost.extend(ended.map(|(running, _)| running));
         lost.retain(|&atom| table::contains(&self.context, atom));
         for &atom in &lost {
-            table::insert(&mut self.kept, atom);
+            table::insert(&mut self.retained, atom);
         }
         let mut has_changed = false;
         for &atom in &lost {
-            let with = and(reached.row(atom), &self.kept);
+            let with = and(reached.row(atom), &self.retained);
             has_changed |= live.add(atom, &with, round);
         }
         spend(self.context.len() * (2 + after.len() + 2 * lost.len()));

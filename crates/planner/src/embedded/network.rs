@@ -202,14 +202,14 @@ impl Network {
     }
 
     /// Raises the lower bound of a node to `time`.
-    pub(crate) fn delay(&mut self, node: NodeId, time: Ticks) -> Result<(), Inconsistent> {
+    pub(crate) fn raise_earliest(&mut self, node: NodeId, time: Ticks) -> Result<(), Inconsistent> {
         let floor = &mut self.nodes[node as usize].floor;
         *floor = (*floor).max(time);
         self.push(node, time, SETTLED)
     }
 
     /// Lowers the upper bound of a node to `time`.
-    pub(crate) fn hurry(&mut self, node: NodeId, time: Ticks) -> Result<(), Inconsistent> {
+    pub(crate) fn lower_latest(&mut self, node: NodeId, time: Ticks) -> Result<(), Inconsistent> {
         let place = &mut self.nodes[node as usize];
         place.latest = place.latest.min(time);
         if place.earliest > place.latest {

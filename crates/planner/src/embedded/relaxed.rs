@@ -9,13 +9,13 @@
 
 mod changes;
 mod consumables;
+mod cost_propagation;
 mod deadlines;
 mod graph;
 mod labels;
 mod numbers;
 mod plan;
 mod resources;
-mod spread;
 #[cfg(test)]
 mod tests;
 
@@ -25,11 +25,11 @@ use elbowroom_num::Rational;
 
 use super::apply::Step;
 use super::compile::{Compiled, Compressibility};
+use super::end_windows::EndWindows;
 use super::formula::Literal;
 use super::network::SETTLED;
 use super::root::root;
-use super::spans::Spans;
-use super::state::{Open, State};
+use super::state::{OpenAction, State};
 use super::step_costs::StepCosts;
 use super::symbolic;
 use super::time::{NEVER, Ticks};
@@ -115,7 +115,7 @@ impl<'a> Relaxed<'a> {
     /// Creates an evaluator. Actions that are at least as safe to compress as `compresses` count as
     /// one step.
     pub(crate) fn new(compiled: &'a Compiled, compresses: Option<Compressibility>) -> Self {
-        Self::over(compiled, Graph::of(compiled, compresses, &[]))
+        Self::from_graph(compiled, Graph::of(compiled, compresses, &[]))
     }
 
     /// As [`new`](Self::new), with macro-operators in place of the starts of their envelopes.
@@ -125,12 +125,12 @@ impl<'a> Relaxed<'a> {
         compresses: Option<Compressibility>,
     ) -> Option<Self> {
         let graph = Graph::of(compiled, compresses, &compiled.macros);
-        let mut relaxed = Self::over(compiled, graph);
+        let mut relaxed = Self::from_graph(compiled, graph);
         relaxed.evaluate(&root(compiled))?;
         Some(relaxed)
     }
 
-    fn over(compiled: &'a Compiled, graph: Graph) -> Self {
+    fn from_graph(compiled: &'a Compiled, graph: Graph) -> Self {
         let (propositions, operators) = (graph.proposition_count, graph.operators.len());
         Self {
             compiled,
@@ -158,8 +158,8 @@ impl<'a> Relaxed<'a> {
     }
 
     /// Weights each step by its cost instead of one.
-    pub(crate) fn weigh(&mut self, step_costs: &StepCosts) {
-        self.graph.weigh(step_costs);
+    pub(crate) fn set_step_costs(&mut self, step_costs: &StepCosts) {
+        self.graph.set_step_costs(step_costs);
         self.own_cost = own_costs(&self.graph);
     }
 
@@ -186,8 +186,8 @@ impl<'a> Relaxed<'a> {
     }
 
     /// Excludes the starts of these actions, by action number.
-    pub(crate) fn leave_out(&mut self, is_left_out: &[bool]) {
-        self.graph.leave_out(self.compiled, is_left_out);
+    pub(crate) fn exclude_starts(&mut self, is_left_out: &[bool]) {
+        self.graph.exclude_starts(self.compiled, is_left_out);
     }
 
     /// Enables the accounting of resources: relaxed plans replenish the resources that they use up.
@@ -214,7 +214,7 @@ impl<'a> Relaxed<'a> {
 
     /// Returns `true` if exactly one instance of the action is running, and no fact that its end
     /// adds is true or can become true before it.
-    pub(crate) fn is_end_the_only_way(&mut self, state: &State, action: u32) -> bool {
+    pub(crate) fn is_end_unavoidable(&mut self, state: &State, action: u32) -> bool {
         let instances = state.open.iter().filter(|open| open.action == action);
         if instances.count() != 1 {
             return false;
@@ -227,7 +227,7 @@ impl<'a> Relaxed<'a> {
             return false;
         }
         self.missing[self.graph.end_of[action as usize] as usize] += 1;
-        self.spread(state, self.serves_repairs);
+        self.propagate_costs(state, self.serves_repairs);
         !is_true(&self.cost)
     }
 
@@ -250,7 +250,7 @@ impl<'a> Relaxed<'a> {
 
     /// Returns a literal of the goal that changes at fixed times only and is false at the end, and
     /// the time at which it last becomes false.
-    pub(crate) fn lost_goal(&self) -> Option<(Literal, Ticks)> {
+    pub(crate) fn expired_goal(&self) -> Option<(Literal, Ticks)> {
         let mut goals = self.compiled.goal.literals.iter();
         goals.find_map(|&literal| {
             let (_, end) = self.graph.spans_of(literal)?.last()?;
@@ -282,7 +282,7 @@ impl<'a> Relaxed<'a> {
         let asks_for_others = self.graph.has_single_starts
             || !self.resources.is_empty()
             || !self.consumables.is_empty();
-        self.spread(state, self.serves_repairs || !asks_for_others);
+        self.propagate_costs(state, self.serves_repairs || !asks_for_others);
         let mut estimate = Estimate::default();
         for open in &state.open {
             let end = self.graph.end_of[open.action as usize];
@@ -311,7 +311,7 @@ impl<'a> Relaxed<'a> {
     pub(crate) fn list(&mut self, state: &State) -> Option<Estimate> {
         let is_in_time = self.prepare(state);
         if is_in_time {
-            self.spread_at_cost_zero(state);
+            self.propagate_zero_costs(state);
         }
         self.buckets.iter_mut().for_each(Vec::clear);
         let mut estimate = Estimate::default();
@@ -325,21 +325,22 @@ impl<'a> Relaxed<'a> {
         let mut is_in_time = true;
         let spans = self
             .is_chronological
-            .then(|| Spans::of(self.compiled, state));
+            .then(|| EndWindows::of(self.compiled, state));
         self.cost.fill(UNREACHED);
         self.missing.clone_from(&self.graph.precondition_counts);
         self.operator_cost.clone_from(&self.own_cost);
         self.applicable.clear();
         for open in &state.open {
-            for &operator in &self.graph.kept_out[open.action as usize] {
+            for &operator in &self.graph.excluded_operators[open.action as usize] {
                 self.missing[operator as usize] += 1;
             }
         }
-        let outlasts =
-            |open: &Open| open.most < NEVER && (open.node == SETTLED || self.is_chronological);
+        let outlasts = |open: &OpenAction| {
+            open.most < NEVER && (open.node == SETTLED || self.is_chronological)
+        };
         if self.horizon < NEVER || !self.graph.windows.is_empty() || state.open.iter().any(outlasts)
         {
-            is_in_time = self.deadlines.exclude_late(
+            is_in_time = self.deadlines.exclude_late_operators(
                 self.compiled,
                 &self.graph,
                 state,
@@ -352,7 +353,7 @@ impl<'a> Relaxed<'a> {
         let reach = |proposition: u32, cost: &mut Vec<u32>, buckets: &mut Vec<Vec<u32>>| {
             if cost[proposition as usize] != 0 {
                 cost[proposition as usize] = 0;
-                if graph.needing(proposition).is_empty() {
+                if graph.dependents(proposition).is_empty() {
                     return;
                 }
                 if buckets.is_empty() {
@@ -376,7 +377,7 @@ impl<'a> Relaxed<'a> {
                 None
             } else if depends_on_times(self.compiled, test, state) {
                 numbers::gap_of_levels(self.compiled, test, &levels)
-            } else if state.passes(self.compiled, test, None) {
+            } else if state.test_holds(self.compiled, test, None) {
                 None
             } else {
                 Some(numbers::gap(self.compiled, test, state))
@@ -437,7 +438,10 @@ pub(crate) fn last_end(spans: &[(Ticks, Ticks)]) -> Option<Ticks> {
 /// Returns the highest levels of exclusive fluents whose values depend on times. No other action
 /// reads them before the ends of the running ones.
 fn highest_levels(compiled: &Compiled, state: &State) -> Vec<(u32, Rational)> {
-    let courses = state.symbolic.iter().flat_map(|symbolic| &symbolic.courses);
+    let courses = state
+        .symbolic
+        .iter()
+        .flat_map(|symbolic| &symbolic.functions);
     let exclusive = courses.filter(|(fluent, _)| compiled.exclusive_fluents[*fluent as usize]);
     let levels = exclusive.filter_map(|(fluent, _)| {
         let level = symbolic::highest_level(compiled, state, *fluent)?;
@@ -453,6 +457,6 @@ fn depends_on_times(compiled: &Compiled, test: u32, state: &State) -> bool {
     };
     let mut depends = false;
     let difference = &compiled.tests[test as usize].difference;
-    difference.visit_fluents(&mut |fluent| depends |= symbolic.governs(fluent));
+    difference.visit_fluents(&mut |fluent| depends |= symbolic.is_time_dependent(fluent));
     depends
 }

@@ -3,17 +3,18 @@
 use super::compile::Compiled;
 use super::expressions::Form;
 use super::network::Network;
-use super::state::{Open, State};
+use super::state::{OpenAction, State};
 use super::symbolic;
 
 /// Returns the state of the situation, with its running actions.
 pub(crate) fn root(compiled: &Compiled) -> State {
-    let beginning = &compiled.beginning;
+    let beginning = &compiled.initial;
     let mut state = State::new(compiled, &beginning.facts, beginning.values.clone());
     state.cost.clone_from(&beginning.cost);
     state.network = Network::with_windows(compiled.windows.clone());
     for (number, running) in (0..).zip(&beginning.running) {
-        let mut open = Open::under_way(number, running.start, running.least, running.most);
+        let mut open =
+            OpenAction::running_initially(number, running.start, running.least, running.most);
         open.duration.clone_from(&running.duration);
         if let Some(latest) = compiled.latest_end_in_window(number) {
             open.most = open.most.min(latest - running.start);

@@ -2,11 +2,11 @@
 
 mod cleanup;
 mod improve;
+mod memory_limit;
+mod parallel;
 mod portfolio;
 mod refining;
-mod room;
-mod side_by_side;
-mod strand;
+mod worker;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -15,19 +15,19 @@ use elbowroom_model::Task;
 
 use super::answer::{Answer, Counts, Progress, Proof, Stopped};
 use super::compile::Compiled;
+use super::deadline_explanation::{self, Names};
 use super::mutex_pairs::MutexPairs;
-use super::reasons::{self, Names};
 use super::relaxed;
 use super::root::root;
 use super::search::Search;
 use super::symmetry::Symmetry;
 use super::tuning::Technique;
-use improve::Entrant;
-use refining::Nearby;
-use room::taken;
-use side_by_side::{Job, Tell, side_by_side};
-pub(super) use strand::Frame;
-use strand::{Allowance, Best, Outcome, Report, Strand};
+use improve::SearchSlot;
+use memory_limit::memory_of;
+use parallel::{Job, ReportCallback, run_parallel};
+use refining::LocalSearch;
+pub(super) use worker::Frame;
+use worker::{Best, Outcome, Report, SearchBudget, Worker};
 
 pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
     Answer::NoneFound {
@@ -38,7 +38,7 @@ pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
 }
 
 /// Result of the search for a first plan.
-enum First {
+enum FirstPlanResult {
     /// No plan exists.
     Proved(Proof),
     /// The run is over, with or without a plan.
@@ -59,21 +59,21 @@ pub(super) struct Planner<'a> {
     pub(super) has_reservoirs: bool,
     best: Option<Arc<Best>>,
     /// Number of plans that have been the best one.
-    finds: u64,
+    improvement_count: u64,
     /// The reason why the run ends.
     stopped: Option<Stopped>,
     /// The work since the last call of `observe`.
     unreported: u64,
     /// Work of each strand on better plans.
-    improved_for: u64,
+    improvement_work: u64,
     /// Minimum of that work after searches were abandoned for lack of memory.
     least_work: u64,
     /// `true` if an unfinished search was abandoned because the memory was exhausted.
-    has_given_up: bool,
+    has_abandoned_search: bool,
     /// The refiners of the best plan.
-    refiners: Vec<Nearby<'a>>,
+    refiners: Vec<LocalSearch<'a>>,
     /// The task of the second strand.
-    own_task: Option<Task>,
+    second_task: Option<Task>,
     /// Counts at which the clean-up of the first plan ends. `None` if it has not begun.
     cleanup_limit: Option<Counts>,
 }
@@ -95,14 +95,14 @@ impl<'a> Planner<'a> {
             has_reservoirs: compiled.tuning.uses(Technique::Reservoirs)
                 && !relaxed::reservoirs(compiled).is_empty(),
             best: None,
-            finds: 0,
+            improvement_count: 0,
             stopped: None,
             unreported: 0,
-            improved_for: 0,
+            improvement_work: 0,
             least_work: 0,
-            has_given_up: false,
+            has_abandoned_search: false,
             refiners: Vec::new(),
-            own_task: None,
+            second_task: None,
             cleanup_limit: None,
         }
     }
@@ -111,14 +111,15 @@ impl<'a> Planner<'a> {
         let strategies = self.strategies();
         // The others are created at their first turn, since their creation is slow with many
         // actions.
-        let mut entrants: Vec<Entrant<'_>> = strategies.into_iter().map(Entrant::new).collect();
+        let mut entrants: Vec<SearchSlot<'_>> =
+            strategies.into_iter().map(SearchSlot::new).collect();
         let (turn, budget) = match self.first_plan(&mut entrants) {
-            First::Proved(proof) => {
+            FirstPlanResult::Proved(proof) => {
                 let counts = self.progress.counts;
                 return Answer::Unsolvable { proof, counts };
             }
-            First::Over => (0, 0),
-            First::Found { turn, budget } => (turn, budget),
+            FirstPlanResult::Over => (0, 0),
+            FirstPlanResult::Found { turn, budget } => (turn, budget),
         };
         let compiled = self.frame.compiled;
         let mut searches = entrants
@@ -143,7 +144,7 @@ impl<'a> Planner<'a> {
                 if turn + 1 < entrants.len() && entrants.last().is_some_and(|e| e.strategy.joins) {
                     entrants.pop();
                 }
-                self.compete(entrants, (turn, budget))
+                self.run_searches(entrants, (turn, budget))
             }
         };
         self.report_held_back();
@@ -172,10 +173,13 @@ impl<'a> Planner<'a> {
     }
 
     /// Searches for a first plan.
-    fn first_plan(&mut self, entrants: &mut [Entrant<'a>]) -> First {
+    fn first_plan(&mut self, entrants: &mut [SearchSlot<'a>]) -> FirstPlanResult {
         let compiled = self.frame.compiled;
         let tuning = &compiled.tuning;
-        self.begin(&mut entrants[0], Allowance::turns(tuning.root_check_after));
+        self.run_first_search(
+            &mut entrants[0],
+            SearchBudget::turns(tuning.root_check_after),
+        );
         if self.best.is_none()
             && tuning.uses(Technique::DeadEnds)
             && self
@@ -184,34 +188,34 @@ impl<'a> Planner<'a> {
             && compiled.is_relaxation_exact()
             && let Some(proof) = self.pairs_proof()
         {
-            return First::Proved(proof);
+            return FirstPlanResult::Proved(proof);
         }
         let search = entrants[0].search.as_ref();
         let mut budget = self.first_budget(search.map_or(0, Search::size));
         let turns = search.map_or(0, |search| share(search, budget, compiled));
         let (mut turn, mut left) = (0, None);
-        if self.is_looking() && !entrants[0].is_over {
+        if self.is_searching() && !entrants[0].is_over {
             // Most problems are solved by then.
-            let allowance = Allowance {
+            let allowance = SearchBudget {
                 turns,
                 work: tuning.second_strand_after,
             };
-            let (outcome, spent) = self.begin(&mut entrants[0], allowance);
+            let (outcome, spent) = self.run_first_search(&mut entrants[0], allowance);
             left = Some(turns.saturating_sub(spent).max(1 + tuning.root_check_after));
             turn = usize::from(outcome != Outcome::WorkDone && outcome != Outcome::Better);
         }
-        if self.is_looking() && self.finds_mutex_pairs() && is_stuck(&entrants[0]) {
+        if self.is_searching() && self.finds_mutex_pairs() && is_stuck(&entrants[0]) {
             // The other searches have not begun yet.
-            self.progress.counts.memory -= taken(&entrants[0]);
-            entrants[0] = Entrant::new(entrants[0].strategy);
+            self.progress.counts.memory -= memory_of(&entrants[0]);
+            entrants[0] = SearchSlot::new(entrants[0].strategy);
             (turn, left) = (0, None);
         }
-        while self.is_looking() {
+        while self.is_searching() {
             turn = self.round(entrants, turn, (budget, left.filter(|_| turn == 0)));
             if entrants.iter().all(|entrant| entrant.is_over) {
-                self.stopped = self.stopped.or(Some(self.all_over()));
+                self.stopped = self.stopped.or(Some(self.stop_reason()));
             }
-            if self.is_looking() {
+            if self.is_searching() {
                 budget = budget.saturating_mul(2);
                 (turn, left) = (0, None);
             }
@@ -220,12 +224,12 @@ impl<'a> Planner<'a> {
             self.clean_up();
         }
         if self.stopped.is_some() {
-            return First::Over;
+            return FirstPlanResult::Over;
         }
         if self.is_refining() {
             budget = budget.min(tuning.improving_round);
         }
-        First::Found { turn, budget }
+        FirstPlanResult::Found { turn, budget }
     }
 
     /// Computes mutex pairs. Returns `true` if there is a spurious action or a dead pair.
@@ -248,15 +252,15 @@ impl<'a> Planner<'a> {
     }
 
     /// Returns the reason for the end of a run whose searches are all over.
-    fn all_over(&self) -> Stopped {
-        if self.has_given_up {
+    fn stop_reason(&self) -> Stopped {
+        if self.has_abandoned_search {
             Stopped::OutOfMemory
         } else {
             Stopped::Exhausted
         }
     }
 
-    fn is_looking(&self) -> bool {
+    fn is_searching(&self) -> bool {
         self.stopped.is_none() && self.best.is_none()
     }
 
@@ -284,12 +288,16 @@ impl<'a> Planner<'a> {
 
     /// Runs the first search alone until a first plan. Returns its outcome, and the number of turns
     /// that it counts for.
-    fn begin(&mut self, entrant: &mut Entrant<'a>, allowance: Allowance) -> (Outcome, u64) {
+    fn run_first_search(
+        &mut self,
+        entrant: &mut SearchSlot<'a>,
+        allowance: SearchBudget,
+    ) -> (Outcome, u64) {
         let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
         let search = entrant.search(frame, symmetry);
         let mut base = self.progress.counts;
-        let mut hear = |report| self.hear(&mut base, report);
-        let mut strand = Strand::new(frame, None, unreported, &mut hear);
+        let mut hear = |report| self.process_report(&mut base, report);
+        let mut strand = Worker::new(frame, None, unreported, &mut hear);
         let (outcome, spent, _) = strand.work(search, allowance);
         let is_over = outcome == Outcome::Over;
         let is_all = !search.is_incomplete() && (search.joins() || !frame.compiled.needs_joining);
@@ -303,7 +311,7 @@ impl<'a> Planner<'a> {
     /// left to the search `from`.
     fn round(
         &mut self,
-        entrants: &mut [Entrant<'a>],
+        entrants: &mut [SearchSlot<'a>],
         from: usize,
         (budget, left): (u64, Option<u64>),
     ) -> usize {
@@ -312,10 +320,10 @@ impl<'a> Planner<'a> {
         // A separate task, because facts are numbered in the order of their first use, which is not
         // deterministic across threads.
         let own_task = self
-            .own_task
+            .second_task
             .take()
             .unwrap_or_else(|| frame.task.with_own_table());
-        let memory: Vec<usize> = entrants.iter().map(taken).collect();
+        let memory: Vec<usize> = entrants.iter().map(memory_of).collect();
         let mut numbers = Vec::new();
         let mut jobs: Vec<Job<'_, (u64, bool)>> = Vec::new();
         for (number, entrant) in entrants.iter_mut().enumerate().skip(from) {
@@ -327,13 +335,13 @@ impl<'a> Planner<'a> {
             let unreported = if jobs.is_empty() { unreported } else { 0 };
             let own_task = (number > 0).then_some(&own_task);
             let budget = budget.saturating_mul(entrant.strategy.share);
-            jobs.push(Box::new(move |tell: Tell<'_>| {
+            jobs.push(Box::new(move |tell: ReportCallback<'_>| {
                 let own_task = own_task.map(Task::with_own_table);
                 let task = own_task.as_ref().unwrap_or(frame.task);
                 let search = entrant.search(frame, symmetry);
                 let turns = left.unwrap_or_else(|| share(search, budget, compiled));
-                let mut strand = Strand::new(Frame { task, ..frame }, None, unreported, tell);
-                let (outcome, _, _) = strand.work(search, Allowance::turns(turns));
+                let mut strand = Worker::new(Frame { task, ..frame }, None, unreported, tell);
+                let (outcome, _, _) = strand.work(search, SearchBudget::turns(turns));
                 let is_over = outcome == Outcome::Over;
                 let is_all = !search.is_incomplete() && (search.joins() || !compiled.needs_joining);
                 let unreported = strand.end(is_over && is_all);
@@ -344,32 +352,32 @@ impl<'a> Planner<'a> {
         let rest = rest.saturating_sub(self.progress.counts.memory);
         let ahead = rest / (4 * jobs.len().max(1));
         let (mut base, mut last) = (self.progress.counts, 0);
-        let ended = side_by_side(
+        let ended = run_parallel(
             jobs,
             (frame.settings.threads, ahead),
             &mut |turn, report| {
                 last = turn;
-                self.hear(&mut base, report) && self.is_looking()
+                self.process_report(&mut base, report) && self.is_searching()
             },
         );
-        self.own_task = Some(own_task);
+        self.second_task = Some(own_task);
         if self.stopped == Some(Stopped::OutOfMemory) {
             let grown = self.progress.counts.memory - base.memory;
             let mut sizes = memory;
             if let Some(&number) = numbers.get(last) {
                 sizes[number] += grown;
             }
-            self.make_room(entrants, &numbers[last..], sizes);
+            self.handle_exhausted_memory(entrants, &numbers[last..], sizes);
             (self.stopped, self.unreported) = (None, 0);
             return 0;
         }
-        if !self.is_looking() {
+        if !self.is_searching() {
             // With one thread, later searches have not begun. With several threads, their progress
             // is not deterministic.
             let later = numbers.iter().skip(last + 1);
             for &number in later.filter(|_| self.stopped.is_none()) {
                 self.progress.counts.memory -= memory[number];
-                entrants[number] = Entrant::new(entrants[number].strategy);
+                entrants[number] = SearchSlot::new(entrants[number].strategy);
             }
             return numbers.get(last).copied().unwrap_or(from);
         }
@@ -382,17 +390,17 @@ impl<'a> Planner<'a> {
     }
 
     /// Runs strands, and processes their reports.
-    fn hear_all<R: Send>(&mut self, jobs: Vec<Job<'_, R>>) -> Vec<R> {
+    fn run_workers<R: Send>(&mut self, jobs: Vec<Job<'_, R>>) -> Vec<R> {
         let threads = self.frame.settings.threads;
         let mut base = self.progress.counts;
-        side_by_side(jobs, (threads, usize::MAX), &mut |_, report| {
-            self.hear(&mut base, report)
+        run_parallel(jobs, (threads, usize::MAX), &mut |_, report| {
+            self.process_report(&mut base, report)
         })
     }
 
     /// Processes a report of a strand. Returns `false` to stop. `base` are the counts before the
     /// strand began.
-    fn hear(&mut self, base: &mut Counts, report: Report) -> bool {
+    fn process_report(&mut self, base: &mut Counts, report: Report) -> bool {
         let (before, done) = (*base, report.counts);
         let counts = &mut self.progress.counts;
         counts.expanded = before.expanded + done.expanded;
@@ -402,7 +410,7 @@ impl<'a> Planner<'a> {
         counts.memory = before.memory + done.memory;
         if report.is_last {
             *base = self.progress.counts;
-            if report.has_seen_everything {
+            if report.has_exhausted_space {
                 self.stopped = self.stopped.or(Some(Stopped::Exhausted));
             }
             return self.stopped.is_none();
@@ -413,12 +421,12 @@ impl<'a> Planner<'a> {
             .found
             .filter(|found| is_better(found, self.best.as_deref()));
         let is_found = found.is_some();
-        let mut goes_on = self.tell(found);
+        let mut goes_on = self.report_to_caller(found);
         if !goes_on
             && let Some(pending) = report.pending
             && is_better(&pending, self.best.as_deref())
         {
-            self.tell(Some(pending));
+            self.report_to_caller(Some(pending));
         }
         if !goes_on {
             self.stopped = Some(Stopped::Interrupted);
@@ -433,13 +441,13 @@ impl<'a> Planner<'a> {
     }
 
     /// Reports the progress, and a new best plan, to the caller. Returns `false` to stop.
-    fn tell(&mut self, found: Option<Arc<Best>>) -> bool {
+    fn report_to_caller(&mut self, found: Option<Arc<Best>>) -> bool {
         if let Some(found) = found {
             if !self.cleans_up() {
-                self.show(&found);
+                self.add_to_progress(&found);
             }
             self.best = Some(found);
-            self.finds += 1;
+            self.improvement_count += 1;
         }
         let flow = (self.observe)(&self.progress);
         self.progress.plan = None;
@@ -447,7 +455,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Adds a new best plan to the next progress report.
-    fn show(&mut self, found: &Best) {
+    fn add_to_progress(&mut self, found: &Best) {
         self.progress.best = Some(found.found.value.clone());
         self.progress.plan = Some(found.found.clone());
     }
@@ -463,16 +471,16 @@ impl<'a> Planner<'a> {
             ..
         } = self;
         let mut goes_on = || observe(progress).is_continue();
-        reasons::pairs_proof(names, frame.compiled, &mut goes_on)
+        deadline_explanation::pairs_proof(names, frame.compiled, &mut goes_on)
     }
 }
 
 /// Returns `true` if a search restarts with mutex pairs: it is incomplete, and its best estimate has not improved
 /// recently.
-fn is_stuck(entrant: &Entrant<'_>) -> bool {
+fn is_stuck(entrant: &SearchSlot<'_>) -> bool {
     let search = entrant.search.as_ref();
     let makes_no_progress =
-        |search: &Search<'_>| search.is_incomplete() && !search.has_come_nearer();
+        |search: &Search<'_>| search.is_incomplete() && !search.has_improved_recently();
     !entrant.is_over && !entrant.strategy.is_complete() && search.is_some_and(makes_no_progress)
 }
 

@@ -8,19 +8,19 @@
 //! A search for plans with a better metric weighs the cost so far against the remaining cost of the
 //! relaxed plan, and prunes states that cannot become better than the best plan (branch and bound).
 
+mod closed_list;
 mod dead_ends;
 mod difference;
 mod goals;
-mod known;
 mod landmarks;
 mod node;
 mod novelty;
-mod queue;
+mod open_list;
 mod runaway;
 mod states;
 mod strategy;
+mod successor_list;
 mod successors;
-mod waiting;
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
@@ -34,18 +34,18 @@ use super::step_costs::StepCosts;
 use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
 use super::tuning::Technique;
+use closed_list::Hashes;
 use dead_ends::DeadEnds;
 pub(crate) use goals::is_goal;
 use goals::misses_goal;
-use known::Hashes;
 use landmarks::SearchLandmarks;
 use node::{DeadEnd, NONE, Node, Notes, SharedNotes};
 use novelty::Novelty;
-use queue::Queue;
+use open_list::OpenList;
 use states::States;
 use strategy::NoveltyOf;
 pub(crate) use strategy::{Aim, Strategy};
-use waiting::{Waiting, WaitingList};
+use successor_list::{QueuedSuccessor, SuccessorList};
 
 /// A search in progress.
 #[derive(Debug)]
@@ -56,19 +56,19 @@ pub(crate) struct Search<'a> {
     stepper: Stepper<'a>,
     relaxed: Relaxed<'a>,
     dead_ends: DeadEnds<'a>,
-    has_begun: bool,
+    is_started: bool,
     nodes: Vec<Node>,
     shared: SharedNotes,
     /// The states of the nodes.
     states: States,
     /// The nodes by the discrete hash of their states.
-    known: Hashes,
+    closed_list: Hashes,
     /// Buffer for known states, for the comparison with a new one.
-    compared: State,
-    all: Queue,
-    preferred: Queue,
+    comparison_buffer: State,
+    all: OpenList,
+    preferred: OpenList,
     /// All successors in order of insertion, for a search that must not starve any of them.
-    oldest: WaitingList,
+    oldest: SuccessorList,
     turns: [i64; 2],
     /// The best estimate, and the number of remaining landmarks where they count.
     best: (u32, u32),
@@ -91,22 +91,22 @@ pub(crate) struct Search<'a> {
     /// Latest time of a happening, regardless of the metric.
     horizon: Ticks,
     /// `true` if a state or step was dropped that could have led to a plan.
-    pub(crate) has_lost: bool,
+    pub(crate) is_lossy: bool,
     /// Cost of the last turn, in turns.
-    price: u64,
+    last_turn_cost: u64,
     /// Work of all turns, in turns of states without unsettled happenings.
-    labour: u64,
+    total_work: u64,
     /// Number of successors generated to compute their novelty.
-    weighed: u64,
+    novelty_evaluations: u64,
     /// Cost of the turns since the last better estimate, in turns.
     idle: u64,
     /// Number of successors taken from the queues.
-    drawn: u64,
+    dequeued: u64,
     pub(crate) expanded: u64,
     pub(crate) generated: u64,
     pub(crate) evaluated: u64,
-    /// Number of states regenerated for rejected candidates: see [`waste`](Search::waste).
-    wasted: u64,
+    /// Number of states regenerated for rejected candidates: see [`count_rejected`](Search::waste).
+    rejected_work: u64,
     pub(crate) memory: usize,
 }
 
@@ -117,7 +117,7 @@ const SUCCESSOR_LOOKUPS: u64 = 1_500;
 
 /// The result of one expansion step of the search.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Turn {
+pub(crate) enum Expansion {
     /// The choices that lead to a goal state.
     Goal(Vec<Step>),
     Nothing,
@@ -138,19 +138,19 @@ impl<'a> Search<'a> {
         let step_costs = metric.map(|metric| StepCosts::of(compiled, metric));
         let mut relaxed = strategy.relaxed(compiled);
         if let Some(mutex_pairs) = mutex_pairs {
-            relaxed.leave_out(&mutex_pairs.is_spurious);
+            relaxed.exclude_starts(&mutex_pairs.is_spurious);
         }
         let mut stepper = Stepper::new(compiled);
         stepper.is_chronological = strategy.is_chronological;
         stepper.joins = strategy.joins;
         if let Some(step_costs) = &step_costs {
-            relaxed.weigh(step_costs);
+            relaxed.set_step_costs(step_costs);
         }
         let is_timeless = compiled.timed.is_empty()
             && compiled.calendars.is_empty()
             && metric.is_none_or(MetricBound::is_timeless)
             && compiled
-                .beginning
+                .initial
                 .running
                 .iter()
                 .all(|running| running.most.is_none());
@@ -161,15 +161,15 @@ impl<'a> Search<'a> {
             stepper,
             dead_ends: DeadEnds::new(compiled, relaxed.size()),
             relaxed,
-            has_begun: false,
+            is_started: false,
             nodes: Vec::new(),
             shared: SharedNotes::default(),
             states: States::default(),
-            known: Hashes::default(),
-            compared: State::default(),
-            all: Queue::default(),
-            preferred: Queue::default(),
-            oldest: WaitingList::default(),
+            closed_list: Hashes::default(),
+            comparison_buffer: State::default(),
+            all: OpenList::default(),
+            preferred: OpenList::default(),
+            oldest: SuccessorList::default(),
             turns: [0, 0],
             best: (u32::MAX, u32::MAX),
             first_estimate: 0,
@@ -185,18 +185,18 @@ impl<'a> Search<'a> {
             step_costs,
             limit: None,
             horizon: NEVER,
-            has_lost: strategy.is_chronological
+            is_lossy: strategy.is_chronological
                 || strategy.replaces_starts(compiled)
                 || mutex_pairs.is_some(),
-            price: 1,
-            labour: 0,
-            weighed: 0,
+            last_turn_cost: 1,
+            total_work: 0,
+            novelty_evaluations: 0,
             idle: 0,
-            drawn: 0,
+            dequeued: 0,
             expanded: 0,
             generated: 0,
             evaluated: 0,
-            wasted: 0,
+            rejected_work: 0,
             memory: 0,
         }
     }
@@ -218,7 +218,7 @@ impl<'a> Search<'a> {
     /// Returns `true` if an exhausted search proves nothing, because it has dropped or rounded
     /// something.
     pub(crate) fn is_incomplete(&self) -> bool {
-        self.has_lost || self.stepper.has_rounded
+        self.is_lossy || self.stepper.has_rounded
     }
 
     /// Returns `true` if it drops states that may lead to plans, for speed.
@@ -242,7 +242,7 @@ impl<'a> Search<'a> {
             actions: 0,
             expanded: self.expanded,
             generated: self.generated,
-            evaluated: self.evaluated + self.wasted,
+            evaluated: self.evaluated + self.rejected_work,
             work: 0,
             memory: self.memory,
         }
@@ -250,8 +250,8 @@ impl<'a> Search<'a> {
 
     /// Counts a rejected candidate, for which `choices` steps were replayed. Any number of such
     /// candidates may follow each other, each of them longer than the last one.
-    pub(crate) fn waste(&mut self, choices: usize) {
-        self.wasted += choices as u64;
+    pub(crate) fn count_rejected(&mut self, choices: usize) {
+        self.rejected_work += choices as u64;
     }
 
     /// Returns the size of an estimate: the number of operators.
@@ -265,13 +265,13 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the cost of the last turn, in turns: more if many happenings are unsettled.
-    pub(crate) fn price(&self) -> u64 {
-        self.price
+    pub(crate) fn last_turn_cost(&self) -> u64 {
+        self.last_turn_cost
     }
 
     /// Returns the work of all turns so far, including those that generated no state.
-    pub(crate) fn labour(&self) -> u64 {
-        self.labour
+    pub(crate) fn total_work(&self) -> u64 {
+        self.total_work
     }
 
     /// Returns `true` if it compresses actions. Its states then take less time than others if there
@@ -283,7 +283,7 @@ impl<'a> Search<'a> {
     /// Returns `true` if a better estimate was found recently: see
     /// [`Tuning::patience`](super::tuning::Tuning::patience). A search by the novelty of successors
     /// has no estimates.
-    pub(crate) fn has_come_nearer(&self) -> bool {
+    pub(crate) fn has_improved_recently(&self) -> bool {
         self.strategy.novelty != Some(NoveltyOf::Successors)
             && self.idle < self.compiled.tuning.patience
     }
@@ -292,46 +292,46 @@ impl<'a> Search<'a> {
     /// known facts, and successors generated to compute their novelty, count for some lookups.
     pub(crate) fn lookups(&self) -> u64 {
         let words = self.novelty.as_ref().map_or(0, Novelty::words);
-        self.dead_ends.lookups() + words + SUCCESSOR_LOOKUPS * self.weighed
+        self.dead_ends.lookups() + words + SUCCESSOR_LOOKUPS * self.novelty_evaluations
     }
 
     /// Expands one more state.
-    pub(crate) fn turn(&mut self) -> Turn {
-        self.price = 1;
-        self.labour += 1;
-        if !self.has_begun {
+    pub(crate) fn turn(&mut self) -> Expansion {
+        self.last_turn_cost = 1;
+        self.total_work += 1;
+        if !self.is_started {
             let initial = root(self.compiled);
             if let Some(turn) = self.find_landmarks(&initial) {
                 return turn;
             }
-            self.has_begun = true;
+            self.is_started = true;
             if initial.earliest_end() > self.horizon {
-                return Turn::Over;
+                return Expansion::Over;
             }
             return self.visit(ROOT, Step::Timed, initial);
         }
         let entry = self.next_entry();
         let Some((parent, step)) = entry else {
-            return Turn::Over;
+            return Expansion::Over;
         };
         let before = self.states.get(parent);
         let latest_end = self.latest_end(&before);
-        if !self.looks_no_later_than(latest_end) || self.is_cut(parent, &before) {
-            return Turn::Nothing;
+        if !self.limit_end(latest_end) || self.is_pruned(parent, &before) {
+            return Expansion::Nothing;
         }
         let unsettled = before.network.node_count() as u64;
-        self.labour += unsettled * unsettled / (1 + self.size());
-        let Some((step, state)) = self.make(&before, step) else {
-            return Turn::Nothing;
+        self.total_work += unsettled * unsettled / (1 + self.size());
+        let Some((step, state)) = self.generate(&before, step) else {
+            return Expansion::Nothing;
         };
         self.visit(parent, step, state)
     }
 
     /// Returns the next successor.
     fn next_entry(&mut self) -> Option<(u32, Step)> {
-        self.drawn += 1;
+        self.dequeued += 1;
         if self
-            .drawn
+            .dequeued
             .is_multiple_of(self.compiled.tuning.exploration_interval)
             && !self.all.is_empty()
             && let Some(oldest) = self.pop_oldest()
@@ -365,32 +365,32 @@ impl<'a> Search<'a> {
             && self.idle >= tuning.alternation_after
     }
 
-    fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
+    fn visit(&mut self, parent: u32, step: Step, state: State) -> Expansion {
         let unsettled = state.network.node_count() as u64;
-        self.price += unsettled * unsettled / (8 * (1 + self.size()));
-        self.idle += self.price;
+        self.last_turn_cost += unsettled * unsettled / (8 * (1 + self.size()));
+        self.idle += self.last_turn_cost;
         if self.strategy.is_chronological && unsettled > self.compiled.tuning.most_unsettled {
-            return Turn::Nothing;
+            return Expansion::Nothing;
         }
         let latest_end = self.latest_end(&state);
         let is_in_time = latest_end.is_some_and(|latest| state.earliest_end() <= latest);
-        if !is_in_time || !self.looks_no_later_than(latest_end) {
-            return Turn::Nothing;
+        if !is_in_time || !self.limit_end(latest_end) {
+            return Expansion::Nothing;
         }
         let hash = state.discrete_hash();
         let projection = (self.strategy.compresses.is_none() && !state.network.is_empty())
             .then(|| Box::new(state.projection()));
         if self.is_known(hash, &state, projection.as_deref()) {
-            return Turn::Nothing;
+            return Expansion::Nothing;
         }
         if self
             .mutex_pairs
             .is_some_and(|known| known.is_dead_end(&state))
         {
-            return Turn::Nothing;
+            return Expansion::Nothing;
         }
         self.evaluated += 1;
-        let (accepted, left) = self.left(parent, &state);
+        let (accepted, left) = self.remaining_landmarks(parent, &state);
         let estimate = if self.needs_estimate(parent, left) {
             self.relaxed.evaluate(&state)
         } else {
@@ -399,8 +399,8 @@ impl<'a> Search<'a> {
         let Some(mut estimate) = estimate else {
             // Where actions are compressed, the relaxed plan may lack facts that hold only while an
             // action runs.
-            self.has_lost |= self.strategy.compresses.is_some();
-            return Turn::Nothing;
+            self.is_lossy |= self.strategy.compresses.is_some();
+            return Expansion::Nothing;
         };
         let steps = (&mut estimate.applicable, &mut estimate.preferred);
         self.symmetry.thin_out(&state, self.is_timeless, steps);
@@ -418,20 +418,31 @@ impl<'a> Search<'a> {
         let drift = self.drift(parent, &state, estimate.steps);
         let may_be_better = is_goal && self.may_be_better(&state);
         let notes = Notes { projection, drift };
-        let number = self.add(Waiting::step(parent, step), (accepted, left), state, notes);
-        self.known.push(hash);
+        let number = self.add(
+            QueuedSuccessor::step(parent, step),
+            (accepted, left),
+            state,
+            notes,
+        );
+        self.closed_list.push(hash);
         // A goal state may still have useful successors: the validator can reject the plan, and
         // another plan can be better.
         self.expand(number, &estimate);
         if may_be_better {
-            return Turn::Goal(self.steps_to(number));
+            return Expansion::Goal(self.steps_to(number));
         }
-        Turn::Nothing
+        Expansion::Nothing
     }
 
     /// Adds a node, and returns its number. `left` are the accepted landmarks, and the number of
     /// remaining ones.
-    fn add(&mut self, origin: Waiting, left: (Vec<u64>, u32), state: State, notes: Notes) -> u32 {
+    fn add(
+        &mut self,
+        origin: QueuedSuccessor,
+        left: (Vec<u64>, u32),
+        state: State,
+        notes: Notes,
+    ) -> u32 {
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
         let (accepted, left) = left;
         let (accepted, memory) = if accepted.is_empty() {
@@ -447,7 +458,7 @@ impl<'a> Search<'a> {
         self.memory += self.states.push(parent, state);
         self.nodes.push(Node {
             origin,
-            left,
+            remaining: left,
             accepted,
             progress: NONE,
             dead_end: DeadEnd::Unchecked,
@@ -458,7 +469,7 @@ impl<'a> Search<'a> {
 
     /// Returns `true` if the stronger bound proves that no plan has this beginning. It is computed
     /// at the turn of the first successor of a state.
-    fn is_cut(&mut self, number: u32, state: &State) -> bool {
+    fn is_pruned(&mut self, number: u32, state: &State) -> bool {
         let node = &mut self.nodes[number as usize];
         match node.dead_end {
             DeadEnd::Unproved => return false,
@@ -495,7 +506,7 @@ impl<'a> Search<'a> {
 
     /// Sets the horizon for the successors of a state. Returns `false` if no plan can continue from
     /// it.
-    fn looks_no_later_than(&mut self, latest_end: Option<Ticks>) -> bool {
+    fn limit_end(&mut self, latest_end: Option<Ticks>) -> bool {
         let Some(horizon) = latest_end else {
             return false;
         };

@@ -17,11 +17,11 @@ use super::root::root;
 
 /// Work limit of the search for mutex groups. If a group is not found, an action only gets an
 /// unnecessary annotation.
-const MOST_WORK: u64 = 2_000_000;
+const MAX_WORK: u64 = 2_000_000;
 
 /// Adds exclusions between instances of each ground action that may overlap.
 pub(super) fn keep_apart(compiled: &mut Compiled) {
-    let mutexes = Mutexes::of(compiled, &root(compiled), MOST_WORK);
+    let mutexes = Mutexes::of(compiled, &root(compiled), MAX_WORK);
     let groups = groups_of_running(compiled, &mutexes);
     for variants in variants(compiled) {
         let starts = |&number: &u32| compiled.action(number).start != NONE;

@@ -30,15 +30,15 @@ pub(crate) struct State {
     /// The latest settled time of each annotation.
     pub(crate) annotations: Vec<Ticks>,
     /// The actions that have started and not ended.
-    pub(crate) open: Vec<Open>,
+    pub(crate) open: Vec<OpenAction>,
     /// Number of timed initials that have happened.
     pub(crate) timed: u32,
     pub(crate) network: Network,
     /// The last choice, where choices come in chronological order.
-    pub(crate) last: Last,
+    pub(crate) last: LastChoice,
     /// The incomplete moment, if an over-all condition is false. The next choice happens at the
     /// same moment.
-    pub(crate) joint: Option<Joint>,
+    pub(crate) joint: Option<JointMoment>,
     /// The time of the last settled happening.
     pub(crate) settled_end: Ticks,
     /// The numbers that depend on times, in a problem with such numbers.
@@ -47,7 +47,7 @@ pub(crate) struct State {
 
 /// Happenings of one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Joint {
+pub(crate) struct JointMoment {
     /// The node of the last one.
     pub(crate) node: NodeId,
     pub(crate) count: u8,
@@ -55,14 +55,14 @@ pub(crate) struct Joint {
 
 /// The happening that was chosen last.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Last {
+pub(crate) struct LastChoice {
     /// Its node, or [`SETTLED`].
     pub(crate) node: NodeId,
     /// The time at which it happened, if that is settled. Later happenings are no earlier.
     pub(crate) floor: Ticks,
 }
 
-impl Default for Last {
+impl Default for LastChoice {
     fn default() -> Self {
         Self {
             node: SETTLED,
@@ -71,7 +71,7 @@ impl Default for Last {
     }
 }
 
-impl Last {
+impl LastChoice {
     /// Returns its earliest time.
     pub(crate) fn earliest(self, network: &Network) -> Ticks {
         match self.node {
@@ -83,7 +83,7 @@ impl Last {
 
 /// A running action.
 #[derive(Clone, Debug)]
-pub(crate) struct Open {
+pub(crate) struct OpenAction {
     pub(crate) action: u32,
     /// The node of its start, or [`SETTLED`].
     pub(crate) node: NodeId,
@@ -108,9 +108,14 @@ pub(crate) struct Open {
     pub(crate) chosen: Vec<Option<usize>>,
 }
 
-impl Open {
+impl OpenAction {
     /// Returns an action that was running before the search began.
-    pub(crate) fn under_way(action: u32, start: Ticks, least: Ticks, most: Option<Ticks>) -> Self {
+    pub(crate) fn running_initially(
+        action: u32,
+        start: Ticks,
+        least: Ticks,
+        most: Option<Ticks>,
+    ) -> Self {
         Self {
             action,
             node: SETTLED,
@@ -159,7 +164,8 @@ impl State {
 
     /// Returns `true` if an instance of the action is running that it must not overlap.
     pub(crate) fn excludes(&self, compiled: &Compiled, action: &Action) -> bool {
-        let is_same = |open: &Open| compiled.action(open.action).exclusion == action.exclusion;
+        let is_same =
+            |open: &OpenAction| compiled.action(open.action).exclusion == action.exclusion;
         action.exclusion != NONE && self.open.iter().any(is_same)
     }
 
@@ -175,9 +181,9 @@ impl State {
                     if super::formula::is_set(&self.facts, rule.head) {
                         continue;
                     }
-                    let holds = rule
-                        .body
-                        .holds(&self.facts, &mut |test| self.passes(compiled, test, None));
+                    let holds = rule.body.holds(&self.facts, &mut |test| {
+                        self.test_holds(compiled, test, None)
+                    });
                     if holds {
                         set(&mut self.facts, rule.head, true);
                         changed = true;
@@ -192,7 +198,7 @@ impl State {
 
     /// Returns `true` if a numeric test holds. A test that reads a fluent without a value does not
     /// hold.
-    pub(crate) fn passes(
+    pub(crate) fn test_holds(
         &self,
         compiled: &Compiled,
         test: u32,
@@ -295,7 +301,7 @@ impl State {
         size_of::<Self>()
             + 8 * (self.facts.len() + self.annotations.len())
             + size_of::<Option<Rational>>() * self.values.len()
-            + size_of::<Open>() * self.open.len()
+            + size_of::<OpenAction>() * self.open.len()
             + self.network.size()
             + self.symbolic.as_ref().map_or(0, |symbolic| symbolic.size())
     }

@@ -92,14 +92,14 @@ fn spent(metric: &Metric, state: &State) -> f64 {
 
 /// Returns the cost before the first choice.
 fn initial(compiled: &Compiled, metric: &Metric) -> f64 {
-    let beginning = &compiled.beginning;
+    let beginning = &compiled.initial;
     let read = metric.values.value(&beginning.values, None);
     let cost = beginning.cost.to_f64();
     read.map_or(cost, |read| read.to_f64() + cost)
 }
 
 fn least_duration(compiled: &Compiled, action: &Action) -> Rational {
-    let values = &compiled.beginning.values;
+    let values = &compiled.initial.values;
     let bounds = action.duration.bounds.iter();
     let known = bounds.filter_map(|bound| bound.value.value(values, None));
     known.fold(action.duration.least.clone(), Rational::max)
@@ -107,7 +107,7 @@ fn least_duration(compiled: &Compiled, action: &Action) -> Rational {
 
 /// Returns the cost of a happening, given the initial values of the numbers that it reads.
 fn cost(compiled: &Compiled, metric: &Metric, snap: &Snap, duration: &Rational) -> f64 {
-    let values = &compiled.beginning.values;
+    let values = &compiled.initial.values;
     let own = snap.cost.as_ref();
     let own = own.and_then(|cost| cost.value(values, Some(duration)));
     let amounts = snap.updates.iter().filter_map(|update| {

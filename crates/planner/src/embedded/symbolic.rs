@@ -14,10 +14,10 @@ use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_num::Rational;
 
 use super::compile::{Change, Compiled, Update};
-use super::expressions::{Course, Form, Moment, Symbolic};
+use super::expressions::{Form, LinearFunction, Moment, Symbolic};
 use super::formula::{Formula, Linear, Numeric};
 use super::network::{NodeId, SETTLED};
-use super::state::{Open, State};
+use super::state::{OpenAction, State};
 pub(crate) use levels::highest_level;
 pub(crate) use program::{Exact, KnownEnd, exact_distance, is_possible, not_before, solve};
 
@@ -26,7 +26,7 @@ pub(crate) fn value(state: &State, numeric: &Numeric, moment: &Moment) -> Option
     let symbolic = state.symbolic.as_ref()?;
     let Numeric::Linear(linear) = numeric else {
         let mut is_governed = numeric.reads_duration();
-        numeric.visit_fluents(&mut |fluent| is_governed |= symbolic.governs(fluent));
+        numeric.visit_fluents(&mut |fluent| is_governed |= symbolic.is_time_dependent(fluent));
         let duration = moment.duration.as_ref().and_then(Form::as_constant);
         return if is_governed && duration.is_none() {
             None
@@ -45,7 +45,7 @@ fn linear_value(
 ) -> Option<Form> {
     let mut sum = Form::constant(linear.constant.clone());
     for (fluent, coefficient) in &linear.terms {
-        match symbolic.course(*fluent) {
+        match symbolic.linear_function(*fluent) {
             None => sum.constant += coefficient * state.values[*fluent as usize].as_ref()?,
             Some(course) => {
                 sum = sum.plus(coefficient, &course.base);
@@ -208,9 +208,9 @@ pub(crate) fn update(
     amount: &Form,
     moment: &Moment,
 ) -> Option<()> {
-    let old = course_of(state, fluent);
+    let old = function_of(state, fluent);
     let rate = old.as_ref().map_or(Rational::ZERO, |old| old.rate.clone());
-    let now = |course: &Course| course.base.clone().plus(&course.rate, &moment.time);
+    let now = |course: &LinearFunction| course.base.clone().plus(&course.rate, &moment.time);
     let new = match operator {
         UpdateOperator::Assign => amount.clone(),
         UpdateOperator::Increase => now(&old?).plus(&Rational::ONE, amount),
@@ -219,16 +219,16 @@ pub(crate) fn update(
         UpdateOperator::ScaleDown => now(&old?).times(&amount.as_constant()?.reciprocal()?),
     };
     let base = new.plus(&-&rate, &moment.time);
-    set_course(state, fluent, Course { base, rate });
+    set_function(state, fluent, LinearFunction { base, rate });
     Some(())
 }
 
 /// Starts a continuous change of a fluent at a time, or ends it if called with the opposite rate.
 pub(crate) fn flow(state: &mut State, fluent: u32, rate: &Rational, time: &Form) -> Option<()> {
-    let mut course = course_of(state, fluent)?;
+    let mut course = function_of(state, fluent)?;
     course.base = course.base.plus(&-rate, time);
     course.rate += rate;
-    set_course(state, fluent, course);
+    set_function(state, fluent, course);
     Some(())
 }
 
@@ -253,7 +253,7 @@ pub(crate) fn settled_value(compiled: &Compiled, state: &State, fluent: u32) -> 
             return None;
         }
     }
-    match settled_course(symbolic, state, fluent) {
+    match settled_function(symbolic, state, fluent) {
         None => state.values[fluent as usize].clone(),
         Some(course) => {
             let is_settled = course.rate.is_zero();
@@ -270,8 +270,8 @@ fn is_assigned_later(compiled: &Compiled, state: &State, fluent: u32) -> bool {
 
 /// Returns the course of a fluent after the ends of all running actions, without its jumps at these
 /// ends, or `None` if its value does not depend on times.
-fn settled_course(symbolic: &Symbolic, state: &State, fluent: u32) -> Option<Course> {
-    let mut course = symbolic.course(fluent)?.clone();
+fn settled_function(symbolic: &Symbolic, state: &State, fluent: u32) -> Option<LinearFunction> {
+    let mut course = symbolic.linear_function(fluent)?.clone();
     for open in &state.open {
         for (_, rate) in open.flows.iter().filter(|(own, _)| *own == fluent) {
             let time = end_form(open, open.end);
@@ -284,7 +284,7 @@ fn settled_course(symbolic: &Symbolic, state: &State, fluent: u32) -> Option<Cou
 
 /// Returns the time of an action's end. A fixed duration counts from the start, so that the total
 /// of a continuous change is a constant.
-pub(crate) fn end_form(open: &Open, end: NodeId) -> Form {
+pub(crate) fn end_form(open: &OpenAction, end: NodeId) -> Form {
     match &open.duration {
         Some(duration) if open.node != SETTLED => {
             Form::constant(duration.clone()).plus(&Rational::ONE, &Form::node(open.node))
@@ -293,23 +293,23 @@ pub(crate) fn end_form(open: &Open, end: NodeId) -> Form {
     }
 }
 
-fn course_of(state: &State, fluent: u32) -> Option<Course> {
-    if let Some(course) = state.symbolic.as_ref()?.course(fluent) {
+fn function_of(state: &State, fluent: u32) -> Option<LinearFunction> {
+    if let Some(course) = state.symbolic.as_ref()?.linear_function(fluent) {
         return Some(course.clone());
     }
     let value = state.values[fluent as usize].clone()?;
-    Some(Course {
+    Some(LinearFunction {
         base: Form::constant(value),
         rate: Rational::ZERO,
     })
 }
 
-fn set_course(state: &mut State, fluent: u32, course: Course) {
+fn set_function(state: &mut State, fluent: u32, course: LinearFunction) {
     let Some(symbolic) = &mut state.symbolic else {
         return;
     };
     let place = symbolic
-        .courses
+        .functions
         .binary_search_by_key(&fluent, |entry| entry.0);
     let constant = course.base.as_constant().filter(|_| course.rate.is_zero());
     let value = &mut state.values[fluent as usize];
@@ -317,13 +317,13 @@ fn set_course(state: &mut State, fluent: u32, course: Course) {
         (Some(constant), place) => {
             *value = Some(constant);
             if let Ok(place) = place {
-                symbolic.courses.remove(place);
+                symbolic.functions.remove(place);
             }
         }
-        (None, Ok(place)) => symbolic.courses[place].1 = course,
+        (None, Ok(place)) => symbolic.functions[place].1 = course,
         (None, Err(place)) => {
             *value = None;
-            symbolic.courses.insert(place, (fluent, course));
+            symbolic.functions.insert(place, (fluent, course));
         }
     }
 }

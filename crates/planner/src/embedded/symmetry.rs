@@ -125,10 +125,11 @@ impl Exchange {
                     state.annotations[a as usize] == state.annotations[b as usize]
                         && (a == b || !is_marked(a) && !is_marked(b))
                 }))
-            && state
-                .symbolic
-                .as_ref()
-                .is_none_or(|symbolic| self.fluents.iter().all(|&(a, _)| !symbolic.governs(a)))
+            && state.symbolic.as_ref().is_none_or(|symbolic| {
+                self.fluents
+                    .iter()
+                    .all(|&(a, _)| !symbolic.is_time_dependent(a))
+            })
     }
 }
 
@@ -247,8 +248,8 @@ impl<'a> Finder<'a> {
         let compiled = self.compiled;
         let is_kept = images.formula_is_kept(compiled, &compiled.goal);
         let are_kept = compiled.timed.iter().all(|timed| {
-            images.keeps_facts(&timed.adds)
-                && images.keeps_facts(&timed.deletes)
+            images.preserves_facts(&timed.adds)
+                && images.preserves_facts(&timed.deletes)
                 && timed
                     .assigns
                     .iter()
@@ -267,7 +268,7 @@ impl Images {
         Literal::new(self.facts[literal.fact() as usize], literal.truth())
     }
 
-    fn keeps_facts(&self, facts: &[u32]) -> bool {
+    fn preserves_facts(&self, facts: &[u32]) -> bool {
         self.same_facts(facts, facts)
     }
 
@@ -321,10 +322,10 @@ impl Images {
                 .iter()
                 .all(|&test| other.tests.iter().any(|&image| test_is(test, image)))
             && (formula.choices.is_empty() && other.choices.is_empty()
-                || formula.choices == other.choices && self.moves_nothing_in(compiled, formula))
+                || formula.choices == other.choices && self.is_formula_fixed(compiled, formula))
     }
 
-    fn moves_nothing_in(&self, compiled: &Compiled, formula: &Formula) -> bool {
+    fn is_formula_fixed(&self, compiled: &Compiled, formula: &Formula) -> bool {
         let mut is_fixed = true;
         formula.visit_literals(&mut |literal| is_fixed &= self.literal(literal) == literal);
         formula.visit_tests(&mut |test| {

@@ -4,7 +4,7 @@ use elbowroom_model::reachability::{self, Answer};
 use elbowroom_model::{Situation, Task};
 
 use super::apply::Step;
-use super::compile::{Compiled, Wanted, compile};
+use super::compile::{CompileInput, Compiled, compile};
 use super::state::State;
 use super::tuning::Tuning;
 
@@ -20,7 +20,7 @@ pub(crate) fn compiled_with(task: &Task, tuning: &Tuning) -> Option<Compiled> {
     let Answer::Complete(grounding) = reachability::ground(task, &limits) else {
         return None;
     };
-    let wanted = Wanted {
+    let wanted = CompileInput {
         situation: &situation,
         metric: false,
         tuning,

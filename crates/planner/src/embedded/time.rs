@@ -95,7 +95,7 @@ mod tests {
     use elbowroom_num::Rational;
 
     #[test]
-    fn the_grid_holds_all_numbers_it_was_made_for() {
+    fn grid_represents_its_input_numbers_exactly() {
         let numbers = [
             Rational::new(1, 1000),
             Rational::new(1, 3),
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_goes_down_and_up() {
+    fn rounding_works_in_both_directions() {
         let scale = Scale::of([Rational::ONE].iter());
         assert_eq!(scale.floor(&Rational::new(-3, 2)), (-2, false));
         assert_eq!(scale.ceil(&Rational::new(-3, 2)), (-1, false));

@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn techniques_and_searches_are_told_by_name() {
+    fn techniques_and_searches_are_set_by_name() {
         for (technique, name) in Technique::ALL {
             assert_eq!(name.parse(), Ok(*technique));
             assert_eq!(technique.to_string(), *name);

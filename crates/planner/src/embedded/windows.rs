@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn intersection_keeps_what_both_have() {
+    fn intersection_contains_common_intervals() {
         let both = intersection(&[(0, 10), (20, 30)], &[(5, 22), (25, 40)]);
         assert_eq!(both, [(5, 10), (20, 22), (25, 30)]);
     }

@@ -77,7 +77,7 @@ fn embossing(sheets: usize) -> (String, String) {
 }
 
 #[test]
-fn what_must_follow_before_something_is_cold_is_not_put_off() {
+fn step_before_expiring_fact_is_not_postponed() {
     let (domain, problem) = embossing(9);
     let answer = answer_without_cleanup(&domain, &problem);
     let evaluated = counts(&answer).evaluated;
@@ -122,7 +122,7 @@ fn pottery(pots: usize) -> (String, String) {
 }
 
 #[test]
-fn what_outlasts_a_fire_is_not_fired_in_it() {
+fn content_longer_than_envelope_is_not_nested() {
     let (domain, problem) = pottery(24);
     let answer = answer_without_cleanup(&domain, &problem);
     let evaluated = counts(&answer).evaluated;
@@ -130,7 +130,7 @@ fn what_outlasts_a_fire_is_not_fired_in_it() {
 }
 
 #[test]
-fn jugs_that_nobody_asks_for_are_left_out() {
+fn unneeded_jugs_are_eliminated() {
     let (domain, problem) = pottery(24);
     let actions = counts(&answer(&domain, &problem)).actions;
     // Two fires; firing and glazing of each pot; twelve jugs.
@@ -187,7 +187,7 @@ fn a_can_that_is_still_needed_is_not_shipped() {
 }
 
 #[test]
-fn a_search_that_compresses_keeps_what_is_needed_too() {
+fn compressing_search_keeps_needed_facts() {
     let cups: Vec<usize> = (0..8).map(|n| 1 + n % 3).collect();
     let (domain, problem) = filling(&cups, &cups);
     let mut tuning = Tuning::default();
@@ -202,7 +202,7 @@ fn a_search_that_compresses_keeps_what_is_needed_too() {
 /// One descent of a single search leads to the goal. If it is interrupted on the way, it has to
 /// wait for all others.
 #[test]
-fn a_search_that_comes_nearer_keeps_its_turn() {
+fn progressing_search_keeps_its_turn() {
     let (domain, problem) = pottery(40);
     let evaluated = |patience: u64| {
         let mut tuning = Tuning::default();

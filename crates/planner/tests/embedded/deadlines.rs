@@ -9,7 +9,7 @@ use elbowroom_model::{Modal, RunningAction, Situation, Step, Task, TimeTriggered
 use elbowroom_num::{Interval, Rational};
 use elbowroom_planner::Answer;
 
-use crate::course_twin::{CONDITIONS, Dice, domain};
+use crate::trajectory_reference::{CONDITIONS, Rng, domain};
 use crate::world::{answer_from, describe, task};
 
 /// Times before the situation.
@@ -17,7 +17,7 @@ const BEFORE: i64 = 3;
 
 /// Returns a random problem with one constraint `within`, and the same with a deadline that is later by [`BEFORE`]
 /// instead.
-fn problems(dice: &mut Dice) -> (Task, Task, String) {
+fn problems(dice: &mut Rng) -> (Task, Task, String) {
     let domain = domain(dice);
     let initial = dice.one(&["", "(p)", "(q)", "(p) (r)", "(q) (r)"]);
     let (number, time) = (dice.below(3), dice.below(7));
@@ -58,8 +58,8 @@ fn moved(task: &Task, plan: &TimeTriggeredPlan, is_later: bool) -> TimeTriggered
 }
 
 #[test]
-fn a_deadline_in_mid_execution_is_one_of_the_problem_that_begins_there() {
-    let mut dice = Dice(0x1357_9bdf_2468_ace1);
+fn mid_execution_deadline_equals_deadline_of_shifted_problem() {
+    let mut dice = Rng(0x1357_9bdf_2468_ace1);
     let (mut found, mut none) = (0, 0);
     for _ in 0..150 {
         let (beginning, later, text) = problems(&mut dice);
@@ -105,7 +105,7 @@ fn a_deadline_in_mid_execution_is_one_of_the_problem_that_begins_there() {
 
 #[test]
 fn running_actions_end_as_planned_under_deadlines() {
-    let mut dice = Dice(0x0fed_cba9_8765_4321);
+    let mut dice = Rng(0x0fed_cba9_8765_4321);
     let (mut found, mut missed) = (0, 0);
     for _ in 0..150 {
         let (_, task, text) = problems(&mut dice);

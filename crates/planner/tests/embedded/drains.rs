@@ -16,7 +16,7 @@ use crate::world::{describe, task};
 struct DraftAction {
     duration: u8,
     /// The possible additional duration.
-    room: Option<u8>,
+    margin: Option<u8>,
     level: u8,
     rate: i8,
     /// A fact that must hold at the start, and one that must hold over all.
@@ -59,7 +59,7 @@ fn drafts() -> impl Strategy<Value = Draft> {
         action.prop_map(
             |(duration, (level, rate), needs, tests, takes, jump)| DraftAction {
                 duration: duration.0,
-                room: duration.1,
+                margin: duration.1,
                 level,
                 rate,
                 needs: needs.into(),
@@ -138,7 +138,7 @@ impl Draft {
             if action.jump != 0 {
                 write!(changes, " (at end (increase (l{level}) {}))", action.jump).unwrap();
             }
-            let duration = match action.room {
+            let duration = match action.margin {
                 None => format!("(= ?duration {})", action.duration),
                 Some(room) => format!(
                     "(and (>= ?duration {}) (<= ?duration {}))",
@@ -203,7 +203,7 @@ proptest! {
     }
 
     #[test]
-    fn problem_is_solvable_whether_or_not_drains_count_as_changes_at_the_end(draft in drafts()) {
+    fn treating_drains_as_end_changes_keeps_solvability(draft in drafts()) {
         let task = draft.task();
         let answers =
             [&[][..], &[Technique::ContinuousDrains]].map(|without| answer(&task, without));

@@ -34,7 +34,7 @@ fn three_fuses_do_not_fit_under_one_match() {
 /// the fact that both need until then. The search does not find this plan, and must not claim that
 /// none exists.
 #[test]
-fn two_instances_that_start_apart_and_end_together_are_not_denied() {
+fn instances_that_start_apart_and_end_together_are_found() {
     let domain = "
         (:requirements :durative-actions :fluents)
         (:predicates (power) (coin) (first) (second)) (:functions (left))
@@ -64,13 +64,13 @@ const DOOR: &str = "
       :condition (over all (open)) :effect (at end (in)))";
 
 #[test]
-fn a_window_is_used_once_it_opens() {
+fn action_waits_for_window_to_open() {
     let problem = "(:init (at 7 (open)) (at 17 (not (open)))) (:goal (in))";
     assert_eq!(describe(&answer(DOOR, problem)), "7: (enter) [10]");
 }
 
 #[test]
-fn a_window_that_is_too_short_is_a_proof_with_a_reason() {
+fn too_short_window_is_a_proof_with_reason() {
     let problem = "(:init (open) (at 9.5 (not (open)))) (:goal (in))";
     assert_eq!(
         describe(&answer(DOOR, problem)),
@@ -104,7 +104,7 @@ fn the_goal_counts_after_all_timed_initials() {
 /// Neither the lamp nor its hours matter to the goal. Without them, only one action and one window
 /// remain to be tried, and an exhausted search proves that the second item has no time.
 #[test]
-fn irrelevant_actions_and_their_timed_initials_are_left_out() {
+fn irrelevant_actions_and_timed_initials_are_removed() {
     let domain = "
         (:requirements :typing :durative-actions :timed-initial-literals)
         (:types item)
@@ -141,7 +141,7 @@ fn irrelevant_actions_and_their_timed_initials_are_left_out() {
 }
 
 #[test]
-fn a_goal_that_nothing_brings_about_is_named() {
+fn unachievable_goal_is_named() {
     let problem = "(:init) (:goal (in))";
     assert_eq!(
         describe(&answer(DOOR, problem)),
@@ -163,7 +163,7 @@ const TANK: &str = "
       :effect (and (at start (decrease (level) 20)) (at end (done))))";
 
 #[test]
-fn a_duration_is_chosen_long_enough_for_what_depends_on_it() {
+fn duration_is_chosen_long_enough_for_dependent_effect() {
     let answer = answer(TANK, "(:init (= (level) 0)) (:goal (done))");
     let found = answer.found().expect("a plan");
     let fill = &found.plan.steps[0];
@@ -173,7 +173,7 @@ fn a_duration_is_chosen_long_enough_for_what_depends_on_it() {
 }
 
 #[test]
-fn a_continuous_effect_is_read_while_it_goes_on() {
+fn continuous_effect_is_read_while_active() {
     let domain = "
         (:requirements :typing :durative-actions :numeric-fluents :continuous-effects)
         (:predicates (idle) (hot))
@@ -196,7 +196,7 @@ fn a_continuous_effect_is_read_while_it_goes_on() {
 }
 
 #[test]
-fn actions_that_use_up_a_stock_run_side_by_side() {
+fn actions_that_consume_a_stock_run_concurrently() {
     let domain = "
         (:requirements :typing :durative-actions :numeric-fluents)
         (:types part) (:predicates (made ?p - part) (raw ?p - part))
@@ -226,7 +226,7 @@ const COUNTER: &str = "
       :effect (and (at end (not (carrying))) (at end (delivered))))";
 
 #[test]
-fn what_must_be_carried_there_takes_both_ways() {
+fn deadline_proof_includes_way_to_and_from_parcel() {
     let problem = "(:objects home shelf counter - place)
         (:init (at home) (parcel shelf) (open counter) (at 25.9 (not (open counter))))
         (:goal (delivered))";
@@ -258,7 +258,7 @@ fn disjunctions_quantifiers_and_conditional_effects() {
 }
 
 #[test]
-fn derived_facts_are_followed() {
+fn derived_facts_are_supported() {
     let domain = "
         (:requirements :adl :derived-predicates :typing)
         (:types place)
@@ -295,7 +295,7 @@ fn battery_and_charger() {
 }
 
 #[test]
-fn what_is_not_handled_is_named() {
+fn unsupported_feature_is_named() {
     let domain = "
         (:requirements :adl :durative-actions)
         (:predicates (p) (q) (r))
@@ -334,7 +334,7 @@ fn interchangeable_objects_are_tried_once() {
 }
 
 #[test]
-fn what_a_conditional_effect_never_makes_true_is_read_all_the_same() {
+fn impossible_conditional_effect_keeps_fact_readable() {
     // (p) never changes, but the validator separates its readers from the actions that may change
     // it.
     let plan = describe(&answer(

@@ -11,7 +11,7 @@ use crate::world::{describe, task};
 
 /// Deep shelves need a search by novelty; the others, which come first, would use up all memory.
 #[test]
-fn the_search_that_takes_most_gives_way_to_one_that_finds_a_plan() {
+fn largest_search_is_dropped_at_memory_limit() {
     let (domain, problem) = shelf(6);
     let task = task(&domain, &problem);
     let run = |max_memory| {
@@ -52,7 +52,7 @@ fn the_search_that_takes_most_gives_way_to_one_that_finds_a_plan() {
 }
 
 /// Maximum number of reports.
-const MOST_REPORTS: usize = 200;
+const MAX_REPORTS: usize = 200;
 
 /// Returns the number of reports about better plans of a shop, the maximum memory of the searches,
 /// and the reason for the end.
@@ -74,7 +74,7 @@ fn better_plans(max_memory: usize) -> (usize, usize, Stopped) {
         &mut |progress| {
             reports += 1;
             most = most.max(progress.counts.memory);
-            if reports < MOST_REPORTS {
+            if reports < MAX_REPORTS {
                 ControlFlow::Continue(())
             } else {
                 ControlFlow::Break(())
@@ -88,9 +88,9 @@ fn better_plans(max_memory: usize) -> (usize, usize, Stopped) {
 }
 
 #[test]
-fn better_plans_are_looked_for_near_the_best_one_when_the_searches_have_no_room() {
+fn local_search_continues_when_searches_are_out_of_memory() {
     let (reports, needed, stopped) = better_plans(usize::MAX);
-    assert_eq!((reports, stopped), (MOST_REPORTS, Stopped::Interrupted));
+    assert_eq!((reports, stopped), (MAX_REPORTS, Stopped::Interrupted));
     let limit = needed / 4;
     // It runs as long as with unlimited memory, and the searches use less memory.
     let (others, most, stopped) = better_plans(limit);

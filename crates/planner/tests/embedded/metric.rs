@@ -3,12 +3,12 @@
 use std::ops::ControlFlow;
 
 use elbowroom_model::Situation;
-use elbowroom_planner::{Answer, Found, Objective, Settings, Stopped, plan};
+use elbowroom_planner::{Answer, FoundPlan, Objective, Settings, Stopped, plan};
 
 use crate::world::{describe, task};
 
 /// Searches until the space is exhausted, and returns all plans that were reported.
-fn plans(domain: &str, problem: &str, settings: &Settings) -> (Vec<Found>, Answer) {
+fn plans(domain: &str, problem: &str, settings: &Settings) -> (Vec<FoundPlan>, Answer) {
     let task = task(domain, problem);
     let situation = Situation::initial(&task);
     let (mut plans, mut left) = (Vec::new(), 2000);
@@ -32,7 +32,7 @@ fn best(domain: &str, problem: &str) -> (String, String) {
     };
     assert_eq!(*stopped, Stopped::Exhausted, "{}", describe(&answer));
     assert_eq!(plans.last(), Some(found));
-    let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
+    let worth = |found: &FoundPlan| (found.value.clone(), found.makespan.clone());
     assert!(plans.is_sorted_by(|a, b| worth(a) > worth(b)));
     let metric = found.metric.as_ref().expect("there is a metric");
     (metric.to_string(), found.makespan.to_string())
@@ -63,7 +63,7 @@ fn the_cheapest_plan_is_not_the_shortest() {
 }
 
 #[test]
-fn time_is_money_at_some_rate() {
+fn metric_weights_time_against_cost() {
     // By taxi 30 + 5 r, by bus 3 + 19.002 r.
     let patient = trip("(:metric minimize (+ (money) (total-time)))");
     assert_eq!(best(TRIP, &patient).0, "11001/500");
@@ -72,7 +72,7 @@ fn time_is_money_at_some_rate() {
 }
 
 #[test]
-fn the_makespan_can_be_asked_for_instead() {
+fn makespan_objective_overrides_metric() {
     let settings = Settings {
         objective: Objective::Makespan,
         ..Settings::default()
@@ -84,7 +84,7 @@ fn the_makespan_can_be_asked_for_instead() {
 }
 
 #[test]
-fn the_first_plan_is_all_if_it_is_all_that_is_asked_for() {
+fn first_plan_only_stops_after_first_plan() {
     let settings = Settings {
         first_plan_only: true,
         ..Settings::default()
@@ -95,7 +95,7 @@ fn the_first_plan_is_all_if_it_is_all_that_is_asked_for() {
 }
 
 #[test]
-fn of_plans_that_cost_the_same_the_shorter_one_is_better() {
+fn equal_cost_is_resolved_by_shorter_makespan() {
     let domain = "(:requirements :durative-actions :numeric-fluents)
         (:predicates (a) (b)) (:functions (cost))
         (:durative-action slow :parameters () :duration (= ?duration 9)
@@ -110,7 +110,7 @@ fn of_plans_that_cost_the_same_the_shorter_one_is_better() {
 }
 
 #[test]
-fn what_is_maximized_grows_from_plan_to_plan() {
+fn maximised_metric_increases_from_plan_to_plan() {
     // Each sight takes an hour, and the last bus leaves at 3.5.
     let domain = "(:requirements :durative-actions :numeric-fluents :timed-initial-literals)
         (:types sight) (:predicates (runs) (back) (free) (new ?s - sight))
@@ -130,7 +130,7 @@ fn what_is_maximized_grows_from_plan_to_plan() {
 }
 
 #[test]
-fn a_price_that_is_paid_for_time_is_kept_low() {
+fn time_dependent_cost_is_minimised() {
     // The cost grows with the time that the lamp burns; it must burn while the work lasts.
     let domain = "(:requirements :durative-actions :numeric-fluents :duration-inequalities)
         (:predicates (light) (done) (dark)) (:functions (oil))

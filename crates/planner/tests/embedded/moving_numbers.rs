@@ -165,7 +165,7 @@ fn step_that_only_changes_a_number_is_not_repeated_for_ever() {
 }
 
 #[test]
-fn constraint_without_form_leaves_the_others_in_force() {
+fn inexpressible_constraint_keeps_other_constraints_active() {
     let domain = format!(
         "{BATH}
         (:durative-action ring :parameters () :duration (= ?duration 1)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::{End, Interval};
-use elbowroom_planner::{Answer, Found, Settings, Stopped, plan};
+use elbowroom_planner::{Answer, FoundPlan, Settings, Stopped, plan};
 
 use crate::world::{describe, task};
 
@@ -24,7 +24,7 @@ fn answer_within(task: &Task, situation: &Situation, states: u64) -> Answer {
     })
 }
 
-fn found(answer: &Answer) -> &Found {
+fn found(answer: &Answer) -> &FoundPlan {
     let found = answer.found();
     found.unwrap_or_else(|| panic!("{}", describe(answer)))
 }
@@ -92,7 +92,7 @@ fn couriers(init: &str, goal: &str) -> Task {
 
 /// Returns a situation with both on their way. The durations of rests can be chosen, so that linear
 /// programs compute the times.
-fn on_the_way() -> (Task, Situation) {
+fn driving_situation() -> (Task, Situation) {
     let task = couriers(
         "(has ann blue) (has bob red) (= (strength ann) 20) (= (strength bob) 16) (accessible mill)",
         "(and (lies red mill) (at ann inn) (lies blue inn) (at bob inn))",
@@ -118,8 +118,8 @@ fn on_the_way() -> (Task, Situation) {
 }
 
 #[test]
-fn what_is_under_way_ends_exactly_when_it_should_though_other_durations_are_chosen() {
-    let (task, situation) = on_the_way();
+fn running_action_ends_exactly_when_other_durations_are_chosen() {
+    let (task, situation) = driving_situation();
     let answer = answer_within(&task, &situation, 100);
     assert_eq!(
         describe(&answer),
@@ -134,7 +134,7 @@ fn what_is_under_way_ends_exactly_when_it_should_though_other_durations_are_chos
 /// Up to the first plan, including the computation of its times.
 #[test]
 fn each_report_can_be_the_last_one() {
-    let (task, situation) = on_the_way();
+    let (task, situation) = driving_situation();
     let settings = Settings {
         first_plan_only: true,
         ..Settings::default()
@@ -167,7 +167,7 @@ fn each_report_can_be_the_last_one() {
 }
 
 #[test]
-fn a_duration_under_way_is_chosen_from_its_exact_start_on() {
+fn duration_of_running_action_counts_from_exact_start() {
     let task = couriers(
         "(at ann home) (= (strength ann) 4) (= (strength bob) 0)",
         "(and (idle ann) (>= (strength ann) 10))",
@@ -186,7 +186,7 @@ fn a_duration_under_way_is_chosen_from_its_exact_start_on() {
 }
 
 #[test]
-fn what_waits_for_a_fixed_time_does_so_though_other_durations_are_chosen() {
+fn action_waits_for_fixed_time_when_other_durations_are_chosen() {
     let task = couriers(
         "(at ann home) (idle ann) (= (strength ann) 4) (= (strength bob) 0)
          (at 5.00000000000001 (accessible mill))",
@@ -205,7 +205,7 @@ const GATE: &str = "
       :condition (at end (open)) :effect (at end (inside)))";
 
 #[test]
-fn what_is_under_way_and_has_to_wait_waits() {
+fn running_action_ends_when_its_gate_opens() {
     let task = task(GATE, "(:init (at 8 (open))) (:goal (inside))");
     let mut situation = Situation::initial(&task);
     situation.time = 6.into();
@@ -218,7 +218,7 @@ fn what_is_under_way_and_has_to_wait_waits() {
 }
 
 #[test]
-fn what_is_under_way_keeps_off_a_bound_that_is_no_possible_duration() {
+fn running_action_respects_open_duration_bound() {
     let task = task(GATE, "(:init (open)) (:goal (inside))");
     let mut situation = Situation::initial(&task);
     situation.time = 1.into();
@@ -237,7 +237,7 @@ fn what_is_under_way_keeps_off_a_bound_that_is_no_possible_duration() {
 /// Off the grid by less than a tick, no time is left. So the validator rejects every plan, and the
 /// candidates become longer and longer.
 #[test]
-fn candidates_that_the_judge_refuses_count_as_states() {
+fn candidates_rejected_by_validator_count_as_states() {
     let task = task(
         "(:requirements :durative-actions :numeric-fluents :timed-initial-literals)
          (:predicates (open) (over)) (:functions (knocks))

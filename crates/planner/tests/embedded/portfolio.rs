@@ -85,7 +85,7 @@ fn each_search_finds_a_plan_by_itself() {
 }
 
 #[test]
-fn each_technique_can_be_done_without() {
+fn plan_is_found_without_each_technique() {
     let (domain, problem) = shelf(3);
     for &(technique, name) in Technique::ALL {
         let mut tuning = Tuning::default();
@@ -97,7 +97,7 @@ fn each_technique_can_be_done_without() {
 
 /// The shelf must be filled from its end, which relaxed plans do not represent.
 #[test]
-fn a_shelf_is_filled_from_its_end_by_looking_for_new_states() {
+fn novelty_search_fills_shelf_from_its_end() {
     let (domain, problem) = shelf(6);
     let mut tuning = Tuning::default();
     tuning.only = Some(Member::Width);
@@ -107,7 +107,7 @@ fn a_shelf_is_filled_from_its_end_by_looking_for_new_states() {
 
 /// With any technique switched off, a full shelf holds no further box, and no plan is reported.
 #[test]
-fn one_box_too_many_has_no_plan_whatever_is_switched_off() {
+fn overfull_shelf_is_unsolvable_without_any_technique() {
     let (domain, problem) = shelf(1);
     let more = problem
         .replace("b0 - box", "b0 spare - box")
@@ -127,7 +127,7 @@ fn one_box_too_many_has_no_plan_whatever_is_switched_off() {
 
 /// Relations that no action and no rule achieves stay false for all intervals.
 #[test]
-fn a_goal_that_nothing_achieves_is_proved_to_be_out_of_reach() {
+fn unachievable_goal_is_proved_unreachable() {
     let domain = "
         (:requirements :typing :durative-actions) (:types interval)
         (:predicates (started ?i - interval) (ended ?i - interval) (before ?i ?j - interval))

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use elbowroom_model::validate::{self, Verdict, validate};
 use elbowroom_model::{Situation, Task};
-use elbowroom_planner::{Answer, Found, Member, Phase, Settings, Stopped, Technique, plan};
+use elbowroom_planner::{Answer, FoundPlan, Member, Phase, Settings, Stopped, Technique, plan};
 
 use crate::world::{describe, task};
 
@@ -90,7 +90,7 @@ fn shortest(jobs: &Shop) -> i64 {
 }
 
 /// Returns the plans that are reported up to report `most`, and the answer.
-fn run(task: &Task, settings: &Settings, most: usize) -> (Vec<Found>, Answer) {
+fn run(task: &Task, settings: &Settings, most: usize) -> (Vec<FoundPlan>, Answer) {
     let situation = Situation::initial(task);
     let (mut plans, mut reports) = (Vec::new(), 0);
     let answer = plan(task, &situation, settings, &mut |progress| {
@@ -152,7 +152,7 @@ fn small_shops_are_as_short_as_the_shortest_order() {
 }
 
 #[test]
-fn what_was_chosen_one_after_the_other_happens_side_by_side() {
+fn sequential_choices_are_scheduled_concurrently() {
     for seed in 0..3 {
         let jobs = made_up(seed, 3, 3);
         let task = shop(&jobs, true);
@@ -166,7 +166,7 @@ fn what_was_chosen_one_after_the_other_happens_side_by_side() {
 }
 
 #[test]
-fn the_search_for_everything_finds_nothing_better() {
+fn exhaustive_search_finds_no_better_plan() {
     // Two jobs: the whole space can be searched.
     for seed in 0..4 {
         let jobs = made_up(seed, 2, 2);
@@ -181,7 +181,7 @@ fn the_search_for_everything_finds_nothing_better() {
 }
 
 #[test]
-fn work_is_moved_to_who_is_idle() {
+fn work_is_moved_to_idle_worker() {
     // Six jobs of four, for three workers. The choice of the first worker does not change the
     // number of steps.
     let task = task(
@@ -204,7 +204,7 @@ fn work_is_moved_to_who_is_idle() {
 }
 
 #[test]
-fn the_same_plans_come_in_each_run() {
+fn runs_are_deterministic() {
     let task = shop(&made_up(7, 4, 3), true);
     let (first, answer) = run(&task, &Settings::default(), 60);
     assert!(first.len() > 1, "{}", describe(&answer));
@@ -212,7 +212,7 @@ fn the_same_plans_come_in_each_run() {
 }
 
 #[test]
-fn each_report_can_be_the_last_one_here_too() {
+fn refinement_can_be_interrupted_at_each_report() {
     let task = shop(&made_up(5, 6, 3), true);
     let situation = Situation::initial(&task);
     for most in 3..40 {
@@ -232,7 +232,7 @@ fn each_report_can_be_the_last_one_here_too() {
 
 /// The same plan as without the clean-up, or a better one, for little more work.
 #[test]
-fn cleaned_up_plan_is_no_worse_and_takes_a_share_of_the_work() {
+fn cleaned_up_plan_is_no_worse_within_work_share() {
     for seed in 0..6 {
         let task = shop(&made_up(seed, 6, 3), seed % 2 == 0);
         let run = |without: &[Technique]| {

@@ -11,7 +11,7 @@ use crate::world::{
 
 /// A hand-truck pair is lent out for a while; moving the piano takes two of them at once.
 #[test]
-fn what_is_lent_in_numbers_is_no_proof_that_it_is_missing() {
+fn temporarily_lowered_number_is_no_proof_of_shortage() {
     let domain = "
         (:requirements :durative-actions :numeric-fluents)
         (:predicates (moved) (piano)) (:functions (stock) (lent))
@@ -65,7 +65,7 @@ fn road(length: usize, capacity: usize) -> (String, String) {
 }
 
 #[test]
-fn what_a_relaxed_plan_uses_up_is_filled_up_before() {
+fn consumption_of_relaxed_plan_is_replenished_before() {
     let (domain, problem) = road(6, 12);
     let answer = answer_without_cleanup(&domain, &problem);
     let Answer::Plan { counts, .. } = &answer else {
@@ -98,7 +98,7 @@ fn states_to_first_plan(domain: &str, problem: &str, without: &[Technique]) -> u
 /// The battery drains while the rover drives, and is charged for as long as it takes. Its actions exclude each
 /// other.
 #[test]
-fn continuous_drain_is_filled_up_before() {
+fn continuous_consumption_is_replenished_before() {
     let (domain, problem) = road(8, 20);
     let domain = domain
         .replace(
@@ -128,7 +128,7 @@ fn continuous_drain_is_filled_up_before() {
 }
 
 #[test]
-fn a_battery_that_is_too_small_is_no_plan() {
+fn too_small_battery_has_no_plan() {
     let (domain, problem) = road(4, 7);
     let answer = answer(&domain, &problem);
     assert!(
@@ -207,7 +207,7 @@ fn laboratory(samples: usize) -> (String, String) {
 /// Replenishing in estimates, and estimates alone, leave a search on plateaus here: without the
 /// turns of BFWS(f₂) without replenishing, this takes more than 14,000 states.
 #[test]
-fn search_for_new_states_without_refilling_leaves_plateaus() {
+fn novelty_search_escapes_plateaus_without_replenishment() {
     let (domain, problem) = laboratory(10);
     let states = states_to_first_plan(&domain, &problem, &[]);
     assert!(states < 10_000, "{states} states");

@@ -20,7 +20,7 @@ const DELIVERY: &str = "
 
 /// Returns the situation at time 6 in which an action without arguments has been running since 0,
 /// and its start has made a fact false.
-fn under_way(task: &Task, schema: &str, gone: &str, duration: Interval) -> Situation {
+fn running_situation(task: &Task, schema: &str, gone: &str, duration: Interval) -> Situation {
     let schema = task.problem().schema(schema).expect("as written");
     let action = task.instantiate(schema, &[]).expect("as written");
     let mut situation = Situation::initial(task);
@@ -37,31 +37,31 @@ fn under_way(task: &Task, schema: &str, gone: &str, duration: Interval) -> Situa
 }
 
 /// Returns the situation at 6, on the way since 0 with the parcel.
-fn on_the_way(closing: &str, duration: Interval) -> (Task, Situation) {
+fn driving_situation(closing: &str, duration: Interval) -> (Task, Situation) {
     let problem =
         format!("(:init (here) (loaded) (open) (at {closing} (not (open)))) (:goal (delivered))");
     let task = task(DELIVERY, &problem);
-    let situation = under_way(&task, "go", "here", duration);
+    let situation = running_situation(&task, "go", "here", duration);
     (task, situation)
 }
 
 #[test]
-fn the_effect_of_what_is_under_way_is_used() {
-    let (task, situation) = on_the_way("20", Interval::closed(8.into(), 15.into()));
+fn end_effect_of_running_action_is_used() {
+    let (task, situation) = driving_situation("20", Interval::closed(8.into(), 15.into()));
     let answer = answer_from(&task, &situation, 100);
     assert_eq!(describe(&answer), "0: (go) [8]\n8: (drop) [2]");
 }
 
 #[test]
-fn what_is_under_way_cannot_have_ended_before_now() {
-    let (task, situation) = on_the_way("20", Interval::closed(2.into(), 15.into()));
+fn running_action_ends_no_earlier_than_now() {
+    let (task, situation) = driving_situation("20", Interval::closed(2.into(), 15.into()));
     let answer = answer_from(&task, &situation, 100);
     assert_eq!(describe(&answer), "0: (go) [6]\n6: (drop) [2]");
 }
 
 #[test]
-fn a_deadline_after_now_can_be_out_of_reach() {
-    let (task, situation) = on_the_way("11.9", Interval::closed(10.into(), 15.into()));
+fn future_deadline_can_be_unreachable() {
+    let (task, situation) = driving_situation("11.9", Interval::closed(10.into(), 15.into()));
     let answer = answer_from(&task, &situation, 100);
     assert_eq!(
         describe(&answer),
@@ -70,8 +70,8 @@ fn a_deadline_after_now_can_be_out_of_reach() {
 }
 
 #[test]
-fn a_deadline_that_has_passed_does_not_come_again() {
-    let (task, mut situation) = on_the_way("5", Interval::closed(8.into(), 15.into()));
+fn past_deadline_is_ignored() {
+    let (task, mut situation) = driving_situation("5", Interval::closed(8.into(), 15.into()));
     let open = task.problem().predicate("open").expect("as written above");
     let open = task.find_fact(open, &[]).expect("as written above");
     situation.state.facts.remove(&open);
@@ -92,7 +92,7 @@ const TIMELY: &str = "
 
 /// Worlds report the time in floats, which no grid contains.
 #[test]
-fn a_plan_that_begins_at_once_begins_at_no_earlier_time_than_it_is() {
+fn plan_starts_no_earlier_than_now() {
     for goal in ["(done)", "(>= (water) 5)", "(and (done) (>= (water) 5))"] {
         let problem = format!("(:init (idle) (= (water) 0)) (:goal {goal})");
         let task = task(TIMELY, &problem);
@@ -134,7 +134,7 @@ fn endless() -> Task {
 }
 
 #[test]
-fn a_search_ends_when_it_is_told_to() {
+fn search_stops_on_request() {
     let task = endless();
     let situation = Situation::initial(&task);
     let answer = answer_from(&task, &situation, 5);
@@ -201,12 +201,12 @@ fn filling(duration: Interval) -> (Task, Situation) {
     let problem = "(:init (idle) (= (level) 0) (= (pumped) 0)) (:goal (drained))
         (:metric minimize (pumped))";
     let task = task(domain, problem);
-    let situation = under_way(&task, "fill", "idle", duration);
+    let situation = running_situation(&task, "fill", "idle", duration);
     (task, situation)
 }
 
 #[test]
-fn what_is_under_way_changes_numbers_by_how_long_it_lasts() {
+fn running_action_changes_numbers_by_its_duration() {
     let (task, situation) = filling(Interval::closed(8.into(), 8.into()));
     let answer = answer_from(&task, &situation, 100);
     assert_eq!(describe(&answer), "0: (fill) [8]\n8001/1000: (drain) [1]");
@@ -218,7 +218,7 @@ fn what_is_under_way_changes_numbers_by_how_long_it_lasts() {
 }
 
 #[test]
-fn what_takes_longer_than_it_should_changes_numbers_more() {
+fn overdue_action_changes_numbers_more() {
     // The duration is known, but differs from the domain's.
     let (task, situation) = filling(Interval::closed(10.into(), 10.into()));
     let answer = answer_from(&task, &situation, 100);

@@ -3,15 +3,15 @@
 use super::*;
 
 /// Hub with one performer or more, and its outputs.
-struct Scene {
+struct Fixture {
     hub: Hub,
     now: Duration,
     sent: Vec<(i16, String)>,
-    told: Vec<(Ticket, Told)>,
+    told: Vec<(ActionHandle, ActionUpdate)>,
     remarks: Vec<String>,
 }
 
-impl Scene {
+impl Fixture {
     fn new() -> Self {
         Self {
             hub: Hub::new("elbowroom"),
@@ -26,14 +26,14 @@ impl Scene {
         for effect in self.hub.effects() {
             match effect {
                 Effect::Send(message) => self.sent.push((message.kind, message.node_id)),
-                Effect::Tell(ticket, told) => self.told.push((ticket, told)),
+                Effect::Report(ticket, told) => self.told.push((ticket, told)),
                 Effect::Remark(text) => self.remarks.push(text),
             }
         }
     }
 
     /// Begins an action. `text` is that of a plan, without parentheses.
-    fn begin(&mut self, ticket: Ticket, text: &str) {
+    fn begin(&mut self, ticket: ActionHandle, text: &str) {
         let (name, arguments) = split(text);
         let action = Action {
             ticket,
@@ -87,7 +87,7 @@ impl Scene {
         }
     }
 
-    fn outcomes(&self, ticket: Ticket) -> Vec<&Told> {
+    fn outcomes(&self, ticket: ActionHandle) -> Vec<&ActionUpdate> {
         let its = self.told.iter().filter(|(it, _)| *it == ticket);
         its.map(|(_, told)| told).collect()
     }
@@ -103,24 +103,24 @@ fn split(text: &str) -> (String, Vec<String>) {
     (words.next().expect("a name"), words.collect())
 }
 
-fn failed(why: &str) -> Told {
-    Told::Failed(why.into())
+fn failed(why: &str) -> ActionUpdate {
+    ActionUpdate::Failed(why.into())
 }
 
 #[test]
 fn a_conversation() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(7, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.says_more(kind::FEEDBACK, "robot1", "MOVE R A B", false, "half-way");
     scene.says(kind::FINISH, "robot1", "move r a b");
-    let feedback = Told::Feedback {
+    let feedback = ActionUpdate::Feedback {
         completion: 0.5,
         note: "half-way".into(),
     };
     assert_eq!(
         scene.outcomes(7),
-        [&Told::Started, &feedback, &Told::Succeeded]
+        [&ActionUpdate::Started, &feedback, &ActionUpdate::Succeeded]
     );
     let expected = [(kind::REQUEST, "elbowroom"), (kind::CONFIRM, "robot1")];
     assert_eq!(scene.sent, expected.map(|(kind, node)| (kind, node.into())));
@@ -128,7 +128,7 @@ fn a_conversation() {
 
 #[test]
 fn a_request_that_is_lost_is_repeated_each_second() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.after(2, None);
     assert_eq!(scene.sent, vec![(kind::REQUEST, "elbowroom".into()); 3]);
@@ -139,31 +139,31 @@ fn a_request_that_is_lost_is_repeated_each_second() {
 
 #[test]
 fn a_repeated_answer_of_the_same_performer_changes_nothing() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     assert_eq!(scene.last_sent(), (kind::CONFIRM, "robot1"));
-    assert_eq!(scene.outcomes(1), [&Told::Started]);
+    assert_eq!(scene.outcomes(1), [&ActionUpdate::Started]);
 }
 
 #[test]
-fn who_answers_second_or_too_late_is_rejected_and_what_it_says_does_not_count() {
-    let mut scene = Scene::new();
+fn late_responses_are_rejected_and_ignored() {
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.says(kind::RESPONSE, "robot2", "move r a b");
     assert_eq!(scene.last_sent(), (kind::REJECT, "robot2"));
     scene.says(kind::FINISH, "robot2", "move r a b");
-    assert_eq!(scene.outcomes(1), [&Told::Started]);
+    assert_eq!(scene.outcomes(1), [&ActionUpdate::Started]);
     scene.says(kind::FINISH, "robot1", "move r a b");
     scene.says(kind::RESPONSE, "robot3", "move r a b");
     assert_eq!(scene.last_sent(), (kind::REJECT, "robot3"));
 }
 
 #[test]
-fn nobody_answers_and_those_that_were_heard_are_named() {
-    let mut scene = Scene::new();
+fn unanswered_request_lists_known_performers() {
+    let mut scene = Fixture::new();
     scene.begin(1, "pick r box");
     scene.after(31, Some(("robot1", state::READY)));
     let why = "no performer answered within 30 s; performers that were heard: robot1 (move)";
@@ -174,7 +174,7 @@ fn nobody_answers_and_those_that_were_heard_are_named() {
 
 #[test]
 fn a_failure_has_the_reason_that_the_performer_gives() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.says_more(
@@ -193,21 +193,24 @@ fn a_failure_has_the_reason_that_the_performer_gives() {
 
 #[test]
 fn a_repeated_finish_counts_once() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.says(kind::FINISH, "robot1", "move r a b");
     scene.says_more(kind::FINISH, "robot1", "move r a b", false, "");
-    assert_eq!(scene.outcomes(1), [&Told::Started, &Told::Succeeded]);
+    assert_eq!(
+        scene.outcomes(1),
+        [&ActionUpdate::Started, &ActionUpdate::Succeeded]
+    );
 }
 
 #[test]
-fn a_performer_that_falls_silent_is_named_and_told_to_cancel() {
-    let mut scene = Scene::new();
+fn silent_performer_is_named_and_cancelled() {
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.after(20, Some(("robot1", state::RUNNING)));
-    assert_eq!(scene.outcomes(1), [&Told::Started]);
+    assert_eq!(scene.outcomes(1), [&ActionUpdate::Started]);
     scene.after(6, None);
     let why = "robot1 is lost: nothing was heard of it for 5 s";
     assert_eq!(scene.outcomes(1)[1..], [&failed(why)]);
@@ -218,7 +221,7 @@ fn a_performer_that_falls_silent_is_named_and_told_to_cancel() {
 
 #[test]
 fn feedback_is_a_sign_of_life() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.is_in(state::RUNNING, "robot1");
@@ -230,19 +233,19 @@ fn feedback_is_a_sign_of_life() {
         !scene
             .told
             .iter()
-            .any(|(_, told)| matches!(told, Told::Failed(_)))
+            .any(|(_, told)| matches!(told, ActionUpdate::Failed(_)))
     );
 }
 
 #[test]
 fn a_performer_that_does_nothing_has_lost_a_word() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.after(2, Some(("robot1", state::READY)));
     scene.after(1, Some(("robot1", state::RUNNING)));
     scene.after(3, Some(("robot1", state::READY)));
-    assert_eq!(scene.outcomes(1), [&Told::Started]);
+    assert_eq!(scene.outcomes(1), [&ActionUpdate::Started]);
     scene.after(1, Some(("robot1", state::READY)));
     let why = "robot1 does nothing, and has not said how this has ended";
     assert_eq!(scene.outcomes(1)[1..], [&failed(why)]);
@@ -251,7 +254,7 @@ fn a_performer_that_does_nothing_has_lost_a_word() {
 
 #[test]
 fn a_performer_that_reports_the_state_failure_has_failed() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.is_in(state::FAILURE, "robot1");
@@ -259,8 +262,8 @@ fn a_performer_that_reports_the_state_failure_has_failed() {
 }
 
 #[test]
-fn a_cancel_is_confirmed_by_the_status_and_until_then_the_action_is_not_given_out() {
-    let mut scene = Scene::new();
+fn cancelled_action_is_not_reassigned_before_confirmation() {
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.hub.cancel(1);
@@ -268,41 +271,47 @@ fn a_cancel_is_confirmed_by_the_status_and_until_then_the_action_is_not_given_ou
     scene.settle();
     assert_eq!(scene.sent[2..], [(kind::CANCEL, "robot1".to_owned())]);
     scene.is_in(state::RUNNING, "robot1");
-    assert_eq!(scene.outcomes(1), [&Told::Started]);
+    assert_eq!(scene.outcomes(1), [&ActionUpdate::Started]);
     scene.begin(2, "move r a b");
     let why = "robot1 has not confirmed that it has stopped the same action";
     assert_eq!(scene.outcomes(2), [&failed(why)]);
     scene.is_in(state::READY, "robot1");
-    assert_eq!(scene.outcomes(1), [&Told::Started, &Told::Cancelled]);
+    assert_eq!(
+        scene.outcomes(1),
+        [&ActionUpdate::Started, &ActionUpdate::Cancelled]
+    );
     scene.begin(3, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     assert_eq!(scene.last_sent(), (kind::CONFIRM, "robot1"));
 }
 
 #[test]
-fn what_nobody_does_yet_is_cancelled_at_once() {
-    let mut scene = Scene::new();
+fn unassigned_action_is_cancelled_at_once() {
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.hub.cancel(1);
     scene.settle();
-    assert_eq!(scene.outcomes(1), [&Told::Cancelled]);
+    assert_eq!(scene.outcomes(1), [&ActionUpdate::Cancelled]);
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     assert_eq!(scene.last_sent(), (kind::REJECT, "robot1"));
 }
 
 #[test]
 fn a_success_after_a_cancel_counts() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(1, "move r a b");
     scene.says(kind::RESPONSE, "robot1", "move r a b");
     scene.hub.cancel(1);
     scene.says(kind::FINISH, "robot1", "move r a b");
-    assert_eq!(scene.outcomes(1), [&Told::Started, &Told::Succeeded]);
+    assert_eq!(
+        scene.outcomes(1),
+        [&ActionUpdate::Started, &ActionUpdate::Succeeded]
+    );
 }
 
 #[test]
 fn the_same_action_is_not_done_twice_at_a_time_but_others_are() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     scene.begin(1, "move r1 a b");
     scene.begin(2, "move r2 a b");
     scene.says(kind::RESPONSE, "robot1", "move r1 a b");
@@ -311,24 +320,30 @@ fn the_same_action_is_not_done_twice_at_a_time_but_others_are() {
     let why = "robot1 is still busy with the same action";
     assert_eq!(scene.outcomes(3), [&failed(why)]);
     scene.says(kind::FINISH, "robot2", "move r2 a b");
-    assert_eq!(scene.outcomes(1), [&Told::Started]);
-    assert_eq!(scene.outcomes(2), [&Told::Started, &Told::Succeeded]);
+    assert_eq!(scene.outcomes(1), [&ActionUpdate::Started]);
+    assert_eq!(
+        scene.outcomes(2),
+        [&ActionUpdate::Started, &ActionUpdate::Succeeded]
+    );
 }
 
 #[test]
 fn an_action_without_arguments_may_come_as_its_own_argument() {
     for (ticket, text) in [(1, "beep"), (2, "beep beep")] {
-        let mut scene = Scene::new();
+        let mut scene = Fixture::new();
         scene.begin(ticket, "beep");
         scene.says(kind::RESPONSE, "robot1", text);
         scene.says(kind::FINISH, "robot1", text);
-        assert_eq!(scene.outcomes(ticket), [&Told::Started, &Told::Succeeded]);
+        assert_eq!(
+            scene.outcomes(ticket),
+            [&ActionUpdate::Started, &ActionUpdate::Succeeded]
+        );
     }
 }
 
 #[test]
 fn another_executor_on_the_topic_is_named_once() {
-    let mut scene = Scene::new();
+    let mut scene = Fixture::new();
     for name in ["executor", "elbowroom", "executor"] {
         scene.says(kind::REQUEST, name, "move r a b");
     }

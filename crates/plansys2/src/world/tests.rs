@@ -8,7 +8,10 @@ fn greeted(speed: f64) -> World {
     let mut world = World::new("plansys2", speed);
     let mut said = vec![];
     let hello = r#"{"type":"hello","protocol":"elbowroom-world","version":1,"versions":[1,2]}"#;
-    assert_eq!(world.hear(hello, at(0.0), &mut said).expect("JSON"), None);
+    assert_eq!(
+        world.handle_line(hello, at(0.0), &mut said).expect("JSON"),
+        None
+    );
     assert_eq!(
         said,
         [r#"{"type":"hello","version":2,"name":"plansys2","can":["cancel","feedback"]}"#]
@@ -17,7 +20,7 @@ fn greeted(speed: f64) -> World {
 }
 
 fn hears(world: &mut World, line: &str, now: f64) -> Option<Command> {
-    world.hear(line, at(now), &mut vec![]).expect("JSON")
+    world.handle_line(line, at(now), &mut vec![]).expect("JSON")
 }
 
 const START: &str = r#"{"type":"start","ticket":3,"action":"(drive r a b)","duration":{"exact":"5","decimal":5.0},"now":{"exact":"0","decimal":0.0}}"#;
@@ -40,7 +43,7 @@ fn a_start_is_a_command_once() {
 fn time_begins_with_the_first_thing_to_do_and_runs_at_its_speed() {
     let mut world = greeted(2.0);
     hears(&mut world, START, 10.0);
-    world.tell(3, &Told::Started, at(10.5));
+    world.report(3, &ActionUpdate::Started, at(10.5));
     hears(&mut world, WAIT, 10.5);
     assert_eq!(
         world.answer(at(10.75)),
@@ -69,12 +72,12 @@ fn each_start_and_each_end_is_reported_once_and_in_this_order() {
     let mut world = greeted(1.0);
     hears(&mut world, START, 0.0);
     for told in [
-        Told::Succeeded,
-        Told::Started,
-        Told::Cancelled,
-        Told::Failed("late".into()),
+        ActionUpdate::Succeeded,
+        ActionUpdate::Started,
+        ActionUpdate::Cancelled,
+        ActionUpdate::Failed("late".into()),
     ] {
-        world.tell(3, &told, at(2.0));
+        world.report(3, &told, at(2.0));
     }
     hears(&mut world, WAIT, 2.0);
     let lines = world.answer(at(2.0));
@@ -90,7 +93,7 @@ fn each_start_and_each_end_is_reported_once_and_in_this_order() {
 }
 
 #[test]
-fn what_takes_no_time_has_ended_when_it_has_started() {
+fn instantaneous_action_ends_at_start() {
     let mut world = greeted(1.0);
     let start = r#"{"type":"start","ticket":1,"action":"(beep)","duration":null}"#;
     let Some(Command::Begin(action)) = hears(&mut world, start, 0.0) else {
@@ -98,29 +101,29 @@ fn what_takes_no_time_has_ended_when_it_has_started() {
     };
     assert!(action.is_instantaneous && action.arguments.is_empty());
     assert_eq!(world.running(), [1]);
-    world.tell(1, &Told::Started, at(1.0));
+    world.report(1, &ActionUpdate::Started, at(1.0));
     assert!(world.running().is_empty());
 }
 
 #[test]
-fn version_1_is_told_no_feedback() {
+fn version_1_receives_no_feedback() {
     let mut world = World::new("plansys2", 1.0);
     let mut said = vec![];
     let hello = r#"{"type":"hello","protocol":"elbowroom-world","version":1}"#;
-    world.hear(hello, at(0.0), &mut said).expect("JSON");
+    world.handle_line(hello, at(0.0), &mut said).expect("JSON");
     assert!(said.is_empty());
     hears(&mut world, START, 0.0);
-    let feedback = Told::Feedback {
+    let feedback = ActionUpdate::Feedback {
         completion: f32::NAN,
         note: String::new(),
     };
-    world.tell(3, &feedback, at(1.0));
+    world.report(3, &feedback, at(1.0));
     hears(&mut world, r#"{"type":"look","facts":[]}"#, 1.0);
     assert_eq!(world.answer(at(1.0)), [r#"{"type":"time","now":1.0}"#]);
 }
 
 #[test]
-fn what_is_not_known_is_passed_over_and_what_is_no_json_is_an_error() {
+fn unknown_messages_are_ignored_and_invalid_json_is_an_error() {
     let mut world = greeted(1.0);
     for line in [
         r#"{"type":"dance"}"#,
@@ -130,8 +133,8 @@ fn what_is_not_known_is_passed_over_and_what_is_no_json_is_an_error() {
     ] {
         assert_eq!(hears(&mut world, line, 0.0), None, "{line}");
     }
-    assert!(world.hear("[1]", at(0.0), &mut vec![]).is_err());
-    assert!(world.hear("nonsense", at(0.0), &mut vec![]).is_err());
+    assert!(world.handle_line("[1]", at(0.0), &mut vec![]).is_err());
+    assert!(world.handle_line("nonsense", at(0.0), &mut vec![]).is_err());
     assert_eq!(
         hears(&mut world, r#"{"type":"stop"}"#, 0.0),
         Some(Command::Stop)
@@ -139,11 +142,11 @@ fn what_is_not_known_is_passed_over_and_what_is_no_json_is_an_error() {
 }
 
 #[test]
-fn what_is_believed_is_heard_and_what_others_change_is_reported() {
-    let mut world = World::new("plansys2", 1.0).following();
+fn beliefs_are_received_and_external_changes_reported() {
+    let mut world = World::new("plansys2", 1.0).with_beliefs();
     let mut said = vec![];
     let hello = r#"{"type":"hello","protocol":"elbowroom-world","version":1,"versions":[1,2]}"#;
-    world.hear(hello, at(0.0), &mut said).expect("JSON");
+    world.handle_line(hello, at(0.0), &mut said).expect("JSON");
     assert!(said[0].contains(r#""can":["cancel","feedback","facts","beliefs"]"#));
     let told = r#"{"type":"believed","now":{"exact":"0","decimal":0.0},"facts":{"(at r a)":false},"values":{"(charge r)":{"exact":"7/2","decimal":3.5},"(driven r)":null}}"#;
     let facts = vec![("(at r a)".to_owned(), false)];
@@ -157,8 +160,14 @@ fn what_is_believed_is_heard_and_what_others_change_is_reported() {
     );
     hears(&mut world, WAIT, 1.0);
     assert!(world.answer(at(1.5)).is_empty());
-    world.see(&Seen::Fact("(blocked b)".to_owned(), true), at(1.5));
-    world.see(&Seen::Value("(charge r)".to_owned(), 2.0), at(1.5));
+    world.report_change(
+        &ExternalChange::Fact("(blocked b)".to_owned(), true),
+        at(1.5),
+    );
+    world.report_change(
+        &ExternalChange::Value("(charge r)".to_owned(), 2.0),
+        at(1.5),
+    );
     assert_eq!(
         world.answer(at(1.5)),
         [

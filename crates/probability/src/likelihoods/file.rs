@@ -2,7 +2,7 @@
 //! format.
 
 mod complete;
-mod failing;
+mod failure_entries;
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use elbowroom_text::{Diagnostics, Report, Source, nearest};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{Failing, Likelihoods, PartialFlip, Success, names};
+use super::{FailureModel, Likelihoods, PartialChange, Success, names};
 
 /// Value of `format` in these files.
 pub(super) const FORMAT: &str = "elbowroom-likelihoods";
@@ -31,7 +31,7 @@ pub(super) fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods
         problem: task.problem(),
         likelihoods: Likelihoods::default(),
         mistakes: Report::new(&source),
-        leftovers: Vec::new(),
+        failure_sections: Vec::new(),
     };
     for error in &errors {
         let span = error.span().unwrap_or(0..0);
@@ -48,18 +48,18 @@ type Key<'a> = Spanned<std::borrow::Cow<'a, str>>;
 type Value<'a> = Spanned<DeValue<'a>>;
 
 /// A mistake that has been recorded.
-struct Noted;
+struct AlreadyReported;
 
 struct Reader<'a> {
     problem: &'a Problem,
     likelihoods: Likelihoods,
     mistakes: Report,
     /// Sections with effects of failures.
-    leftovers: Vec<(Range<usize>, failing::About)>,
+    failure_sections: Vec<(Range<usize>, failure_entries::SectionSubject)>,
 }
 
 impl Reader<'_> {
-    fn object(&mut self, span: Range<usize>, (message, expected): names::Objection) {
+    fn report_objection(&mut self, span: Range<usize>, (message, expected): names::NameError) {
         self.mistakes.mistake(span, message, expected);
     }
 
@@ -72,15 +72,15 @@ impl Reader<'_> {
             match key.get_ref().as_ref() {
                 "format" | "version" => {}
                 "defaults" => self.defaults(key, value),
-                "facts" => self.each(key, value, &mut Self::fact),
-                "actions" => self.each(key, value, &mut Self::action),
-                "beliefs" => self.each(key, value, &mut Self::belief),
+                "facts" => self.for_each_entry(key, value, &mut Self::fact),
+                "actions" => self.for_each_entry(key, value, &mut Self::action),
+                "beliefs" => self.for_each_entry(key, value, &mut Self::belief),
                 _ => self.unknown(key, &SECTIONS),
             }
         }
         if !self.mistakes.is_failed() {
             self.check_complete(document);
-            self.check_leftovers();
+            self.check_failure_effects();
         }
     }
 
@@ -126,7 +126,7 @@ impl Reader<'_> {
     }
 
     /// Calls `entry` for each entry of a table.
-    fn each(
+    fn for_each_entry(
         &mut self,
         key: &Key<'_>,
         value: &Value<'_>,
@@ -151,8 +151,8 @@ impl Reader<'_> {
     }
 
     fn defaults(&mut self, section: &Key<'_>, value: &Value<'_>) {
-        let mut failing = Failing::default();
-        self.each(section, value, &mut |reader, key, value| {
+        let mut failing = FailureModel::default();
+        self.for_each_entry(section, value, &mut |reader, key, value| {
             let name = key.get_ref().as_ref();
             let known = [
                 "becomes_true",
@@ -169,7 +169,7 @@ impl Reader<'_> {
             if !known.contains(&name) {
                 return reader.unknown(key, &known);
             }
-            if failing::KEYS.contains(&name) {
+            if failure_entries::KEYS.contains(&name) {
                 return reader.failing(None, key, value, &mut failing);
             }
             if name.ends_with("_per_second") {
@@ -190,7 +190,7 @@ impl Reader<'_> {
                 _ => defaults.effect = probability,
             }
         });
-        self.note_leftovers(section, &failing, failing::About::Defaults);
+        self.note_failure_effects(section, &failing, failure_entries::SectionSubject::Defaults);
         self.likelihoods.defaults.failing = failing;
     }
 
@@ -198,8 +198,8 @@ impl Reader<'_> {
         let Some((predicate, arguments)) = self.fact_named(key) else {
             return;
         };
-        let mut flip = PartialFlip::default();
-        self.each(
+        let mut flip = PartialChange::default();
+        self.for_each_entry(
             key,
             value,
             &mut |reader, key, value| match key.get_ref().as_ref() {
@@ -237,32 +237,32 @@ impl Reader<'_> {
         let name = words.next().unwrap_or_default();
         let schema = match names::schema(self.problem, name) {
             Ok(schema) => schema,
-            Err(objection) => return self.object(key.span(), objection),
+            Err(objection) => return self.report_objection(key.span(), objection),
         };
         let parameters = &self.problem.schemas[schema.index()].parameters;
         let Ok(arguments) = self.arguments(key, name, parameters, words) else {
             return;
         };
         let mut success = Success::default();
-        self.each(
+        self.for_each_entry(
             key,
             value,
             &mut |reader, key, value| match key.get_ref().as_ref() {
                 "start" => success.start = reader.probability(value),
-                "effects" => reader.each(key, value, &mut |reader, key, value| {
+                "effects" => reader.for_each_entry(key, value, &mut |reader, key, value| {
                     reader.effect(schema, key, value, &mut success);
                 }),
-                name if failing::KEYS.contains(&name) => {
+                name if failure_entries::KEYS.contains(&name) => {
                     reader.failing(Some(schema), key, value, &mut success.failing);
                 }
                 _ => {
-                    let known = [&["start", "effects"][..], &failing::KEYS].concat();
+                    let known = [&["start", "effects"][..], &failure_entries::KEYS].concat();
                     reader.unknown(key, &known);
                 }
             },
         );
-        let about = failing::About::Action(schema, arguments.clone());
-        self.note_leftovers(key, &success.failing, about);
+        let about = failure_entries::SectionSubject::Action(schema, arguments.clone());
+        self.note_failure_effects(key, &success.failing, about);
         let is_new = match arguments {
             Some(arguments) => {
                 let key = (schema, arguments);
@@ -292,12 +292,12 @@ impl Reader<'_> {
         };
         let predicate = match names::predicate(self.problem, name) {
             Ok(predicate) => predicate,
-            Err(objection) => return self.object(key.span(), objection),
+            Err(objection) => return self.report_objection(key.span(), objection),
         };
         let (adds, deletes) = names::effects_on(self.problem, schema, predicate);
         if !deletes && (is_deletion || !adds) {
             let objection = names::no_such_effect(self.problem, schema, key.get_ref());
-            return self.object(key.span(), objection);
+            return self.report_objection(key.span(), objection);
         }
         if let Some(probability) = self.probability(value) {
             let stated = if is_deletion {
@@ -339,7 +339,7 @@ impl Reader<'_> {
                 Some((predicate, arguments))
             }
             Err(objection) => {
-                self.object(key.span(), objection);
+                self.report_objection(key.span(), objection);
                 None
             }
         }
@@ -352,7 +352,7 @@ impl Reader<'_> {
         of: &str,
         parameters: &[elbowroom_model::problem::Variable],
         words: impl Iterator<Item = &'k str>,
-    ) -> Result<Option<Vec<ObjectId>>, Noted> {
+    ) -> Result<Option<Vec<ObjectId>>, AlreadyReported> {
         let mut words = words.peekable();
         if words.peek().is_none() && !parameters.is_empty() {
             return Ok(None);
@@ -360,8 +360,8 @@ impl Reader<'_> {
         match names::arguments(self.problem, of, parameters, words) {
             Ok(objects) => Ok(Some(objects)),
             Err(objection) => {
-                self.object(key.span(), objection);
-                Err(Noted)
+                self.report_objection(key.span(), objection);
+                Err(AlreadyReported)
             }
         }
     }
@@ -383,7 +383,7 @@ impl Reader<'_> {
                 Some("a probability, from 0 to 1".to_owned()),
             )),
         };
-        read.map_err(|objection| self.object(value.span(), objection))
+        read.map_err(|objection| self.report_objection(value.span(), objection))
             .ok()
     }
 

@@ -4,14 +4,14 @@ use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId, Variabl
 use elbowroom_text::nearest;
 
 /// Error message for a name, and advice.
-pub(super) type Objection = (String, Option<String>);
+pub(super) type NameError = (String, Option<String>);
 
 fn did_you_mean<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<String> {
     nearest(name, candidates).map(|name| format!("did you mean `{name}`?"))
 }
 
 /// Returns the basic predicate with that name.
-pub(super) fn predicate(problem: &Problem, name: &str) -> Result<PredicateId, Objection> {
+pub(super) fn predicate(problem: &Problem, name: &str) -> Result<PredicateId, NameError> {
     let Some(id) = problem.predicate(name) else {
         let known = problem.predicates.iter().filter(|p| !p.is_derived);
         let suggestion = did_you_mean(name, known.map(|p| p.name.as_str()));
@@ -27,7 +27,7 @@ pub(super) fn predicate(problem: &Problem, name: &str) -> Result<PredicateId, Ob
 }
 
 /// Returns the action with that name.
-pub(super) fn schema(problem: &Problem, name: &str) -> Result<SchemaId, Objection> {
+pub(super) fn schema(problem: &Problem, name: &str) -> Result<SchemaId, NameError> {
     problem.schema(name).ok_or_else(|| {
         let known = problem.schemas.iter().map(|s| s.name.as_str());
         (
@@ -43,7 +43,7 @@ pub(super) fn arguments<'a>(
     of: &str,
     parameters: &[Variable],
     names: impl Iterator<Item = &'a str>,
-) -> Result<Vec<ObjectId>, Objection> {
+) -> Result<Vec<ObjectId>, NameError> {
     let mut objects = Vec::new();
     for name in names {
         let object = problem.object(name).ok_or_else(|| {
@@ -128,7 +128,7 @@ pub(super) fn affected(problem: &Problem, schema: SchemaId) -> Vec<(PredicateId,
 }
 
 /// Returns the error for an effect that an action does not have.
-pub(super) fn no_such_effect(problem: &Problem, schema: SchemaId, effect: &str) -> Objection {
+pub(super) fn no_such_effect(problem: &Problem, schema: SchemaId, effect: &str) -> NameError {
     let mut names = Vec::new();
     for (predicate, _) in affected(problem, schema) {
         let name = problem.predicates[predicate.index()].name.as_str();
@@ -177,7 +177,7 @@ pub(super) fn for_each_tuple(
 }
 
 /// Parses a probability.
-pub(super) fn probability(text: &str) -> Result<f64, Objection> {
+pub(super) fn probability(text: &str) -> Result<f64, NameError> {
     let number: Option<f64> = text.parse().ok();
     match number {
         Some(number) if (0.0..=1.0).contains(&number) => Ok(number),

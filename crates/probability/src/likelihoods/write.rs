@@ -5,7 +5,7 @@ use std::fmt::Write;
 use elbowroom_model::problem::{ObjectId, Problem, SchemaId};
 
 use super::file::{FORMAT, VERSION};
-use super::{Failing, Likelihoods, Outcome, PartialFlip, Success};
+use super::{FailureModel, Likelihoods, Outcome, PartialChange, Success};
 
 /// Returns the likelihoods in Elbowroom's format. [`read`](super::read) returns the same
 /// likelihoods.
@@ -24,7 +24,7 @@ pub fn write(problem: &Problem, likelihoods: &Likelihoods) -> String {
         ("effect", defaults.effect),
     ];
     let failing = &defaults.failing;
-    if entries.iter().any(|(_, value)| value.is_some()) || *failing != Failing::default() {
+    if entries.iter().any(|(_, value)| value.is_some()) || *failing != FailureModel::default() {
         text.push_str("\n[defaults]\n");
         numbers(&mut text, &entries);
         failures(&mut text, problem, None, failing);
@@ -68,7 +68,7 @@ fn key(problem: &Problem, name: &str, arguments: &[ObjectId]) -> String {
     key
 }
 
-fn fact(text: &mut String, key: &str, flip: &PartialFlip) {
+fn fact(text: &mut String, key: &str, flip: &PartialChange) {
     header(text, "facts", key);
     numbers(
         text,
@@ -93,7 +93,12 @@ fn action(text: &mut String, problem: &Problem, schema: SchemaId, success: &Succ
     }
 }
 
-fn failures(text: &mut String, problem: &Problem, schema: Option<SchemaId>, failing: &Failing) {
+fn failures(
+    text: &mut String,
+    problem: &Problem,
+    schema: Option<SchemaId>,
+    failing: &FailureModel,
+) {
     let entries = [
         ("end", failing.end),
         ("during_per_second", failing.during_per_second),

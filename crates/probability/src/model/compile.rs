@@ -13,8 +13,8 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Node, PartialOrderPlan};
 
 use super::requirement::{Requirement, is_derived, visit_facts};
-use super::{Event, FactEffect, Leftover, Model, Semantics, Update};
-use crate::likelihoods::{Flip, Likelihoods, Missing, Rate};
+use super::{CompiledOutcome, Event, FactEffect, Model, Semantics, Update};
+use crate::likelihoods::{Likelihoods, Missing, Rate, SpontaneousChange};
 
 pub(super) fn model(
     task: Arc<Task>,
@@ -44,7 +44,9 @@ pub(super) fn model(
     }
     // A derived fact without rules is false, and has no likelihood.
     facts.retain(|fact| !is_derived(&task, *fact));
-    let flips = facts.iter().map(|&fact| likelihoods.flip(&task, fact));
+    let flips = facts
+        .iter()
+        .map(|&fact| likelihoods.spontaneous_change(&task, fact));
     let flips = flips.collect::<Result<_, _>>()?;
     let rates = facts.iter().map(|&fact| likelihoods.rate(&task, fact));
     let rates = rates.collect();
@@ -52,7 +54,7 @@ pub(super) fn model(
         task: &task,
         likelihoods,
         facts: facts.into_iter().collect(),
-        flips,
+        spontaneous_changes: flips,
         rates,
         fluents: fluents.into_iter().collect(),
     };
@@ -92,7 +94,7 @@ pub(super) fn model(
     let goal = compiler.requirement(task.goal());
     let Compiler {
         facts,
-        flips,
+        spontaneous_changes: flips,
         rates,
         fluents,
         ..
@@ -103,7 +105,7 @@ pub(super) fn model(
         plan,
         semantics,
         facts,
-        flips,
+        spontaneous_changes: flips,
         has_rates: rates.iter().any(|rate| *rate != Rate::NEVER)
             || events.iter().any(|event| event.failures_per_second > 0.0),
         rates,
@@ -160,7 +162,7 @@ struct Compiler<'a> {
     task: &'a Task,
     likelihoods: &'a Likelihoods,
     facts: Vec<FactId>,
-    flips: Vec<Flip>,
+    spontaneous_changes: Vec<SpontaneousChange>,
     rates: Vec<Rate>,
     fluents: Vec<FluentId>,
 }
@@ -176,11 +178,11 @@ impl Compiler<'_> {
     }
 
     /// Adds a fact of the model that remembers whether a guard held.
-    fn memory(&mut self) -> FactId {
+    fn add_memory(&mut self) -> FactId {
         let last = self.facts.last().map_or(0, |fact| fact.0 + 1);
         let memory = FactId(last.max(FactId::FIRST_FREE.0));
         self.facts.push(memory);
-        self.flips.push(Flip::NEVER);
+        self.spontaneous_changes.push(SpontaneousChange::NEVER);
         self.rates.push(Rate::NEVER);
         memory
     }
@@ -213,10 +215,10 @@ impl Compiler<'_> {
         }
         start.effects.sort_by_key(|effect| effect.fact);
         let mut end = self.snap(action, &ending)?;
-        start.failures_per_second = self.likelihoods.during(action);
+        start.failures_per_second = self.likelihoods.failure_rate(action);
         end.success = self.likelihoods.end(action);
         if end.success < 1.0 || start.failures_per_second > 0.0 {
-            end.aftermaths = self.aftermaths(action);
+            end.failure_outcomes = self.failure_outcomes(action);
         }
         for effect in &body.continuous {
             let Some(fluent) = self.fluents.binary_search(&effect.fluent).ok() else {
@@ -239,7 +241,7 @@ impl Compiler<'_> {
     /// links.
     fn bounds(&self, body: &DurativeBody, planned: Option<&Rational>) -> Vec<(bool, Condition)> {
         // A running action has already started.
-        let Some(planned) = planned.filter(|_| !body.is_under_way) else {
+        let Some(planned) = planned.filter(|_| !body.is_running) else {
             return Vec::new();
         };
         let changes = |bound: &Expression| {
@@ -260,9 +262,12 @@ impl Compiler<'_> {
 
     /// Returns the outcomes of a failed end, without facts that nothing in the model reads or
     /// writes.
-    fn aftermaths(&self, action: &Action) -> Vec<Leftover> {
-        let aftermaths = self.likelihoods.aftermaths(self.task, action).into_iter();
-        let leftover = |aftermath: crate::likelihoods::Aftermath| {
+    fn failure_outcomes(&self, action: &Action) -> Vec<CompiledOutcome> {
+        let aftermaths = self
+            .likelihoods
+            .failure_outcomes(self.task, action)
+            .into_iter();
+        let leftover = |aftermath: crate::likelihoods::FailureOutcome| {
             // The last of several changes of a fact counts.
             let mut changes = BTreeMap::new();
             for (fact, becomes) in aftermath.changes {
@@ -270,7 +275,7 @@ impl Compiler<'_> {
                     changes.insert(position, becomes);
                 }
             }
-            Leftover {
+            CompiledOutcome {
                 probability: aftermath.probability,
                 changes: changes.into_iter().collect(),
             }
@@ -284,7 +289,7 @@ impl Compiler<'_> {
         if guard.at_start.is_trivial() && guard.over_all.is_trivial() {
             return;
         }
-        let memory = self.memory();
+        let memory = self.add_memory();
         let fact = self.position(memory);
         let at_start = std::mem::replace(&mut guard.at_start, Condition::TRUE);
         let over_all = std::mem::replace(&mut guard.over_all, Condition::TRUE);
@@ -296,7 +301,7 @@ impl Compiler<'_> {
             is_certain: true,
         });
         if !over_all.is_trivial() {
-            start.watches.push((fact, over_all));
+            start.guard_memories.push((fact, over_all));
         }
         let now = std::mem::replace(&mut guard.now, Condition::TRUE);
         guard.now = Condition::And(vec![Condition::Fact(memory), now]);

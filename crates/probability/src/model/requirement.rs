@@ -33,7 +33,7 @@ impl Requirement {
         position: &dyn Fn(FactId) -> usize,
     ) -> Self {
         let mut requirement = Self::default();
-        for part in negations_inwards(condition, true).conjuncts() {
+        for part in negation_normal_form(condition, true).conjuncts() {
             match part {
                 Condition::Fact(fact) if !is_derived(task, *fact) => {
                     requirement.literals.push((position(*fact), true));
@@ -84,15 +84,15 @@ pub(crate) fn visit_facts(task: &Task, condition: &Condition, visit: &mut impl F
 }
 
 /// Returns the condition with `Not` only around facts and comparisons.
-pub(crate) fn negations_inwards(condition: &Condition, is_positive: bool) -> Condition {
+pub(crate) fn negation_normal_form(condition: &Condition, is_positive: bool) -> Condition {
     let all = |parts: &[Condition]| {
         let parts = parts.iter();
         parts
-            .map(|part| negations_inwards(part, is_positive))
+            .map(|part| negation_normal_form(part, is_positive))
             .collect()
     };
     match condition {
-        Condition::Not(part) => negations_inwards(part, !is_positive),
+        Condition::Not(part) => negation_normal_form(part, !is_positive),
         Condition::And(parts) if is_positive => Condition::And(all(parts)),
         Condition::Or(parts) if !is_positive => Condition::And(all(parts)),
         Condition::And(parts) | Condition::Or(parts) => match all(parts) {
@@ -110,7 +110,7 @@ pub(crate) enum Value {
     /// No value: the fluent was never assigned, or a divisor is zero.
     Undefined,
     /// It depends on times, not only on the order of happenings.
-    Open,
+    TimeDependent,
     /// A known value.
     Known(Rational),
 }
@@ -129,14 +129,14 @@ impl Value {
         let value = expression.evaluate(&mut |part| match leaf(part) {
             Self::Known(value) => Some(value),
             other => {
-                is_open |= other == Self::Open;
+                is_open |= other == Self::TimeDependent;
                 None
             }
         });
         match value {
             Some(value) => Self::Known(value),
             // The evaluation stops at the first leaf that is not known.
-            None if is_open && !reads_undefined(expression, leaf) => Self::Open,
+            None if is_open && !reads_undefined(expression, leaf) => Self::TimeDependent,
             None => Self::Undefined,
         }
     }
@@ -162,11 +162,11 @@ pub(crate) fn evaluate(
     truth: &dyn Fn(FactId) -> bool,
     value: &dyn Fn(&Expression) -> Value,
 ) -> Result<bool, TimeDependent> {
-    let basic = Basic { truth, value };
+    let basic = BasicContext { truth, value };
     let read = |condition: &Condition| match task.derivation() {
         Some(derivation) if derivation.is_read_by(condition) => {
             let derived = derivation.derive(&basic);
-            holds(condition, &derivation.on_top_of(&basic, &derived))
+            holds(condition, &derivation.with_derived_facts(&basic, &derived))
         }
         _ => holds(condition, &basic),
     };
@@ -223,12 +223,12 @@ enum Fault {
     TimeDependent,
 }
 
-struct Basic<'a> {
+struct BasicContext<'a> {
     truth: &'a dyn Fn(FactId) -> bool,
     value: &'a dyn Fn(&Expression) -> Value,
 }
 
-impl Moment<Fault> for Basic<'_> {
+impl Moment<Fault> for BasicContext<'_> {
     fn fact(&self, fact: FactId) -> Result<bool, Fault> {
         Ok((self.truth)(fact))
     }

@@ -29,13 +29,13 @@ impl Clock {
 }
 
 /// Times closer than this, in seconds, count as equal in comparisons of orders.
-const SAME: f64 = 1e-9;
+const TIME_TOLERANCE: f64 = 1e-9;
 
 impl PrunedNetwork<'_> {
     /// Advances the time to a happening. Running actions may fail, and their over-all conditions
     /// must hold without interruption: a fact must not change and change back. Other facts change
     /// by themselves.
-    pub(super) fn pass(&mut self, node: NodeId) -> Result<(), TooCoupled> {
+    pub(super) fn advance_to(&mut self, node: NodeId) -> Result<(), TooCoupled> {
         let model = self.model;
         if !model.has_rates() {
             return Ok(());
@@ -67,7 +67,7 @@ impl PrunedNetwork<'_> {
                     continue;
                 }
                 held.push((fact, truth));
-                let lasts = model.rates[fact].lasting(truth, seconds);
+                let lasts = model.rates[fact].unchanged_probability(truth, seconds);
                 let fact = model.facts[fact];
                 self.multiply(lasts, (node, Reading::Throughout(id)), || LossCause::Fact {
                     fact,
@@ -75,14 +75,14 @@ impl PrunedNetwork<'_> {
                 });
             }
         }
-        self.facts.pass(seconds, &held);
+        self.facts.advance(seconds, &held);
         self.require_throughout(node)
     }
 
     /// Returns the data that determines the times of later happenings, for comparison with another
     /// order that has the same happenings: the remaining durations of running actions, and, if
     /// `is_on_the_clock`, the present time.
-    pub(crate) fn times_to_come(&self, is_on_the_clock: bool) -> Vec<i64> {
+    pub(crate) fn pending_times(&self, is_on_the_clock: bool) -> Vec<i64> {
         if !self.model.has_rates() {
             return Vec::new();
         }
@@ -90,7 +90,7 @@ impl PrunedNetwork<'_> {
             clippy::cast_possible_truncation,
             reason = "casts saturate, and nobody waits for centuries"
         )]
-        let rounded = |seconds: f64| (seconds / SAME).round() as i64;
+        let rounded = |seconds: f64| (seconds / TIME_TOLERANCE).round() as i64;
         let mut ends: Vec<_> = self.running.iter().zip(&self.clock.ends).collect();
         ends.sort_by_key(|(id, _)| **id);
         let rests = ends.iter().map(|(_, end)| (*end - self.clock.now).max(0.0));

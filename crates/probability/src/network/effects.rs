@@ -31,7 +31,7 @@ impl PrunedNetwork<'_> {
                 Some(true) => Numbers::updated(&present, update.operator, amount),
                 None => Numbers::maybe_updated(&present),
             };
-            put(&mut after, update.fluent, next);
+            set_value(&mut after, update.fluent, next);
         }
         let end_of = match model.plan().nodes[node.index()] {
             Node::End(id) => Some(id),
@@ -40,25 +40,25 @@ impl PrunedNetwork<'_> {
         for (fluent, rate) in &event.continuous {
             let present = present(&after, &self.numbers, *fluent);
             let next = match end_of {
-                None => Numbers::begun(&present),
+                None => Numbers::after_effect_start(&present),
                 Some(id) => {
-                    let lasted = self.lasts(id).or(event.duration.clone());
+                    let lasted = self.remaining_duration(id).or(event.duration.clone());
                     let leaf = |leaf: &Expression| self.numbers.value(model, leaf, duration);
                     let amount = match (Value::of(rate, &leaf), lasted) {
                         (Value::Known(rate), Some(lasted)) => Value::Known(rate * lasted),
-                        _ => Value::Open,
+                        _ => Value::TimeDependent,
                     };
-                    Numbers::stopped(&present, amount)
+                    Numbers::after_effect_end(&present, amount)
                 }
             };
-            put(&mut after, *fluent, next);
+            set_value(&mut after, *fluent, next);
         }
         after
     }
 
     /// Returns the remaining duration of an action that was running initially, counted from the
     /// initial time.
-    fn lasts(&self, id: InstanceId) -> Option<Rational> {
+    fn remaining_duration(&self, id: InstanceId) -> Option<Rational> {
         let is_first_end = |node: &NodeId| self.model.plan().nodes[node.index()] == Node::End(id);
         if self.sequence.iter().any(is_first_end) {
             return None;
@@ -73,7 +73,11 @@ impl PrunedNetwork<'_> {
     }
 
     /// Applies the effects of a happening on facts, and spontaneous changes.
-    pub(super) fn facts_change(&mut self, node: NodeId, event: &Event) -> Result<(), TooCoupled> {
+    pub(super) fn apply_fact_effects(
+        &mut self,
+        node: NodeId,
+        event: &Event,
+    ) -> Result<(), TooCoupled> {
         let model = self.model;
         let mut uncertain = Vec::new();
         let mut certain = Vec::new();
@@ -100,26 +104,26 @@ impl PrunedNetwork<'_> {
             .partition(|outcome| is_open(outcome.fact));
         uncertain.extend(joint.into_iter().map(|outcome| (None, outcome)));
         let pending = Pending {
-            apart,
+            independent: apart,
             is_step: event.is_step,
         };
-        self.facts_transform_with(node, &uncertain, &pending)
+        self.transform_facts_with(node, &uncertain, &pending)
     }
 
-    pub(super) fn facts_transform(
+    pub(super) fn transform_facts(
         &mut self,
         node: NodeId,
         guarded: &[(Option<Condition>, Outcome)],
         is_step: bool,
     ) -> Result<(), TooCoupled> {
         let pending = Pending {
-            apart: Vec::new(),
+            independent: Vec::new(),
             is_step,
         };
-        self.facts_transform_with(node, guarded, &pending)
+        self.transform_facts_with(node, guarded, &pending)
     }
 
-    fn facts_transform_with(
+    fn transform_facts_with(
         &mut self,
         node: NodeId,
         guarded: &[(Option<Condition>, Outcome)],
@@ -140,7 +144,7 @@ fn present(after: &[(usize, Number)], numbers: &Numbers, fluent: usize) -> Numbe
     )
 }
 
-fn put(after: &mut Vec<(usize, Number)>, fluent: usize, number: Number) {
+fn set_value(after: &mut Vec<(usize, Number)>, fluent: usize, number: Number) {
     match after.iter_mut().find(|(other, _)| *other == fluent) {
         Some((_, old)) => *old = number,
         None => after.push((fluent, number)),

@@ -11,7 +11,7 @@ mod snapshot;
 use elbowroom_model::ground::{Condition, Expression, FactId};
 
 use super::cluster::{Cluster, Kernel};
-use super::outcome::{Outcome, Pending, by_itself, kernel, later};
+use super::outcome::{Outcome, Pending, kernel, rate_kernel, spontaneous_kernel};
 use crate::belief::Belief;
 use crate::likelihoods::Rate;
 use crate::model::{Model, Value, evaluate, visit_facts};
@@ -19,7 +19,7 @@ use crate::model::{Model, Value, evaluate, visit_facts};
 pub(crate) use snapshot::Snapshot;
 
 /// Largest number of facts in a cluster (2^16 numbers).
-pub(super) const MOST_COUPLED: usize = 16;
+pub(super) const MAX_COUPLED: usize = 16;
 
 /// Belief about a fact.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,7 +107,7 @@ impl Facts {
     /// Returns P(true) in the present layer.
     pub(super) fn marginal(&mut self, model: &Model, fact: usize) -> f64 {
         match self.records[fact].cluster {
-            None => self.single(model, fact),
+            None => self.independent_probability(model, fact),
             Some(slot) => {
                 let cluster = self.cluster(model, slot);
                 cluster.marginal(cluster.place(fact))
@@ -120,7 +120,7 @@ impl Facts {
         if let Some(slot) = self.records[fact].cluster {
             return self.require_in_cluster(model, slot, fact, truth);
         }
-        let p = self.single(model, fact);
+        let p = self.independent_probability(model, fact);
         let mass = if truth { p } else { 1.0 - p };
         self.set_record(fact, f64::from(u8::from(truth)));
         mass
@@ -202,9 +202,9 @@ impl Facts {
                         None => coupled.push((slot, vec![(fact, kernel)])),
                     }
                 }
-                Some(_) => self.forget(model, fact, kernel.if_true, next),
+                Some(_) => self.decouple(model, fact, kernel.if_true, next),
                 None => {
-                    let p = kernel.apply(self.single(model, fact));
+                    let p = kernel.apply(self.independent_probability(model, fact));
                     self.set_record_at(fact, p, next);
                 }
             }
@@ -214,7 +214,8 @@ impl Facts {
             for (place, &fact) in cluster.facts.clone().iter().enumerate() {
                 match kernels.iter().find(|(changed, _)| *changed == fact) {
                     Some((_, kernel)) => cluster.transform(place, *kernel),
-                    None if is_step => cluster.transform(place, by_itself(model.flips[fact])),
+                    None if is_step => cluster
+                        .transform(place, spontaneous_kernel(model.spontaneous_changes[fact])),
                     None => {}
                 }
             }
@@ -229,7 +230,7 @@ impl Facts {
 
     /// Lets time pass: facts change by themselves, except for those in `held`, which keep their
     /// values.
-    pub(super) fn pass(&mut self, seconds: f64, held: &[(usize, bool)]) {
+    pub(super) fn advance(&mut self, seconds: f64, held: &[(usize, bool)]) {
         self.transitions.push(Some(seconds));
         self.layer += 1;
         for &(fact, truth) in held {
@@ -262,7 +263,7 @@ impl Facts {
         let coupled = cluster.facts.clone();
         let mut places: Vec<usize> = Vec::new();
         let all = guarded.iter().map(|(_, outcome)| outcome);
-        for outcome in all.chain(&pending.apart) {
+        for outcome in all.chain(&pending.independent) {
             if let Some(place) = coupled.iter().position(|&fact| fact == outcome.fact)
                 && !places.contains(&place)
             {
@@ -279,7 +280,7 @@ impl Facts {
                 .iter()
                 .filter(|(guard, _)| takes_place(guard))
                 .map(|(_, outcome)| *outcome)
-                .chain(pending.apart.iter().copied())
+                .chain(pending.independent.iter().copied())
                 .collect();
             let of = |&place: &usize| {
                 let fact = coupled[place];
@@ -291,14 +292,14 @@ impl Facts {
         if pending.is_step {
             for (place, &fact) in coupled.iter().enumerate() {
                 if !places.contains(&place) {
-                    cluster.transform(place, by_itself(model.flips[fact]));
+                    cluster.transform(place, spontaneous_kernel(model.spontaneous_changes[fact]));
                 }
             }
             cluster.layer += 1;
         }
         self.set_cluster(slot, Some(cluster));
         let apart: Vec<Outcome> = pending
-            .apart
+            .independent
             .iter()
             .filter(|outcome| !coupled.contains(&outcome.fact))
             .copied()
@@ -309,18 +310,18 @@ impl Facts {
     }
 
     /// Returns P(true) of an independent fact, updated to the present layer.
-    fn single(&mut self, model: &Model, fact: usize) -> f64 {
+    fn independent_probability(&mut self, model: &Model, fact: usize) -> f64 {
         let record = self.records[fact];
         if record.layer >= self.layer {
             return record.p;
         }
-        let (flip, rate) = (model.flips[fact], model.rates[fact]);
+        let (flip, rate) = (model.spontaneous_changes[fact], model.rates[fact]);
         let mut p = record.p;
         for transition in &self.transitions[record.layer as usize..self.layer as usize] {
             p = match transition {
                 None => flip.after(p),
                 Some(_) if rate == Rate::NEVER => p,
-                Some(seconds) => later(rate, *seconds).apply(p),
+                Some(seconds) => rate_kernel(rate, *seconds).apply(p),
             };
         }
         self.set_record(fact, p);

@@ -56,12 +56,12 @@ pub(super) struct Ledger(Option<Vec<Loss>>);
 
 impl Ledger {
     /// Creates a ledger that records losses.
-    pub(super) fn kept() -> Self {
+    pub(super) fn recording() -> Self {
         Self(Some(Vec::new()))
     }
 
     /// Records the loss, if the probability has decreased.
-    pub(super) fn note(
+    pub(super) fn record(
         &mut self,
         position: Option<usize>,
         reading: Reading,

@@ -22,7 +22,7 @@ impl Number {
     /// Returns the present value.
     pub(crate) fn value(&self) -> Value {
         match &self.settled {
-            Value::Known(_) if self.changing > 0 => Value::Open,
+            Value::Known(_) if self.changing > 0 => Value::TimeDependent,
             settled => settled.clone(),
         }
     }
@@ -59,8 +59,8 @@ impl Numbers {
                 Some(position) => self.changing[position].value(),
                 None => Value::from(self.constant.get(fluent)),
             },
-            Expression::Duration => duration.cloned().map_or(Value::Open, Value::Known),
-            _ => Value::Open,
+            Expression::Duration => duration.cloned().map_or(Value::TimeDependent, Value::Known),
+            _ => Value::TimeDependent,
         }
     }
 
@@ -73,7 +73,7 @@ impl Numbers {
             // The value is assigned during a continuous change, and the amount of that change is
             // unknown.
             (UpdateOperator::Assign, _, amount) if is_still => amount,
-            (UpdateOperator::Assign, _, _) => Value::Open,
+            (UpdateOperator::Assign, _, _) => Value::TimeDependent,
             (_, Value::Undefined, _) => Value::Undefined,
             (operator, Value::Known(value), Value::Known(amount)) => match operator {
                 UpdateOperator::Increase => Value::Known(value + amount),
@@ -83,9 +83,9 @@ impl Numbers {
                     Some(value) => Value::Known(value),
                     None => number.settled.clone(),
                 },
-                _ => Value::Open,
+                _ => Value::TimeDependent,
             },
-            _ => Value::Open,
+            _ => Value::TimeDependent,
         };
         Number {
             settled,
@@ -96,13 +96,13 @@ impl Numbers {
     /// Returns the value after an update that may or may not take place.
     pub(super) fn maybe_updated(number: &Number) -> Number {
         Number {
-            settled: Value::Open,
+            settled: Value::TimeDependent,
             changing: number.changing,
         }
     }
 
     /// Returns the value after the start of a continuous effect.
-    pub(super) fn begun(number: &Number) -> Number {
+    pub(super) fn after_effect_start(number: &Number) -> Number {
         Number {
             settled: number.settled.clone(),
             changing: number.changing + 1,
@@ -111,12 +111,12 @@ impl Numbers {
 
     /// Returns the value after the end of a continuous effect that has changed the fluent by
     /// `amount`.
-    pub(super) fn stopped(number: &Number, amount: Value) -> Number {
+    pub(super) fn after_effect_end(number: &Number, amount: Value) -> Number {
         Number {
             settled: match (&number.settled, amount) {
                 (Value::Undefined, _) => Value::Undefined,
                 (Value::Known(value), Value::Known(amount)) => Value::Known(value + amount),
-                _ => Value::Open,
+                _ => Value::TimeDependent,
             },
             changing: number.changing.saturating_sub(1),
         }

@@ -1,7 +1,7 @@
 //! Influence of effects, and of spontaneous changes, on the probability of a fact.
 
 use super::cluster::Kernel;
-use crate::likelihoods::{Flip, Rate};
+use crate::likelihoods::{Rate, SpontaneousChange};
 use crate::model::{FactEffect, Model, Semantics};
 
 /// An effect with its success probability.
@@ -27,13 +27,13 @@ impl From<&FactEffect> for Outcome {
 /// Parts of a step other than guarded effects.
 pub(super) struct Pending {
     /// Unconditional effects on other facts.
-    pub(super) apart: Vec<Outcome>,
+    pub(super) independent: Vec<Outcome>,
     /// `true` if facts change by themselves afterwards.
     pub(super) is_step: bool,
 }
 
 /// Returns the transition of a fact by spontaneous changes in a step.
-pub(super) fn by_itself(flip: Flip) -> Kernel {
+pub(super) fn spontaneous_kernel(flip: SpontaneousChange) -> Kernel {
     Kernel {
         if_true: 1.0 - flip.becomes_false,
         if_false: flip.becomes_true,
@@ -41,8 +41,8 @@ pub(super) fn by_itself(flip: Flip) -> Kernel {
 }
 
 /// Returns the transition of a fact by spontaneous changes while time passes.
-pub(super) fn later(rate: Rate, seconds: f64) -> Kernel {
-    let (if_true, if_false) = rate.later(seconds);
+pub(super) fn rate_kernel(rate: Rate, seconds: f64) -> Kernel {
+    let (if_true, if_false) = rate.probabilities_after(seconds);
     Kernel { if_true, if_false }
 }
 
@@ -66,10 +66,10 @@ pub(super) fn kernel<'a>(
             stays *= 1.0 - outcome.probability;
         }
     }
-    let flip = model.flips[fact];
+    let flip = model.spontaneous_changes[fact];
     if !adds && !deletes {
         return if is_step {
-            by_itself(flip)
+            spontaneous_kernel(flip)
         } else {
             Kernel {
                 if_true: 1.0,
@@ -94,7 +94,7 @@ pub(super) fn kernel<'a>(
                 if_false: comes,
             };
             if is_step && !is_certain {
-                let flipped = by_itself(flip);
+                let flipped = spontaneous_kernel(flip);
                 Kernel {
                     if_true: flipped.apply(after.if_true),
                     if_false: flipped.apply(after.if_false),

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::table::{check, holds, table};
-use super::{DeadEnds, Move, NotSmall, Settings};
-use crate::circumstances::Circumstances;
+use super::{DeadEnds, Move, Settings, TabulationError};
 use crate::model::{Event, Model, Requirement};
+use crate::search_state::SearchState;
 
 /// Largest number of states to tabulate.
-const MOST_STATES: usize = 1 << 22;
+const MAX_STATES: usize = 1 << 22;
 
 /// Markov decision process; see [`optimum`](super).
 #[derive(Clone, Debug)]
@@ -24,7 +24,7 @@ pub struct Perturbed {
     /// By node: `true` for the states where its condition holds.
     is_possible: Vec<Vec<bool>>,
     /// By instance: `true` for the states where its over-all condition holds.
-    goes_on: Vec<Vec<bool>>,
+    over_all_holds: Vec<Vec<bool>>,
     pub(super) goal: Vec<bool>,
     /// By set and state: `true` if a plan exists.
     is_solvable: Vec<Vec<bool>>,
@@ -37,12 +37,12 @@ impl Perturbed {
     ///
     /// # Errors
     /// When it is too large, or of an unsupported kind.
-    pub fn new(model: impl Into<Arc<Model>>, settings: Settings) -> Result<Self, NotSmall> {
+    pub fn new(model: impl Into<Arc<Model>>, settings: Settings) -> Result<Self, TabulationError> {
         let model: Arc<Model> = model.into();
         let instances = model.plan().instances.len();
         let facts = model.facts.len();
         check(&model)?;
-        let too_many = || NotSmall::TooManyStates {
+        let too_many = || TabulationError::TooManyStates {
             facts,
             actions: instances,
         };
@@ -59,7 +59,7 @@ impl Perturbed {
             |set: &u32| set & !durative == 0 && set.count_ones() as usize <= settings.most_running;
         let mut sets: Vec<u32> = (0..1 << instances).filter(fits).collect();
         sets.sort_by_key(|set| (set.count_ones(), *set));
-        if sets.len() << facts > MOST_STATES {
+        if sets.len() << facts > MAX_STATES {
             return Err(too_many());
         }
         let mut place = vec![usize::MAX; 1 << instances];
@@ -77,7 +77,7 @@ impl Perturbed {
                 .iter()
                 .map(|event| holds(&event.condition))
                 .collect(),
-            goes_on: ids()
+            over_all_holds: ids()
                 .map(|id| holds(&model.event(model.start(id)).over_all))
                 .collect(),
             goal: holds(&model.goal),
@@ -105,8 +105,8 @@ impl Perturbed {
         &self,
         set: usize,
         state: usize,
-        like: &Circumstances,
-    ) -> Circumstances {
+        like: &SearchState,
+    ) -> SearchState {
         let mut circumstances = like.clone();
         for (place, &fact) in self.model.facts.iter().enumerate() {
             let truth = state & (1 << place) != 0;
@@ -123,7 +123,7 @@ impl Perturbed {
     }
 
     /// Returns the possible states of a belief, with their probabilities.
-    pub(super) fn weights(&self, circumstances: &Circumstances) -> Vec<(usize, usize, f64)> {
+    pub(super) fn weights(&self, circumstances: &SearchState) -> Vec<(usize, usize, f64)> {
         let running = circumstances.running.iter();
         let set = running.fold(0_u32, |set, running| set | 1 << running.instance.0);
         let Some(&set) = self
@@ -204,13 +204,13 @@ impl Perturbed {
             let own = 1 << index;
             if bits & own != 0 {
                 if self.is_possible[end.index()][state] {
-                    options.push(Move::Do(end));
+                    options.push(Move::Try(end));
                 }
                 options.push(Move::Abandon(InstanceId::from(index)));
             } else {
                 let is_room = start == end || self.place[(bits | own) as usize] != usize::MAX;
                 if is_room && self.is_possible[start.index()][state] {
-                    options.push(Move::Do(start));
+                    options.push(Move::Try(start));
                 }
             }
         }
@@ -238,15 +238,15 @@ impl Perturbed {
         match option {
             Move::Stop => 0.0,
             Move::Abandon(id) => values[self.without(set, id)][state],
-            Move::Do(node) => {
+            Move::Try(node) => {
                 let event = self.model.event(node);
                 let after = &flipped[self.set_after(set, node)];
                 let success = self.expected(event, state, after);
                 // A failed start changes nothing.
-                let failure = if event.aftermaths.is_empty() {
+                let failure = if event.failure_outcomes.is_empty() {
                     flipped[set][state]
                 } else {
-                    expected_aftermath(event, state, after)
+                    expected_failure_outcome(event, state, after)
                 };
                 event.success * success + (1.0 - event.success) * failure
             }
@@ -284,14 +284,14 @@ impl Perturbed {
     }
 
     /// Returns the expected values before spontaneous changes, computed fact by fact.
-    pub(super) fn flipped(&self, values: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    pub(super) fn after_spontaneous_changes(&self, values: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let mut flipped: Vec<Vec<f64>> = values.to_vec();
         if self.settings.enforces_over_all {
             for (set, row) in flipped.iter_mut().enumerate() {
                 for (state, value) in row.iter_mut().enumerate() {
                     let ended: u32 = self
                         .members(set)
-                        .filter(|id| !self.goes_on[id.index()][state])
+                        .filter(|id| !self.over_all_holds[id.index()][state])
                         .map(|id| 1 << id.0)
                         .sum();
                     *value = values[self.place[(self.sets[set] & !ended) as usize]][state];
@@ -299,7 +299,7 @@ impl Perturbed {
             }
         }
         for row in &mut flipped {
-            for (place, flip) in self.model.flips.iter().enumerate() {
+            for (place, flip) in self.model.spontaneous_changes.iter().enumerate() {
                 let bit = 1 << place;
                 for state in (0..row.len()).filter(|state| state & bit == 0) {
                     let (if_false, if_true) = (row[state], row[state | bit]);
@@ -329,7 +329,7 @@ impl Perturbed {
                         self.options(set, state)
                             .into_iter()
                             .any(|option| match option {
-                                Move::Do(node) => {
+                                Move::Try(node) => {
                                     let after = self.nominal(self.model.event(node), state);
                                     solvable[self.set_after(set, node)][after]
                                 }
@@ -367,8 +367,8 @@ impl Perturbed {
 }
 
 /// Returns the expected value after a failed end.
-fn expected_aftermath(event: &Event, state: usize, after: &[f64]) -> f64 {
-    let values = event.aftermaths.iter().map(|aftermath| {
+fn expected_failure_outcome(event: &Event, state: usize, after: &[f64]) -> f64 {
+    let values = event.failure_outcomes.iter().map(|aftermath| {
         let changes = aftermath.changes.iter();
         let state = changes.fold(state, |state, &(fact, becomes)| {
             if becomes {

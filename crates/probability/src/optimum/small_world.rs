@@ -9,35 +9,35 @@ use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Instance, PartialOrderPlan};
 
-use super::{NotSmall, Optimum, Perturbed, Settings};
+use super::{Optimum, Perturbed, Settings, TabulationError};
 use crate::actions::all_actions_under;
-use crate::circumstances::Circumstances;
 use crate::dispatch::Choice;
 use crate::likelihoods::Likelihoods;
 use crate::model::{Model, Semantics};
 use crate::search::{OrderSearch, SearchSettings};
+use crate::search_state::SearchState;
 use crate::total_order::Slot;
 
 /// Largest number of actions that run at once.
-const MOST_RUNNING: usize = 3;
+const MAX_RUNNING: usize = 3;
 
 /// Largest number of states to tabulate: states of facts times sets of running actions. A table of
 /// this size takes some seconds.
-const MOST_STATES: usize = 1 << 18;
+const MAX_STATES: usize = 1 << 18;
 
 /// Largest number of facts, even with few actions.
-const MOST_FACTS: usize = 16;
+const MAX_FACTS: usize = 16;
 
 /// Optimal policy of a small world.
 #[derive(Clone, Debug)]
-pub struct Table {
+pub struct PolicyTable {
     process: Perturbed,
     optimum: Optimum,
     /// Actions in the order of the model's instances, with the durations of the domain.
     steps: Vec<Step>,
 }
 
-impl Table {
+impl PolicyTable {
     /// Creates the table of a world. Returns `None` if the world is too large, or if some happening
     /// cannot be chosen when it is due. This is the case if there are numbers, timed initials or
     /// negations, if an action's end, successful or failed, deletes a fact that another action or
@@ -59,11 +59,11 @@ impl Table {
         let steps = steps.collect::<Option<Vec<Step>>>()?;
         let model = Model::new(task, plan, &likelihoods, Semantics::World).ok()?;
         let facts = model.facts().count();
-        if facts > MOST_FACTS || sets(steps.len()) << facts > MOST_STATES {
+        if facts > MAX_FACTS || sets(steps.len()) << facts > MAX_STATES {
             return None;
         }
         let settings = Settings {
-            most_running: MOST_RUNNING,
+            most_running: MAX_RUNNING,
             // An action is abandoned when its over-all condition fails.
             enforces_over_all: true,
             ..Settings::default()
@@ -90,13 +90,13 @@ impl Table {
     }
 
     /// Returns the probability that the optimal policy reaches the goal from here.
-    pub fn value(&self, circumstances: &Circumstances) -> f64 {
+    pub fn value(&self, circumstances: &SearchState) -> f64 {
         self.optimum.value(&self.process, circumstances)
     }
 
     /// Returns the best choice. A start is due as soon as no happening that interferes with it is
     /// recent.
-    pub fn choose(&self, search: &OrderSearch, circumstances: &Circumstances) -> Choice {
+    pub fn choose(&self, search: &OrderSearch, circumstances: &SearchState) -> Choice {
         self.optimum.choice(&self.process, circumstances, |node| {
             let slots = search.windows(circumstances, &[node]);
             let slot = slots.and_then(|slots| slots.into_iter().next());
@@ -123,25 +123,25 @@ pub fn best_value(
     task: &Task,
     actions: Vec<Action>,
     likelihoods: &Likelihoods,
-    circumstances: &Circumstances,
-) -> Result<f64, NotSmall> {
+    circumstances: &SearchState,
+) -> Result<f64, TabulationError> {
     let plan = PartialOrderPlan::unordered(task, actions);
     let model = Model::new(task.clone(), plan, likelihoods, Semantics::World);
-    let model = model.map_err(|missing| NotSmall::Unsupported {
+    let model = model.map_err(|missing| TabulationError::Unsupported {
         what: missing.to_string(),
     })?;
     let (facts, actions) = (model.facts().count(), model.plan().instances.len());
-    if facts > MOST_FACTS || actions > 20 || sets(actions) << facts > MOST_STATES {
-        return Err(NotSmall::TooManyStates { facts, actions });
+    if facts > MAX_FACTS || actions > 20 || sets(actions) << facts > MAX_STATES {
+        return Err(TabulationError::TooManyStates { facts, actions });
     }
     let settings = Settings {
-        most_running: MOST_RUNNING,
+        most_running: MAX_RUNNING,
         enforces_over_all: true,
         ..Settings::default()
     };
     let process = Perturbed::new(model, settings)?;
     if table_search(&process).has_couplings() {
-        return Err(NotSmall::Unsupported {
+        return Err(TabulationError::Unsupported {
             what: "actions need each other at one moment".to_owned(),
         });
     }
@@ -315,7 +315,7 @@ fn breaks(change: &Change, condition: &Condition) -> bool {
 fn sets(actions: usize) -> usize {
     let mut ways: usize = 1;
     let mut sum: usize = 1;
-    for count in 1..=MOST_RUNNING.min(actions) {
+    for count in 1..=MAX_RUNNING.min(actions) {
         ways = ways.saturating_mul(actions + 1 - count) / count;
         sum = sum.saturating_add(ways);
     }
@@ -329,7 +329,7 @@ mod tests {
     use elbowroom_num::Rational;
     use elbowroom_pddl::{Source, read_problem};
 
-    use super::{MOST_RUNNING, Table, sets};
+    use super::{MAX_RUNNING, PolicyTable, sets};
 
     /// Returns the durations of the table's actions, if there is a table.
     fn durations(actions: &str, init: &str) -> Option<Vec<Rational>> {
@@ -358,7 +358,7 @@ mod tests {
              becomes_false = 0.0\nstart = 1.0\neffect = 1.0\n{entries}"
         );
         let likelihoods = likelihoods::read(text.as_str(), &task).unwrap();
-        let table = Table::new(&task, &likelihoods)?;
+        let table = PolicyTable::new(&task, &likelihoods)?;
         let durations = table.steps().iter().map(|step| step.duration.clone());
         durations.collect()
     }
@@ -372,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn actions_take_as_long_as_they_must() {
+    fn actions_take_their_minimum_duration() {
         let look = |duration: &str| action("look", duration, "()", "(at end (done ?p))");
         let numbers = |text: &str| {
             let numbers = text.split(' ').map(str::parse::<Rational>);
@@ -389,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn worlds_in_which_the_clock_matters_have_no_table() {
+    fn time_dependent_worlds_have_no_table() {
         let look = action(
             "look",
             "(= ?duration 2)",
@@ -459,7 +459,7 @@ mod tests {
     #[test]
     fn sets_are_counted() {
         for actions in 0..10_u32 {
-            let few = |set: &u32| set.count_ones() as usize <= MOST_RUNNING;
+            let few = |set: &u32| set.count_ones() as usize <= MAX_RUNNING;
             let count = (0..1_u32 << actions).filter(few).count();
             assert_eq!(sets(actions as usize), count);
         }

@@ -2,15 +2,15 @@
 
 use elbowroom_model::ground::{Condition, Expression, FactId};
 
-use super::NotSmall;
+use super::TabulationError;
 use crate::model::{Event, Model, Requirement, Semantics, Value, evaluate};
 
 /// Checks that the model is one of a world without numbers and time.
-pub(super) fn check(model: &Model) -> Result<(), NotSmall> {
+pub(super) fn check(model: &Model) -> Result<(), TabulationError> {
     if model.semantics() != Semantics::World {
-        return Err(NotSmall::PaperSemantics);
+        return Err(TabulationError::PaperSemantics);
     }
-    let unsupported = |what: &str| NotSmall::Unsupported {
+    let unsupported = |what: &str| TabulationError::Unsupported {
         what: what.to_owned(),
     };
     if !model.fluents.is_empty() {
@@ -24,7 +24,11 @@ pub(super) fn check(model: &Model) -> Result<(), NotSmall> {
     if !model.task().timed().is_empty() {
         return Err(unsupported("facts change at fixed times"));
     }
-    if model.events.iter().any(|event| !event.watches.is_empty()) {
+    if model
+        .events
+        .iter()
+        .any(|event| !event.guard_memories.is_empty())
+    {
         return Err(unsupported(
             "effects depend on what held throughout an action",
         ));
@@ -66,7 +70,7 @@ pub(super) fn holds(model: &Model, condition: &Condition, state: usize) -> bool 
     // Numbers are constant here.
     let value = |leaf: &Expression| match leaf {
         Expression::Fluent(fluent) => model.task().initial().values.get(fluent).into(),
-        _ => Value::Open,
+        _ => Value::TimeDependent,
     };
     evaluate(model.task(), condition, &truth, &value).unwrap_or(false)
 }

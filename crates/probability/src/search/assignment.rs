@@ -1,13 +1,13 @@
 //! The assignment problem: the Hungarian method (Kuhn 1955, in the form of Jonker and Volgenant).
 
 /// With more rows than this, each row gets its best column. This is also an upper bound, and fast.
-pub(super) const MOST: usize = 24;
+pub(super) const MAX_ROWS: usize = 24;
 
 /// Returns an upper bound of the greatest product of one entry from each row, no two from one
 /// column, of a square matrix of numbers in [0, 1]. For small matrices, it is exact up to rounding.
 /// Rows of large ones may omit entries that are not their greatest.
 pub(super) fn best_product(rows: &[Vec<f64>]) -> f64 {
-    if rows.len() > MOST {
+    if rows.len() > MAX_ROWS {
         let best = |row: &Vec<f64>| row.iter().copied().fold(0.0, f64::max);
         return rows.iter().map(best).product();
     }
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn no_assignment_is_better() {
+    fn best_product_equals_brute_force() {
         let mut seed: u32 = 1;
         let mut draw = || {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

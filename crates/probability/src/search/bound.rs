@@ -62,7 +62,7 @@ impl Bound {
 
     /// Returns the bound of a sequence that is continued at the same moment. Over-all conditions
     /// are not included, because the next happening may make them true.
-    pub(crate) fn of_beginning(network: &PrunedNetwork<'_>) -> Self {
+    pub(crate) fn of_start(network: &PrunedNetwork<'_>) -> Self {
         Self {
             probability: network.actions_probability() * (1.0 + 1e-12),
             length: network.sequence().len() + 1,
@@ -83,7 +83,7 @@ struct Setter {
 }
 
 /// State of the search that the bound reads.
-pub(crate) struct Outlook<'a> {
+pub(crate) struct BoundContext<'a> {
     pub(crate) nominal: &'a Nominal,
     /// `true` if the order must work without failures.
     pub(crate) must_work: bool,
@@ -167,7 +167,7 @@ impl Bounds {
         &self,
         model: &Model,
         network: &mut PrunedNetwork<'_>,
-        outlook: &Outlook<'_>,
+        outlook: &BoundContext<'_>,
         separations: &Separations,
     ) -> Bound {
         let probability = network.actions_probability();
@@ -208,7 +208,7 @@ impl Bounds {
     fn needed(
         &self,
         network: &PrunedNetwork<'_>,
-        outlook: &Outlook<'_>,
+        outlook: &BoundContext<'_>,
     ) -> Option<Vec<InstanceId>> {
         let mut needed: Vec<InstanceId> = network.running().to_vec();
         if !outlook.must_work {
@@ -273,7 +273,7 @@ struct Run<'a, 'm, 'n> {
     bounds: &'a Bounds,
     model: &'a Model,
     network: &'n mut PrunedNetwork<'m>,
-    outlook: &'a Outlook<'a>,
+    outlook: &'a BoundContext<'a>,
     is_counted: Vec<bool>,
     bound: f64,
 }
@@ -300,7 +300,10 @@ impl Run<'_, '_, '_> {
             running,
             ends: ends.len(),
         };
-        let shares: Vec<Vec<f64>> = ends.iter().map(|&id| self.share(id, queue)).collect();
+        let shares: Vec<Vec<f64>> = ends
+            .iter()
+            .map(|&id| self.factors_by_rank(id, queue))
+            .collect();
         self.bound *= assignment::best_product(&shares);
         for &id in needed.iter().skip(running) {
             for &(fact, truth) in &self.bounds.needs_at_start[id.index()] {
@@ -317,7 +320,7 @@ impl Run<'_, '_, '_> {
     ///
     /// It is open whether more starts come before or after this end. As probabilities decay, each
     /// factor is log-convex in the number of starts before it, so one of the extremes is best.
-    fn share(&mut self, id: InstanceId, queue: Queue) -> Vec<f64> {
+    fn factors_by_rank(&mut self, id: InstanceId, queue: Queue) -> Vec<f64> {
         let is_new = |literal: &&(usize, bool), is_counted: &mut Vec<bool>| {
             !std::mem::replace(&mut is_counted[literal.0], true)
         };
@@ -338,13 +341,13 @@ impl Run<'_, '_, '_> {
             let own = own.filter(|setter| setter.by == Some(id) && setter.makes_true == truth);
             let chance = |p: f64| if truth { p } else { 1.0 - p };
             let own = own.filter_map(|setter| setter.leaves.map(chance));
-            let chain = Chain::of(self.model.flips[fact], truth);
+            let chain = Chain::of(self.model.spontaneous_changes[fact], truth);
             brings.push((chain, own.fold(0.0, f64::max)));
         }
         let mut with = |before: usize, after: usize| -> f64 {
             let needs = needs.iter();
             let lasting: f64 = needs
-                .map(|&literal| self.lasting(id, literal, before))
+                .map(|&literal| self.persistence_bound(id, literal, before))
                 .product();
             let brings = brings.iter();
             let kept: f64 = brings
@@ -364,14 +367,19 @@ impl Run<'_, '_, '_> {
     ///
     /// An over-all condition must never fail after the start. The best start is just before the
     /// end: until then, a lost fact may be restored by a spontaneous change.
-    fn lasting(&mut self, id: InstanceId, (fact, truth): (usize, bool), before: usize) -> f64 {
+    fn persistence_bound(
+        &mut self,
+        id: InstanceId,
+        (fact, truth): (usize, bool),
+        before: usize,
+    ) -> f64 {
         let literal = (fact, truth);
         let bounds = self.bounds;
         let is_throughout = bounds.needs_throughout[id.index()].contains(&literal);
-        let chain = Chain::of(self.model.flips[fact], truth);
+        let chain = Chain::of(self.model.spontaneous_changes[fact], truth);
         let mut to_come = bounds.setters[fact].iter();
-        if !is_throughout || !chain.is_steady() || to_come.any(|setter| self.is_to_come(setter)) {
-            return self.chance(fact, truth, before);
+        if !is_throughout || !chain.is_steady() || to_come.any(|setter| self.is_pending(setter)) {
+            return self.fact_bound(fact, truth, before);
         }
         let steps = i32::try_from(before).unwrap_or(i32::MAX);
         let stays = 1.0 - chain.fails();
@@ -379,9 +387,9 @@ impl Run<'_, '_, '_> {
             return stays.powi(steps);
         }
         if before > 0 && bounds.needs_at_start[id.index()].contains(&literal) {
-            return self.chance(fact, truth, before - 1) * stays;
+            return self.fact_bound(fact, truth, before - 1) * stays;
         }
-        self.chance(fact, truth, before)
+        self.fact_bound(fact, truth, before)
     }
 
     /// Returns `true` if only the end of `id` can still change the fact, and the fact does not have
@@ -393,7 +401,7 @@ impl Run<'_, '_, '_> {
         }
         let mut is_set = false;
         for setter in &self.bounds.setters[fact] {
-            if !self.is_to_come(setter) {
+            if !self.is_pending(setter) {
                 continue;
             }
             if setter.by != Some(id) || !setter.at_end || setter.leaves.is_none() {
@@ -404,7 +412,7 @@ impl Run<'_, '_, '_> {
         is_set
     }
 
-    fn is_to_come(&self, setter: &Setter) -> bool {
+    fn is_pending(&self, setter: &Setter) -> bool {
         match setter.by {
             None => self.outlook.has_timed,
             Some(id) if self.network.running().contains(&id) => setter.at_end,
@@ -415,14 +423,14 @@ impl Run<'_, '_, '_> {
     /// Includes a needed fact once.
     fn count_fact(&mut self, fact: usize, truth: bool, steps: usize) {
         if !std::mem::replace(&mut self.is_counted[fact], true) {
-            self.bound *= self.chance(fact, truth, steps);
+            self.bound *= self.fact_bound(fact, truth, steps);
         }
     }
 
     /// Returns an upper bound of the probability that a fact has a truth value after at least
     /// `steps` steps.
-    fn chance(&mut self, fact: usize, truth: bool, steps: usize) -> f64 {
-        let chain = Chain::of(self.model.flips[fact], truth);
+    fn fact_bound(&mut self, fact: usize, truth: bool, steps: usize) -> f64 {
+        let chain = Chain::of(self.model.spontaneous_changes[fact], truth);
         let of = |p: f64| if truth { p } else { 1.0 - p };
         // If an effect must establish the value, the present value is irrelevant.
         let must_be_set =
@@ -432,7 +440,7 @@ impl Run<'_, '_, '_> {
             best = chain.best_after(of(self.network.marginal_at(fact)), steps);
         }
         for setter in &self.bounds.setters[fact] {
-            if !self.is_to_come(setter) || (must_be_set && setter.makes_true != truth) {
+            if !self.is_pending(setter) || (must_be_set && setter.makes_true != truth) {
                 continue;
             }
             match setter.leaves {

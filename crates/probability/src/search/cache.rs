@@ -7,12 +7,12 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId};
 use indexmap::IndexMap;
 
-use crate::circumstances::Circumstances;
 use crate::model::Model;
+use crate::search_state::SearchState;
 use crate::total_order::TotalOrderPlan;
 
 /// Largest number of entries; then the cache is cleared.
-const MOST: usize = 65_536;
+const MAX_ENTRIES: usize = 65_536;
 
 /// The parts of the circumstances that determine the result.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -29,7 +29,7 @@ pub(super) struct Key {
 }
 
 /// Returns the key of these circumstances.
-pub(super) fn key(model: &Model, circumstances: &Circumstances, has_deadlines: bool) -> Key {
+pub(super) fn key(model: &Model, circumstances: &SearchState, has_deadlines: bool) -> Key {
     let probability = |&fact| circumstances.belief.probability(fact).to_bits();
     Key {
         belief: model.facts.iter().map(probability).collect(),
@@ -56,43 +56,43 @@ pub(super) fn key(model: &Model, circumstances: &Circumstances, has_deadlines: b
 /// not matter.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cache {
-    known: Arc<Mutex<IndexMap<Key, Arc<Known>>>>,
+    entries: Arc<Mutex<IndexMap<Key, Arc<CachedOrder>>>>,
 }
 
 impl Cache {
     /// Returns the entry, if there is one.
-    pub(super) fn get(&self, key: &Key) -> Option<Arc<Known>> {
-        self.known().get(key).cloned()
+    pub(super) fn get(&self, key: &Key) -> Option<Arc<CachedOrder>> {
+        self.lock_entries().get(key).cloned()
     }
 
     pub(super) fn put(&self, key: Key, order: Option<&TotalOrderPlan>, now: &Rational) {
-        let mut all = self.known();
-        if all.len() >= MOST {
+        let mut all = self.lock_entries();
+        if all.len() >= MAX_ENTRIES {
             all.clear();
         }
-        let known = Known {
+        let known = CachedOrder {
             order: order.cloned(),
-            began: now.clone(),
+            start: now.clone(),
         };
         all.insert(key, Arc::new(known));
     }
 
-    fn known(&self) -> MutexGuard<'_, IndexMap<Key, Arc<Known>>> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock_entries(&self) -> MutexGuard<'_, IndexMap<Key, Arc<CachedOrder>>> {
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Cached result of an earlier search.
 #[derive(Clone, Debug)]
-pub(super) struct Known {
+pub(super) struct CachedOrder {
     order: Option<TotalOrderPlan>,
-    began: Rational,
+    start: Rational,
 }
 
-impl Known {
+impl CachedOrder {
     /// Returns the order as of `now`; `None` if there is none.
-    pub(super) fn from(&self, now: &Rational) -> Option<TotalOrderPlan> {
-        let delay = now - &self.began;
+    pub(super) fn order_at(&self, now: &Rational) -> Option<TotalOrderPlan> {
+        let delay = now - &self.start;
         self.order.as_ref().map(|order| order.delayed(&delay))
     }
 }

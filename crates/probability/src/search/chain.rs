@@ -1,17 +1,17 @@
 //! Markov chain of one fact under spontaneous changes, relative to a required truth value.
 
-use crate::likelihoods::Flip;
+use crate::likelihoods::SpontaneousChange;
 
 /// Spontaneous changes of a fact, relative to the required truth value.
 #[derive(Clone, Copy)]
-pub(super) struct Chain(Flip);
+pub(super) struct Chain(SpontaneousChange);
 
 impl Chain {
-    pub(super) fn of(flip: Flip, truth: bool) -> Self {
+    pub(super) fn of(flip: SpontaneousChange, truth: bool) -> Self {
         Self(if truth {
             flip
         } else {
-            Flip {
+            SpontaneousChange {
                 becomes_true: flip.becomes_false,
                 becomes_false: flip.becomes_true,
             }
@@ -33,7 +33,7 @@ impl Chain {
     /// Probabilities converge to `becomes_true / (becomes_true + becomes_false)` from one side,
     /// unless the sum of the two is greater than 1; then they oscillate.
     pub(super) fn best_after(self, p: f64, steps: usize) -> f64 {
-        let Flip {
+        let SpontaneousChange {
             becomes_true,
             becomes_false,
         } = self.0;

@@ -39,7 +39,7 @@ impl Couplings {
         let plan = model.plan();
         let mut needs = vec![BTreeSet::new(); plan.nodes.len()];
         let mut need = |one: NodeId, other: NodeId| {
-            if one != other && !separations.are_apart(one, other) {
+            if one != other && !separations.must_be_separated(one, other) {
                 needs[one.index()].insert(other);
             }
         };
@@ -206,7 +206,7 @@ fn parts(model: &Model, start: NodeId) -> Vec<Part> {
     let literals = literals.iter();
     let literals = literals.map(|&(fact, truth)| Part::Literal(fact, truth));
     let coupled = coupled.iter().map(|coupled| &coupled.condition);
-    let watched = event.watches.iter().map(|(_, condition)| condition);
+    let watched = event.guard_memories.iter().map(|(_, condition)| condition);
     let conditions = numeric.iter().chain(coupled).chain(watched);
     literals
         .chain(conditions.cloned().map(Part::Condition))

@@ -11,10 +11,10 @@ use elbowroom_num::work;
 use elbowroom_plan::{Node, NodeId};
 
 use super::nominal::Nominal;
-use super::room::Rooms;
+use super::time_slack::TimeSlacks;
 use super::{Candidates, OrderSearch, SEQUENCE_WORK};
-use crate::circumstances::Circumstances;
 use crate::network::{PrunedNetwork, TooCoupled};
+use crate::search_state::SearchState;
 
 /// Orders of a plan.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +93,7 @@ impl OrderSearch {
     /// When there are more than the limits allow.
     pub fn lattice(
         &self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         limits: LatticeLimits,
     ) -> Result<Lattice, TooLarge> {
         let nothing = Lattice {
@@ -101,7 +101,7 @@ impl OrderSearch {
             edges: Vec::new(),
             orders: 0,
         };
-        let Some(rooms) = Rooms::new(&self.separations, circumstances) else {
+        let Some(rooms) = TimeSlacks::new(&self.separations, circumstances) else {
             return Ok(nothing);
         };
         let (nominal, works) = Nominal::new(&self.model, circumstances);
@@ -115,12 +115,12 @@ impl OrderSearch {
             is_used[running.instance.index()] = true;
         }
         let timed = self.separations.timed.iter();
-        let mut walk = Walk {
+        let mut walk = LatticeBuilder {
             search: self,
             must_work,
             network: PrunedNetwork::new(model, circumstances)?,
             nominal,
-            rooms,
+            time_slacks: rooms,
             is_used,
             is_placed: vec![false; model.plan().nodes.len()],
             next_timed: timed
@@ -132,7 +132,7 @@ impl OrderSearch {
             nodes: BTreeMap::new(),
             edges: BTreeMap::new(),
         };
-        walk.go_on()?;
+        walk.explore()?;
         Ok(walk.finish())
     }
 }
@@ -140,12 +140,12 @@ impl OrderSearch {
 /// A set of happenings, preceded by its size, so that smaller ones come first.
 type Set = (usize, Vec<NodeId>);
 
-struct Walk<'s> {
+struct LatticeBuilder<'s> {
     search: &'s OrderSearch,
     must_work: bool,
     network: PrunedNetwork<'s>,
     nominal: Nominal,
-    rooms: Rooms<'s>,
+    time_slacks: TimeSlacks<'s>,
     is_used: Vec<bool>,
     is_placed: Vec<bool>,
     next_timed: usize,
@@ -156,7 +156,7 @@ struct Walk<'s> {
     edges: BTreeMap<(Set, NodeId), f64>,
 }
 
-impl Walk<'_> {
+impl LatticeBuilder<'_> {
     fn set(&self) -> Set {
         let mut done = self.network.sequence().to_vec();
         done.sort_unstable();
@@ -165,7 +165,7 @@ impl Walk<'_> {
 
     /// Examines all orders that begin with the current sequence, and returns the best of their
     /// probabilities.
-    fn go_on(&mut self) -> Result<f64, TooLarge> {
+    fn explore(&mut self) -> Result<f64, TooLarge> {
         self.sequences += 1;
         work::spend(SEQUENCE_WORK);
         if self.sequences > self.limits.sequences {
@@ -176,7 +176,7 @@ impl Walk<'_> {
         let mut best = own.unwrap_or(0.0);
         self.orders += usize::from(own.is_some());
         for (node, is_open) in self.search.joinable(&self.network, self.next()) {
-            if let Some(through) = self.through(node, is_open)? {
+            if let Some(through) = self.explore_after(node, is_open)? {
                 let known = self.edges.entry((set.clone(), node)).or_insert(0.0);
                 *known = known.max(through);
                 best = best.max(through);
@@ -212,7 +212,7 @@ impl Walk<'_> {
         }
         if self.must_work {
             let checkpoint = self.nominal.checkpoint();
-            let works = self.nominal.admit(model, &model.goal);
+            let works = self.nominal.assume(model, &model.goal);
             self.nominal.undo_to(checkpoint);
             if !works {
                 return Ok(None);
@@ -224,7 +224,7 @@ impl Walk<'_> {
 
     /// Returns the best probability of all orders that continue with this happening; `None` if
     /// there are none.
-    fn through(&mut self, node: NodeId, is_open: bool) -> Result<Option<f64>, TooLarge> {
+    fn explore_after(&mut self, node: NodeId, is_open: bool) -> Result<Option<f64>, TooLarge> {
         let model = &*self.search.model;
         let what = model.plan().nodes[node.index()];
         let timed_before = self.next_timed;
@@ -240,11 +240,15 @@ impl Walk<'_> {
             } else {
                 !self.must_work || self.nominal.apply(model, event, running)
             };
-            if works && self.rooms.push(model, (node, is_joined), timed_before) {
+            if works
+                && self
+                    .time_slacks
+                    .push(model, (node, is_joined), timed_before)
+            {
                 self.mark(node, what, true);
-                best = self.go_on()?;
+                best = self.explore()?;
                 self.mark(node, what, false);
-                self.rooms.pop();
+                self.time_slacks.pop();
             }
         }
         self.nominal.undo_to(checkpoint);

@@ -16,13 +16,13 @@ use elbowroom_plan::{InstanceId, Node};
 use indexmap::IndexMap;
 
 use super::nominal::{Nominal, Truth};
-use super::room::Room;
 use super::separations::Separations;
+use super::time_slack::TimeSlack;
 use crate::model::{Model, Requirement, visit_facts};
 use crate::network::{Number, PrunedNetwork, Snapshot};
 
 /// Largest number of remembered sequences that are equivalent in progress.
-const MOST: usize = 64;
+const MAX_ENTRIES: usize = 64;
 
 /// Remembered sequences.
 #[derive(Clone, Debug)]
@@ -40,7 +40,7 @@ struct Key {
     /// `true` if the last happening is a timed initial. Such a sequence may not be an order; see
     /// `OrderSearch::may_be_over`.
     is_timed_last: bool,
-    /// If facts change with time: see [`PrunedNetwork::times_to_come`].
+    /// If facts change with time: see [`PrunedNetwork::pending_times`].
     times: Vec<i64>,
     truths: Vec<Truth>,
     numbers: Vec<Number>,
@@ -50,7 +50,7 @@ struct Key {
 struct Entry {
     probability: f64,
     facts: Snapshot,
-    room: Option<Room>,
+    time_slack: Option<TimeSlack>,
 }
 
 /// Facts, with truth values, that conditions depend on.
@@ -62,7 +62,7 @@ struct Needs {
     rest: Vec<Vec<(usize, u8)>>,
     goal: Need,
     /// Facts whose greater probability may be worse although nothing needs them to be false.
-    is_turbulent: Vec<bool>,
+    is_non_monotone: Vec<bool>,
 }
 
 /// By fact: bit 0, needed true; bit 1, needed false.
@@ -83,7 +83,7 @@ impl Memo {
             let mut need = vec![0; count];
             for event in [start, end] {
                 include(&mut need, &event.over_all);
-                for (memory, condition) in &event.watches {
+                for (memory, condition) in &event.guard_memories {
                     need[*memory] = BOTH;
                     include_condition(model, &mut need, condition);
                 }
@@ -100,7 +100,7 @@ impl Memo {
         }
         let mut goal = vec![0; count];
         include(&mut goal, &model.goal);
-        let is_turbulent = model.flips.iter();
+        let is_turbulent = model.spontaneous_changes.iter();
         let is_turbulent = is_turbulent.map(|flip| flip.becomes_true + flip.becomes_false > 1.0);
         Self {
             entries: IndexMap::new(),
@@ -108,7 +108,7 @@ impl Memo {
                 whole,
                 rest,
                 goal,
-                is_turbulent: is_turbulent.collect(),
+                is_non_monotone: is_turbulent.collect(),
             },
             marks: Vec::new(),
         }
@@ -132,7 +132,7 @@ impl Memo {
         network: &mut PrunedNetwork<'_>,
         is_used: &[bool],
         (next_timed, has_timed): (usize, bool),
-        room: Option<Room>,
+        room: Option<TimeSlack>,
     ) -> bool {
         let need = self.needs.of(is_used, network.running());
         let mut running = network.running().to_vec();
@@ -146,7 +146,7 @@ impl Memo {
             next_timed,
             is_timed_last: last
                 .is_some_and(|node| matches!(model.plan().nodes[node.index()], Node::Timed(_))),
-            times: network.times_to_come(has_timed),
+            times: network.pending_times(has_timed),
             truths: (0..need.len())
                 .filter(matters)
                 .map(|fact| nominal.truth(fact))
@@ -156,14 +156,14 @@ impl Memo {
         let entry = Entry {
             probability: network.actions_probability(),
             facts: network.snapshot(&|fact| need[fact] != 0),
-            room,
+            time_slack: room,
         };
         let known = self.entries.entry(key).or_default();
         if known.iter().any(|other| other.dominates(&entry, &need)) {
             return true;
         }
         known.retain(|other| !entry.dominates(other, &need));
-        if known.len() < MOST {
+        if known.len() < MAX_ENTRIES {
             known.push(entry);
         }
         false
@@ -172,7 +172,7 @@ impl Memo {
 
 impl Entry {
     fn dominates(&self, other: &Self, need: &Need) -> bool {
-        let has_room = match (&self.room, &other.room) {
+        let has_room = match (&self.time_slack, &other.time_slack) {
             (None, None) => true,
             (Some(own), Some(its)) => own.contains(its),
             _ => false,
@@ -197,7 +197,7 @@ fn ratio(from: &Snapshot, than: &Snapshot, need: &Need) -> f64 {
         }
         let pairs = own.iter().zip(weights);
         ratio *= pairs
-            .map(|(&own, &its)| part(own, its))
+            .map(|(&own, &its)| ratio_or_infinity(own, its))
             .fold(f64::INFINITY, f64::min);
     }
     if from.single.len() != than.single.len() {
@@ -207,8 +207,8 @@ fn ratio(from: &Snapshot, than: &Snapshot, need: &Need) -> f64 {
         if fact != its_fact {
             return 0.0;
         }
-        let if_true = part(own, its);
-        let if_false = part(1.0 - own, 1.0 - its);
+        let if_true = ratio_or_infinity(own, its);
+        let if_false = ratio_or_infinity(1.0 - own, 1.0 - its);
         ratio *= match need[fact] {
             TRUE => if_true.min(1.0),
             FALSE => if_false.min(1.0),
@@ -219,7 +219,7 @@ fn ratio(from: &Snapshot, than: &Snapshot, need: &Need) -> f64 {
 }
 
 /// Returns `own / its`, or infinity if `its` is 0.
-fn part(own: f64, its: f64) -> f64 {
+fn ratio_or_infinity(own: f64, its: f64) -> f64 {
     if its > 0.0 { own / its } else { f64::INFINITY }
 }
 
@@ -239,7 +239,7 @@ impl Needs {
         }
         for (need, _) in need
             .iter_mut()
-            .zip(&self.is_turbulent)
+            .zip(&self.is_non_monotone)
             .filter(|(_, is)| **is)
         {
             if *need != 0 {

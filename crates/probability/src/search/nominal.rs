@@ -5,8 +5,8 @@ use elbowroom_model::ground::{Condition, Expression, FactId};
 use elbowroom_model::problem::Comparison;
 use elbowroom_plan::InstanceId;
 
-use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement, is_fact};
+use crate::search_state::SearchState;
 
 /// Truth value of a fact without failures. Numbers are not tracked here, so an effect whose
 /// condition reads them may or may not take place.
@@ -27,9 +27,9 @@ impl From<bool> for Truth {
 
 /// Decision whether an effect takes place without failures.
 #[derive(Clone, Copy, Debug)]
-enum Taking {
-    Place,
-    Nothing,
+enum EffectStatus {
+    TakesPlace,
+    Skipped,
     /// It depends on numbers.
     Open,
 }
@@ -43,7 +43,7 @@ pub(crate) struct Nominal {
 
 impl Nominal {
     /// Returns the believed state, and `true` if the running actions can continue in it.
-    pub(crate) fn new(model: &Model, circumstances: &Circumstances) -> (Self, bool) {
+    pub(crate) fn new(model: &Model, circumstances: &SearchState) -> (Self, bool) {
         let belief = &circumstances.belief;
         let truth = |&fact: &FactId| match belief.probability(fact) {
             p if p <= 0.0 => Truth::False,
@@ -98,29 +98,29 @@ impl Nominal {
     /// Like [`Self::apply`], for a happening that is followed by another one at the same moment:
     /// the over-all conditions of the running actions need not hold in between.
     pub(crate) fn apply_open(&mut self, model: &Model, event: &Event) -> bool {
-        if !self.admit(model, &event.condition) {
+        if !self.assume(model, &event.condition) {
             return false;
         }
         // Guards are read before any effect.
-        let effects: Vec<(usize, bool, Taking)> = event
+        let effects: Vec<(usize, bool, EffectStatus)> = event
             .effects
             .iter()
             .map(|effect| {
                 (
                     effect.fact,
                     effect.makes_true,
-                    self.taking(model, effect.guard.as_ref()),
+                    self.effect_status(model, effect.guard.as_ref()),
                 )
             })
             .collect();
         for makes_true in [false, true] {
             for &(fact, _, taking) in effects.iter().filter(|(_, truth, _)| *truth == makes_true) {
                 match taking {
-                    Taking::Place => self.set(fact, Truth::from(makes_true)),
-                    Taking::Open if self.truths[fact] != Truth::from(makes_true) => {
+                    EffectStatus::TakesPlace => self.set(fact, Truth::from(makes_true)),
+                    EffectStatus::Open if self.truths[fact] != Truth::from(makes_true) => {
                         self.set(fact, Truth::Open);
                     }
-                    Taking::Open | Taking::Nothing => {}
+                    EffectStatus::Open | EffectStatus::Skipped => {}
                 }
             }
         }
@@ -129,13 +129,13 @@ impl Nominal {
 
     /// Decides whether an effect with this guard takes place. Undecided facts are assumed to have
     /// the values with which it does.
-    fn taking(&self, model: &Model, guard: Option<&Condition>) -> Taking {
+    fn effect_status(&self, model: &Model, guard: Option<&Condition>) -> EffectStatus {
         let Some(guard) = guard else {
-            return Taking::Place;
+            return EffectStatus::TakesPlace;
         };
         match self.reading(model, guard) {
-            Ok(true) => Taking::Place,
-            Ok(false) => Taking::Nothing,
+            Ok(true) => EffectStatus::TakesPlace,
+            Ok(false) => EffectStatus::Skipped,
             Err(Open) => {
                 let mut reads_numbers = false;
                 model
@@ -144,9 +144,9 @@ impl Nominal {
                 // The memory of a start is undecided if it depends on numbers.
                 guard.visit_facts(&mut |fact| reads_numbers |= !is_fact(fact));
                 if reads_numbers {
-                    Taking::Open
+                    EffectStatus::Open
                 } else {
-                    Taking::Place
+                    EffectStatus::TakesPlace
                 }
             }
         }
@@ -158,7 +158,7 @@ impl Nominal {
             let start = model.event(model.start(id));
             let mut literals = start.over_all.literals.iter();
             let mut coupled = start.over_all.coupled.iter();
-            let mut watches = start.watches.iter();
+            let mut watches = start.guard_memories.iter();
             literals.all(|&(fact, truth)| self.truths[fact] == Truth::from(truth))
                 && coupled.all(|coupled| self.reading(model, &coupled.condition) == Ok(true))
                 && watches.all(|(memory, condition)| {
@@ -172,17 +172,17 @@ impl Nominal {
     pub(crate) fn stays_possible(&mut self, model: &Model, running: &[InstanceId]) -> bool {
         running.iter().all(|&id| {
             let start = model.event(model.start(id));
-            for (memory, condition) in &start.watches {
-                if self.surely_not(model, condition) {
+            for (memory, condition) in &start.guard_memories {
+                if self.is_certainly_false(model, condition) {
                     self.set(*memory, Truth::False);
                 }
             }
-            self.admit(model, &start.over_all)
+            self.assume(model, &start.over_all)
         })
     }
 
     /// Returns `true` if a requirement may hold. Undecided facts get the required values.
-    pub(crate) fn admit(&mut self, model: &Model, requirement: &Requirement) -> bool {
+    pub(crate) fn assume(&mut self, model: &Model, requirement: &Requirement) -> bool {
         for &(fact, truth) in &requirement.literals {
             match self.truths[fact] {
                 Truth::Open => self.set(fact, truth.into()),
@@ -201,7 +201,7 @@ impl Nominal {
         self.reading(model, condition).unwrap_or(true)
     }
 
-    fn surely_not(&self, model: &Model, condition: &Condition) -> bool {
+    fn is_certainly_false(&self, model: &Model, condition: &Condition) -> bool {
         self.reading(model, condition) == Ok(false)
     }
 
@@ -213,7 +213,7 @@ impl Nominal {
         match model.task().derivation() {
             Some(derivation) if derivation.is_read_by(condition) => {
                 let derived = derivation.derive(&basic);
-                holds(condition, &derivation.on_top_of(&basic, &derived))
+                holds(condition, &derivation.with_derived_facts(&basic, &derived))
             }
             _ => holds(condition, &basic),
         }

@@ -3,10 +3,10 @@
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::OrderSearch;
-use super::run::TIE;
-use crate::circumstances::Circumstances;
+use super::run::TIE_TOLERANCE;
 use crate::model::Event;
 use crate::network::{Happenings, PrunedNetwork, TooCoupled};
+use crate::search_state::SearchState;
 
 impl OrderSearch {
     /// Moves starts behind ends that may fail and on whose effects the end of the started action
@@ -18,7 +18,7 @@ impl OrderSearch {
     /// would have no schedule.
     pub(super) fn postponed(
         &self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         (sequence, probability): (Vec<NodeId>, f64),
     ) -> Result<Vec<NodeId>, TooCoupled> {
         let mut order = sequence.clone();
@@ -26,7 +26,7 @@ impl OrderSearch {
             let Node::Start(id) = self.model.plan().nodes[start.index()] else {
                 continue;
             };
-            if let Some(moved) = self.moved(&order, id)
+            if let Some(moved) = self.with_start_postponed(&order, id)
                 && self.is_as_likely(circumstances, &moved, probability)?
             {
                 order = moved;
@@ -38,7 +38,7 @@ impl OrderSearch {
     /// Returns the sequence with an action moved behind the last end that it should wait for: its
     /// start, and its end if that would come before the start otherwise. Returns `None` if it has
     /// nothing to wait for, or the plan's links forbid the change.
-    fn moved(&self, sequence: &[NodeId], id: InstanceId) -> Option<Vec<NodeId>> {
+    fn with_start_postponed(&self, sequence: &[NodeId], id: InstanceId) -> Option<Vec<NodeId>> {
         let (start, end) = (self.model.start(id), self.model.end(id));
         let place = |wanted: NodeId| sequence.iter().position(|node| *node == wanted);
         let (from, own_end) = (place(start)?, place(end)?);
@@ -95,7 +95,11 @@ impl OrderSearch {
         let (start, end) = (self.model.start(other), self.model.end(other));
         let (start, end) = (self.model.event(start), self.model.event(end));
         let needed = [&start.condition, &start.over_all, &end.condition];
-        let aftermaths = self.model.event(self.model.end(own)).aftermaths.iter();
+        let aftermaths = self
+            .model
+            .event(self.model.end(own))
+            .failure_outcomes
+            .iter();
         let mut changes = aftermaths.flat_map(|aftermath| &aftermath.changes);
         changes.any(|&(fact, becomes)| {
             let mut needed = needed.iter();
@@ -112,7 +116,7 @@ impl OrderSearch {
     /// Returns `true` if a sequence has time and at least this probability.
     fn is_as_likely(
         &self,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         sequence: &[NodeId],
         probability: f64,
     ) -> Result<bool, TooCoupled> {
@@ -124,6 +128,6 @@ impl OrderSearch {
         }
         let mut network = PrunedNetwork::new(&self.model, circumstances)?;
         network.push_all(Happenings::from(sequence))?;
-        Ok(network.success_probability()? >= probability * (1.0 - TIE))
+        Ok(network.success_probability()? >= probability * (1.0 - TIE_TOLERANCE))
     }
 }

@@ -28,7 +28,7 @@ impl Queue {
     /// Probabilities decay, so shares are log-convex in the rank, except for the first happening
     /// and where ends begin to need starts. The best rank is at an end of one of these pieces.
     pub(super) fn ranks(self) -> Vec<usize> {
-        if self.ends <= assignment::MOST {
+        if self.ends <= assignment::MAX_ROWS {
             return (0..self.ends).collect();
         }
         let bend = self.running;
@@ -45,12 +45,12 @@ impl Queue {
 #[cfg(test)]
 mod tests {
     use super::Queue;
-    use crate::likelihoods::Flip;
+    use crate::likelihoods::SpontaneousChange;
     use crate::search::chain::Chain;
 
     /// One of the examined ranks is the best of all, for any decay.
     #[test]
-    fn in_a_long_queue_the_best_rank_is_among_those_that_are_looked_at() {
+    fn long_queue_keeps_best_rank() {
         let mut seed: u32 = 3;
         let mut draw = || {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -63,7 +63,7 @@ mod tests {
             };
             let mut chain = |truth| {
                 let scale = if draw() < 0.5 { 0.01 } else { 0.5 };
-                let flip = Flip {
+                let flip = SpontaneousChange {
                     becomes_true: if draw() < 0.3 { 0.0 } else { scale * draw() },
                     becomes_false: if draw() < 0.3 { 0.0 } else { scale * draw() },
                 };

@@ -5,14 +5,14 @@ use std::ops::ControlFlow;
 use elbowroom_num::work;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use super::bound::{Bound, Outlook};
+use super::bound::{Bound, BoundContext};
 use super::memo::Memo;
 use super::nominal::Nominal;
-use super::room::Rooms;
+use super::time_slack::TimeSlacks;
 use super::{Candidates, OrderSearch, Progress, SEQUENCE_WORK};
-use crate::circumstances::Circumstances;
 use crate::model::Model;
 use crate::network::{PrunedNetwork, TooCoupled};
+use crate::search_state::SearchState;
 
 /// A running search, with the data of the current sequence.
 pub(super) struct Run<'s, 'w> {
@@ -22,7 +22,7 @@ pub(super) struct Run<'s, 'w> {
     has_deadlines: bool,
     network: PrunedNetwork<'s>,
     nominal: Nominal,
-    rooms: Rooms<'s>,
+    time_slacks: TimeSlacks<'s>,
     is_used: Vec<bool>,
     /// For each instance, the interchangeable one that has to be used before it.
     before: Vec<Option<InstanceId>>,
@@ -45,15 +45,15 @@ pub(super) struct Best {
 
 /// Relative difference below which two probabilities count as equal. It is more than the correction
 /// of bounds for rounding; otherwise a bound would always seem slightly better than the best order.
-pub(super) const TIE: f64 = 1e-11;
+pub(super) const TIE_TOLERANCE: f64 = 1e-11;
 
 impl<'s, 'w> Run<'s, 'w> {
     /// Creates a search with an empty sequence.
     pub(super) fn new(
         search: &'s OrderSearch,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
         nominal: Nominal,
-        rooms: Rooms<'s>,
+        rooms: TimeSlacks<'s>,
         watch: &'w mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, TooCoupled> {
         let model = &*search.model;
@@ -70,7 +70,7 @@ impl<'s, 'w> Run<'s, 'w> {
             has_deadlines: search.separations.has_deadlines(now),
             network: PrunedNetwork::new(model, circumstances)?,
             nominal,
-            rooms,
+            time_slacks: rooms,
             is_used,
             before: search.symmetry.order(model, circumstances),
             is_placed: vec![false; model.plan().nodes.len()],
@@ -88,7 +88,7 @@ impl<'s, 'w> Run<'s, 'w> {
     }
 
     /// Examines one sequence, without happenings that are impossible from here.
-    pub(super) fn try_first(&mut self, sequence: &[NodeId]) -> Result<(), TooCoupled> {
+    pub(super) fn try_sequence(&mut self, sequence: &[NodeId]) -> Result<(), TooCoupled> {
         let mut done = Vec::new();
         for &node in sequence {
             let can_be = match self.model.plan().nodes[node.index()] {
@@ -105,7 +105,7 @@ impl<'s, 'w> Run<'s, 'w> {
                 continue;
             }
             // The goal may be reached before the end of the sequence.
-            self.consider()?;
+            self.record_if_better()?;
             // Happenings that need each other come at the same moment.
             let is_joined = self.network.is_open();
             let is_coupled = self.must_work && self.search.couplings.is_coupled(node);
@@ -115,15 +115,18 @@ impl<'s, 'w> Run<'s, 'w> {
                 break;
             }
             let timed_before = self.timed_before(node);
-            if !self.rooms.push(self.model, (node, is_joined), timed_before) {
+            if !self
+                .time_slacks
+                .push(self.model, (node, is_joined), timed_before)
+            {
                 self.pop(node);
                 break;
             }
             done.push(node);
         }
-        self.consider()?;
+        self.record_if_better()?;
         for node in done.into_iter().rev() {
-            self.rooms.pop();
+            self.time_slacks.pop();
             self.pop(node);
         }
         Ok(())
@@ -140,7 +143,7 @@ impl<'s, 'w> Run<'s, 'w> {
         if (self.watch)(&progress).is_break() || work::is_stopped() {
             return Ok(ControlFlow::Break(()));
         }
-        self.consider()?;
+        self.record_if_better()?;
         let is_joined = self.network.is_open();
         let mut promising = Vec::new();
         for next in self.next() {
@@ -161,14 +164,16 @@ impl<'s, 'w> Run<'s, 'w> {
                 continue;
             }
             let timed_before = self.timed_before(node);
-            let has_time = self.rooms.push(self.model, (node, is_joined), timed_before);
+            let has_time = self
+                .time_slacks
+                .push(self.model, (node, is_joined), timed_before);
             let deeper = if has_time {
                 let deeper = if !is_open && self.is_dominated() {
                     ControlFlow::Continue(())
                 } else {
                     self.explore()?
                 };
-                self.rooms.pop();
+                self.time_slacks.pop();
                 deeper
             } else {
                 ControlFlow::Continue(())
@@ -193,14 +198,15 @@ impl<'s, 'w> Run<'s, 'w> {
             None => bound.probability > 0.0,
             Some(best) => {
                 let (best, order) = (best.probability, &best.sequence);
-                bound.probability > best * (1.0 + TIE)
-                    || (bound.probability >= best * (1.0 - TIE) && bound.length < order.len())
+                bound.probability > best * (1.0 + TIE_TOLERANCE)
+                    || (bound.probability >= best * (1.0 - TIE_TOLERANCE)
+                        && bound.length < order.len())
             }
         }
     }
 
     /// Records the current sequence, if it is an order and better than the best one.
-    fn consider(&mut self) -> Result<(), TooCoupled> {
+    fn record_if_better(&mut self) -> Result<(), TooCoupled> {
         if !self.network.running().is_empty()
             || self.network.is_open()
             || !self
@@ -211,7 +217,7 @@ impl<'s, 'w> Run<'s, 'w> {
         }
         if self.must_work {
             let checkpoint = self.nominal.checkpoint();
-            let works = self.nominal.admit(self.model, &self.model.goal);
+            let works = self.nominal.assume(self.model, &self.model.goal);
             self.nominal.undo_to(checkpoint);
             if !works {
                 return Ok(());
@@ -223,8 +229,8 @@ impl<'s, 'w> Run<'s, 'w> {
             None => probability > 0.0,
             Some(best) => {
                 let (best, order) = (best.probability, &best.sequence);
-                probability > best * (1.0 + TIE)
-                    || (probability >= best * (1.0 - TIE) && length < order.len())
+                probability > best * (1.0 + TIE_TOLERANCE)
+                    || (probability >= best * (1.0 - TIE_TOLERANCE) && length < order.len())
             }
         };
         if is_better {
@@ -298,7 +304,7 @@ impl<'s, 'w> Run<'s, 'w> {
             Bound::IMPOSSIBLE
         } else if is_open {
             if self.nominal.apply_open(model, event) && !self.is_settled() {
-                Bound::of_beginning(&self.network)
+                Bound::of_start(&self.network)
             } else {
                 Bound::IMPOSSIBLE
             }
@@ -341,7 +347,7 @@ impl<'s, 'w> Run<'s, 'w> {
     fn bound(&mut self) -> Bound {
         let is_used = &self.is_used;
         let is_free = |id: InstanceId| !is_used[id.index()];
-        let outlook = Outlook {
+        let outlook = BoundContext {
             nominal: &self.nominal,
             must_work: self.must_work,
             is_free: &is_free,
@@ -358,7 +364,9 @@ impl<'s, 'w> Run<'s, 'w> {
     /// Returns `true` if an equivalent sequence dominates the current one.
     fn is_dominated(&mut self) -> bool {
         let has_timed = self.next_timed < self.search.separations.timed.len();
-        let room = self.rooms.room(self.has_deadlines && has_timed);
+        let room = self
+            .time_slacks
+            .relevant_slack(self.has_deadlines && has_timed);
         self.memo.is_dominated(
             self.model,
             &self.nominal,

@@ -5,8 +5,8 @@ use elbowroom_model::ground::Body;
 use elbowroom_num::Rational;
 use elbowroom_plan::{LinkKind, Node, NodeId};
 
-use crate::circumstances::Running;
 use crate::model::Model;
+use crate::search_state::Running;
 
 /// Temporal constraints of a plan, computed once for all searches.
 #[derive(Clone, Debug)]
@@ -42,7 +42,7 @@ impl Separations {
             Node::End(id) => {
                 let mut footprint = Footprint::of_end(task, &plan.instance(id).action);
                 // A failed end writes the facts of its outcome.
-                let aftermaths = model.event(model.end(id)).aftermaths.iter();
+                let aftermaths = model.event(model.end(id)).failure_outcomes.iter();
                 for &(fact, becomes) in aftermaths.flat_map(|aftermath| &aftermath.changes) {
                     footprint.include_fact(model.facts[fact], becomes);
                 }
@@ -84,7 +84,7 @@ impl Separations {
         let matters = |at: usize| {
             let own = &footprints[at];
             let actions = plan.nodes.iter().zip(&footprints);
-            read.iter().any(|reader| own.writes_what_is_read_by(reader))
+            read.iter().any(|reader| own.writes_reads_of(reader))
                 || actions
                     .filter(|(node, _)| is_action(node))
                     .any(|(_, other)| own.interferes_with(other))
@@ -101,7 +101,7 @@ impl Separations {
             });
         let timed: Vec<(NodeId, Rational)> = timed.collect();
         let is_for_goal =
-            |(node, _): &(NodeId, Rational)| footprints[node.index()].writes_what_is_read_by(&goal);
+            |(node, _): &(NodeId, Rational)| footprints[node.index()].writes_reads_of(&goal);
         let keeps_distance = apart.iter().map(|row| row.contains(&true)).collect();
         let ids = || plan.instances().map(|(id, _)| id);
         Self {
@@ -122,7 +122,7 @@ impl Separations {
     }
 
     /// Returns `true` if two happenings must be `epsilon` apart.
-    pub(crate) fn are_apart(&self, one: NodeId, other: NodeId) -> bool {
+    pub(crate) fn must_be_separated(&self, one: NodeId, other: NodeId) -> bool {
         self.apart[one.index()][other.index()]
     }
 
@@ -145,7 +145,7 @@ impl Separations {
     pub(crate) fn latest_before_timed(&self, node: NodeId, next_timed: usize) -> Option<Rational> {
         let to_come = self.timed.iter().enumerate().skip(next_timed);
         let latest = to_come.filter_map(|(index, (timed, time))| {
-            if self.are_apart(*timed, node) {
+            if self.must_be_separated(*timed, node) {
                 Some(time - &self.epsilon)
             } else {
                 (index == next_timed).then(|| time.clone())

@@ -12,9 +12,9 @@
 use elbowroom_plan::{InstanceId, NodeId};
 
 use super::separations::Separations;
-use crate::circumstances::Circumstances;
 use crate::likelihoods::Rate;
 use crate::model::{Event, Model};
+use crate::search_state::SearchState;
 
 /// Symmetries of a model, computed once for all searches.
 #[derive(Clone, Debug)]
@@ -84,7 +84,7 @@ impl Symmetry {
     pub(super) fn order(
         &self,
         model: &Model,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
     ) -> Vec<Option<InstanceId>> {
         let is_free = |id: InstanceId| {
             let nodes = [model.start(id), model.end(id)];
@@ -128,7 +128,7 @@ fn facts_of(model: &Model, id: InstanceId) -> Vec<usize> {
             facts.extend(requirement.coupled.iter().flat_map(|part| &part.facts));
         }
         facts.extend(event.effects.iter().map(|effect| effect.fact));
-        facts.extend(event.watches.iter().map(|(memory, _)| *memory));
+        facts.extend(event.guard_memories.iter().map(|(memory, _)| *memory));
     }
     facts.sort_unstable();
     facts.dedup();
@@ -148,7 +148,7 @@ fn signature(
         let is_plain = requirements
             .iter()
             .all(|needs| needs.numeric.is_empty() && needs.coupled.is_empty())
-            && event.watches.is_empty()
+            && event.guard_memories.is_empty()
             && event.updates.is_empty()
             && event.continuous.is_empty()
             && event.effects.iter().all(|effect| effect.guard.is_none());
@@ -196,7 +196,7 @@ fn signature(
         goal.find(|(own, _)| *own == fact).map(|(_, truth)| *truth)
     };
     let flips = own.iter().map(|&fact| {
-        let flip = model.flips[fact];
+        let flip = model.spontaneous_changes[fact];
         let rate = model.rates[fact];
         (flip.becomes_true, flip.becomes_false, rate, wanted(fact))
     });
@@ -226,7 +226,7 @@ impl Separations {
         };
         let stays = |from: NodeId, to: NodeId| {
             let (new_from, new_to) = (swapped(from), swapped(to));
-            self.are_apart(from, to) == self.are_apart(new_from, new_to)
+            self.must_be_separated(from, to) == self.must_be_separated(new_from, new_to)
                 && self.may_precede(from, to) == self.may_precede(new_from, new_to)
         };
         let all = || (0..self.node_count()).map(NodeId::from);

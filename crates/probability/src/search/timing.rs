@@ -5,12 +5,12 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 
 use super::separations::Separations;
-use crate::circumstances::Circumstances;
 use crate::model::Model;
+use crate::search_state::SearchState;
 
 /// The whole network of an order, happening by happening.
 ///
-/// The search itself needs less, and uses a faster method ([`super::room::Rooms`]).
+/// The search itself needs less, and uses a faster method ([`super::room::TimeSlacks`]).
 #[derive(Clone, Debug)]
 pub(super) struct Timing<'s> {
     separations: &'s Separations,
@@ -27,7 +27,7 @@ pub(super) struct Timing<'s> {
 
 impl<'s> Timing<'s> {
     /// Creates the network without happenings; `None` if the running actions leave no schedule.
-    pub(super) fn new(separations: &'s Separations, circumstances: &Circumstances) -> Option<Self> {
+    pub(super) fn new(separations: &'s Separations, circumstances: &SearchState) -> Option<Self> {
         let mut network = ConsistentNetwork::new();
         let zero = network.add_node();
         let now = network.add_node();
@@ -94,7 +94,7 @@ impl<'s> Timing<'s> {
         // Happenings before the last one that must be apart are earlier, so they need no
         // constraint.
         let mut placed = self.placed.iter().rev();
-        let last_apart = placed.find(|(other, _)| separations.are_apart(*other, node));
+        let last_apart = placed.find(|(other, _)| separations.must_be_separated(*other, node));
         if let Some(&(_, before)) = last_apart {
             let epsilon = separations.epsilon.clone();
             self.demand(Constraint::at_least(before, own, epsilon))?;

@@ -185,11 +185,15 @@ fn regressed(model: &Model, event: &Event, condition: &Condition) -> Option<Cond
 }
 
 /// The value of a number cannot be determined from values before.
-struct Lost;
+struct Undetermined;
 
 /// Returns a fluent's value after a happening as an expression over values before; `None` if it
 /// does not change.
-fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<Expression>, Lost> {
+fn value_after(
+    model: &Model,
+    event: &Event,
+    fluent: FluentId,
+) -> Result<Option<Expression>, Undetermined> {
     let Some(position) = model.fluent_position(fluent) else {
         return Ok(None);
     };
@@ -198,7 +202,7 @@ fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<
         .iter()
         .any(|(changed, _)| *changed == position)
     {
-        return Err(Lost);
+        return Err(Undetermined);
     }
     let mut value: Option<Expression> = None;
     for update in event
@@ -207,7 +211,7 @@ fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<
         .filter(|update| update.fluent == position)
     {
         if update.guard.is_some() {
-            return Err(Lost);
+            return Err(Undetermined);
         }
         let mut is_lost = false;
         let amount = update.value.map_leaves(&mut |leaf| match leaf {
@@ -219,7 +223,7 @@ fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<
             _ => None,
         });
         if is_lost {
-            return Err(Lost);
+            return Err(Undetermined);
         }
         let old = value.take().unwrap_or(Expression::Fluent(fluent));
         value = Some(match update.operator {

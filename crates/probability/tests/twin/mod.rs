@@ -14,8 +14,8 @@ use elbowroom_model::ground::{
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
-use elbowroom_probability::likelihoods::Failing;
-use elbowroom_probability::{Circumstances, Flip, Likelihoods, Semantics};
+use elbowroom_probability::likelihoods::FailureModel;
+use elbowroom_probability::{Likelihoods, SearchState, Semantics, SpontaneousChange};
 
 /// A world: the true facts, and the end effects of running actions that will take place.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,7 +46,7 @@ impl<'a> Worlds<'a> {
         plan: &'a PartialOrderPlan,
         likelihoods: &'a Likelihoods,
         semantics: Semantics,
-        circumstances: &Circumstances,
+        circumstances: &SearchState,
     ) -> Self {
         let mut memories = BTreeMap::new();
         for running in &circumstances.running {
@@ -258,12 +258,12 @@ impl<'a> Worlds<'a> {
         }
     }
 
-    fn failing(&self, id: InstanceId) -> Failing {
+    fn failing(&self, id: InstanceId) -> FailureModel {
         let action = &self.plan.instance(id).action;
         let key = (action.schema, action.arguments.clone());
         let own = self.likelihoods.actions.get(&key);
         let success = own.or(self.likelihoods.schemas.get(&action.schema));
-        success.map_or_else(Failing::default, |success| success.failing.clone())
+        success.map_or_else(FailureModel::default, |success| success.failing.clone())
     }
 
     /// Removes a running action.
@@ -312,7 +312,10 @@ impl<'a> Worlds<'a> {
                 }
                 let set = left.iter().rev().find(|(own, _)| *own == fact);
                 let was = set.map_or(world.facts[index], |(_, truth)| *truth);
-                let flip = self.likelihoods.flip(self.task, fact).unwrap();
+                let flip = self
+                    .likelihoods
+                    .spontaneous_change(self.task, fact)
+                    .unwrap();
                 let p = f64::from(u8::from(was));
                 // A set fact has an effect: in the paper's network it does not also change by
                 // itself.
@@ -436,7 +439,10 @@ impl<'a> Worlds<'a> {
                 }
             }
             let was = f64::from(u8::from(world.facts[index]));
-            let flip = self.likelihoods.flip(self.task, fact).unwrap();
+            let flip = self
+                .likelihoods
+                .spontaneous_change(self.task, fact)
+                .unwrap();
             let p = self.chance(was, &adds, &deletes, flip);
             outcomes = outcomes
                 .into_iter()
@@ -454,7 +460,7 @@ impl<'a> Worlds<'a> {
     }
 
     /// Returns P(true afterwards) of a fact that was true with probability 0 or 1.
-    fn chance(&self, was: f64, adds: &[f64], deletes: &[f64], flip: Flip) -> f64 {
+    fn chance(&self, was: f64, adds: &[f64], deletes: &[f64], flip: SpontaneousChange) -> f64 {
         let none = |of: &[f64]| of.iter().map(|p| 1.0 - p).product::<f64>();
         match self.semantics {
             Semantics::Paper => match (adds, deletes) {

@@ -138,7 +138,7 @@ fn extend(
 fn may_be_over(case: &Case, sequence: &[NodeId]) -> bool {
     let goal = Footprint::of_condition(&case.task, case.task.goal());
     let concerns_goal =
-        |index: usize| Footprint::of_timed(&case.task.timed()[index]).writes_what_is_read_by(&goal);
+        |index: usize| Footprint::of_timed(&case.task.timed()[index]).writes_reads_of(&goal);
     let is_to_come = |index: usize| case.task.timed()[index].time > case.circumstances.now;
     let mut nodes = (0..).map(NodeId::from).zip(&case.plan.nodes);
     let is_complete = nodes.all(|(node, what)| match what {

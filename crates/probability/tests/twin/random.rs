@@ -8,8 +8,10 @@ use elbowroom_model::ground::{Action, Change, FactId, SnapAction};
 use elbowroom_model::problem::{PredicateId, SchemaId};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
-use elbowroom_probability::likelihoods::{Failing, Outcome, OutcomeChange, PartialFlip, Success};
-use elbowroom_probability::{Circumstances, Likelihoods, Running};
+use elbowroom_probability::likelihoods::{
+    FailureModel, Outcome, OutcomeChange, PartialChange, Success,
+};
+use elbowroom_probability::{Likelihoods, Running, SearchState};
 use rand::Rng;
 use rand::seq::IndexedRandom;
 
@@ -33,7 +35,7 @@ pub(crate) struct Case {
     pub(crate) task: Arc<Task>,
     pub(crate) plan: PartialOrderPlan,
     pub(crate) likelihoods: Likelihoods,
-    pub(crate) circumstances: Circumstances,
+    pub(crate) circumstances: SearchState,
 }
 
 impl Case {
@@ -242,10 +244,10 @@ fn probability(rng: &mut impl Rng) -> f64 {
 fn likelihoods(rng: &mut impl Rng, task: &Task) -> Likelihoods {
     let mut likelihoods = Likelihoods::default();
     for index in 0..task.problem().predicates.len() {
-        let flip = PartialFlip {
+        let flip = PartialChange {
             becomes_true: Some(probability(rng) * 0.5),
             becomes_false: Some(probability(rng) * 0.6),
-            ..PartialFlip::default()
+            ..PartialChange::default()
         };
         likelihoods
             .predicates
@@ -271,7 +273,7 @@ fn likelihoods(rng: &mut impl Rng, task: &Task) -> Likelihoods {
 /// Returns the case with actions that fail at their ends.
 pub(crate) fn with_failing_ends(rng: &mut impl Rng, mut case: Case) -> Case {
     for success in case.likelihoods.schemas.values_mut() {
-        success.failing = Failing {
+        success.failing = FailureModel {
             end: Some(match rng.random_range(0..5) {
                 0 => 1.0,
                 1 => 0.0,
@@ -281,7 +283,7 @@ pub(crate) fn with_failing_ends(rng: &mut impl Rng, mut case: Case) -> Case {
                 .choose(rng)
                 .copied()
                 .flatten(),
-            ..Failing::default()
+            ..FailureModel::default()
         };
     }
     case
@@ -332,8 +334,8 @@ pub(crate) fn in_time(rng: &mut impl Rng, mut case: Case) -> Case {
     case
 }
 
-fn circumstances(rng: &mut impl Rng, task: &Task, plan: &PartialOrderPlan) -> Circumstances {
-    let mut circumstances = Circumstances::initial(task);
+fn circumstances(rng: &mut impl Rng, task: &Task, plan: &PartialOrderPlan) -> SearchState {
+    let mut circumstances = SearchState::initial(task);
     for index in 0..task.fact_count() {
         if rng.random_bool(0.2) {
             let fact = elbowroom_model::ground::FactId(u32::try_from(index).unwrap());

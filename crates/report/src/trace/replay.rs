@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom_execution::{
-    Command, Entry, Need, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, PrepareError,
-    Prepared, Preparer, Recorder, Wanted, World, WorldError,
+    Command, Entry, Observation, PlanAnswer, PlanForm, Planner, PlannerAnswer, PreparationRequest,
+    PreparationResult, PrepareError, Preparer, Recorder, TimeAdvance, World, WorldError,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
@@ -14,8 +14,8 @@ use elbowroom_num::Rational;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use super::line::{
-    Line, LookedLine, ObservationLine, PassedLine, PlannedLine, ShortfallLine, StepLine,
+use super::schema::{
+    GoalLookLine, Line, ObservationLine, PlannedLine, ShortfallLine, StepLine, TimeAdvanceLine,
 };
 use super::{FORMAT, SNAPSHOT, SnapshotLine, VERSION};
 use crate::wire::read_observation;
@@ -139,7 +139,7 @@ impl Stored {
     }
 
     /// Returns how many times the run was resumed after its end.
-    pub fn reopened(&self) -> usize {
+    pub fn restart_count(&self) -> usize {
         let is_over = |line: &&Line| matches!(line, Line::Over(_));
         let over = self.lines.iter().filter(is_over).count();
         over - usize::from(self.is_complete())
@@ -152,7 +152,7 @@ impl Stored {
     }
 
     /// Returns the lines with their numbers in the file.
-    fn numbered(&self) -> impl Iterator<Item = (usize, &Line)> {
+    fn numbered_lines(&self) -> impl Iterator<Item = (usize, &Line)> {
         (self.first_number()..).zip(&self.lines)
     }
 
@@ -197,11 +197,11 @@ impl Stored {
 /// World that repeats the reports and failures of the world in a trace.
 pub struct ReplayWorld {
     task: Arc<Task>,
-    answers: VecDeque<Played>,
+    answers: VecDeque<RecordedAnswer>,
 }
 
 /// Answer of a world in a trace.
-enum Played {
+enum RecordedAnswer {
     /// Reports up to a time, with the number of the line.
     Passage(usize, Rational, Vec<ObservationLine>),
     /// A failure.
@@ -216,13 +216,14 @@ impl ReplayWorld {
     /// Creates the world of a trace.
     pub fn new(stored: &Stored, task: &Arc<Task>) -> Self {
         let mut answers = VecDeque::new();
-        for (index, (number, line)) in stored.numbered().enumerate() {
+        for (index, (number, line)) in stored.numbered_lines().enumerate() {
             let failure = match line {
-                Line::Passed(PassedLine {
+                Line::Passed(TimeAdvanceLine {
                     now, observations, ..
                 })
-                | Line::Looked(LookedLine { now, observations }) => {
-                    let passage = Played::Passage(number, now.0.clone(), observations.clone());
+                | Line::Looked(GoalLookLine { now, observations }) => {
+                    let passage =
+                        RecordedAnswer::Passage(number, now.0.clone(), observations.clone());
                     answers.push_back(passage);
                     continue;
                 }
@@ -236,7 +237,7 @@ impl ReplayWorld {
                 }
                 _ => continue,
             };
-            answers.push_back(Played::Failure {
+            answers.push_back(RecordedAnswer::Failure {
                 error: failure,
                 commands: failed_command(&stored.lines[..index]),
             });
@@ -247,15 +248,15 @@ impl ReplayWorld {
         }
     }
 
-    fn next(&mut self) -> Result<Passage, WorldError> {
+    fn next(&mut self) -> Result<TimeAdvance, WorldError> {
         let (line, now, reported) = match self.answers.pop_front() {
-            Some(Played::Passage(line, now, reported)) => (line, now, reported),
-            Some(Played::Failure { error, .. }) => return Err(error),
+            Some(RecordedAnswer::Passage(line, now, reported)) => (line, now, reported),
+            Some(RecordedAnswer::Failure { error, .. }) => return Err(error),
             None => return Err(WorldError::new(END)),
         };
         let mut observations = Vec::with_capacity(reported.len());
         for observation in &reported {
-            if let Some((event, time)) = observation.of_the_run() {
+            if let Some((event, time)) = observation.run_event() {
                 let time = time.clone();
                 observations.push(Observation { time, event });
                 continue;
@@ -265,7 +266,7 @@ impl ReplayWorld {
                 WorldError::new(format!("line {line} of the trace: {}", wrong.message))
             })?);
         }
-        Ok(Passage { now, observations })
+        Ok(TimeAdvance { now, observations })
     }
 }
 
@@ -289,7 +290,7 @@ fn failed_command(lines: &[Line]) -> usize {
 
 impl World for ReplayWorld {
     fn command(&mut self, _now: &Rational, _command: &Command) -> Result<(), WorldError> {
-        if let Some(Played::Failure { commands, .. }) = self.answers.front_mut()
+        if let Some(RecordedAnswer::Failure { commands, .. }) = self.answers.front_mut()
             && *commands > 0
         {
             *commands -= 1;
@@ -300,7 +301,7 @@ impl World for ReplayWorld {
         Ok(())
     }
 
-    fn wait(&mut self, _until: &Rational) -> Result<Passage, WorldError> {
+    fn wait(&mut self, _until: &Rational) -> Result<TimeAdvance, WorldError> {
         self.next()
     }
 
@@ -325,7 +326,7 @@ impl ReplayPlanner {
     /// Creates the planner of a trace.
     pub fn new(stored: &Stored) -> Self {
         let mut requests = VecDeque::new();
-        for (number, line) in stored.numbered() {
+        for (number, line) in stored.numbered_lines() {
             match line {
                 Line::Planning(_) => requests.push_back((number, None)),
                 Line::Planned(planned) => {
@@ -411,12 +412,12 @@ impl<P: Preparer> Preparer for ReplayPreparer<P> {
         &mut self,
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
-        need: Need,
-    ) -> Result<Prepared, PrepareError> {
+        need: PlanForm,
+    ) -> Result<PreparationResult, PrepareError> {
         self.0.prepare(task, plan, need)
     }
 
-    fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {
+    fn begin(&mut self, _wanted: &PreparationRequest<'_>) -> bool {
         true
     }
 }
@@ -496,7 +497,7 @@ impl Replay {
             difference: None,
             is_to_end: Arc::default(),
         }
-        .looking_ahead()
+        .with_lookahead()
     }
 
     /// Returns the flag that is set when the replay reaches the point at which the run was
@@ -505,7 +506,7 @@ impl Replay {
         Arc::clone(&self.is_to_end)
     }
 
-    fn looking_ahead(self) -> Self {
+    fn with_lookahead(self) -> Self {
         self.look_ahead();
         self
     }

@@ -1,13 +1,13 @@
 //! Snapshot of a run at the rotation of its record, as a line.
 
+mod plan_adoption;
 mod starts;
-mod taken_up;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::run::{Doing, Goals, Refusals, Stand};
-use elbowroom_execution::{Doubt, Parts, Progression, Ticket};
+use elbowroom_execution::run::{Goals, RefusalBackoff, RunPhase, RunSnapshot};
+use elbowroom_execution::{ActionHandle, BeliefState, BeliefStateParts, Doubt};
 use elbowroom_model::Task;
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
@@ -16,8 +16,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::exact::Exact;
 
-pub use starts::{StartLine, UnderWayLine};
-pub use taken_up::{GoalLine, NewsLine, SituatedLine, TakenUpLine, TurnLine};
+pub use plan_adoption::{
+    GoalLine, NewsLine, PendingGoalChangeLine, PlanAdoptionLine, SituationActionLine,
+};
+pub use starts::{RunningActionLine, StartLine};
 
 /// The second line of a rotated record, which replaces all earlier records. Rotation happens when a
 /// persistent run is idle or adopts a plan: `docs/formats/journal.md`.
@@ -80,10 +82,10 @@ pub struct SnapshotLine {
     pub starts: Vec<StartLine>,
     /// Actions that are believed to be running.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub under_way: Vec<UnderWayLine>,
+    pub under_way: Vec<RunningActionLine>,
     /// The adopted plan, if the run is not idle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plan: Option<TakenUpLine>,
+    pub plan: Option<PlanAdoptionLine>,
 }
 
 /// A fact or a number that is in doubt.
@@ -125,30 +127,30 @@ fn is_zero(number: &usize) -> bool {
 impl SnapshotLine {
     /// Creates the line of a run of this task. Returns `None` if its plan cannot be written as a
     /// line.
-    pub fn of(task: &Task, stand: &Stand) -> Option<Self> {
+    pub fn of(task: &Task, stand: &RunSnapshot) -> Option<Self> {
         let parts = stand.belief.parts();
-        let plan = match &stand.doing {
-            Doing::Rests { .. } => None,
-            Doing::TakesUp(it) => Some(TakenUpLine::of(task, it, &stand.starts)?),
+        let plan = match &stand.phase {
+            RunPhase::Idle { .. } => None,
+            RunPhase::Adopting(it) => Some(PlanAdoptionLine::of(task, it, &stand.starts)?),
         };
-        let since = match &stand.doing {
-            Doing::Rests { since, .. } => Some(Exact(since.clone())),
-            Doing::TakesUp(_) => None,
+        let since = match &stand.phase {
+            RunPhase::Idle { since, .. } => Some(Exact(since.clone())),
+            RunPhase::Adopting(_) => None,
         };
         let unsolvable = matches!(
-            stand.doing,
-            Doing::Rests {
+            stand.phase,
+            RunPhase::Idle {
                 is_unsolvable: true,
                 ..
             }
         );
         let facts = (0..task.fact_count()).map(|index| {
             let truth = parts.facts.get(index).copied().unwrap_or(false);
-            (task.fact_name(FactId(narrow(index))), truth)
+            (task.fact_name(FactId(to_u32(index))), truth)
         });
         let numbers = (0..task.fluent_count()).map(|index| {
             let value = parts.values.get(index).cloned().flatten();
-            (task.fluent_name(FluentId(narrow(index))), value.map(Exact))
+            (task.fluent_name(FluentId(to_u32(index))), value.map(Exact))
         });
         let facts_before = parts.facts_on_arrival.iter();
         let numbers_before = parts.values_on_arrival.iter();
@@ -181,8 +183,8 @@ impl SnapshotLine {
             doubtful_numbers: doubtful_numbers
                 .flat_map(|(fluent, doubts)| DoubtLine::all(&task.fluent_name(*fluent), doubts))
                 .collect(),
-            goals: taken_up::goal_lines(&stand.goals),
-            problem_goals: !stand.goals.are_others,
+            goals: plan_adoption::goal_lines(&stand.goals),
+            problem_goals: !stand.goals.are_changed,
             paused: stand.is_paused,
             replans: stand.replans,
             refused: refused
@@ -192,7 +194,7 @@ impl SnapshotLine {
                 .then(|| Exact(stand.refusals.until.clone())),
             starts: starts.map(|it| StartLine::of(task, it)).collect(),
             under_way: under_way
-                .map(|(ticket, it)| UnderWayLine::of(*ticket, it))
+                .map(|(ticket, it)| RunningActionLine::of(*ticket, it))
                 .collect(),
             plan,
         })
@@ -204,15 +206,15 @@ impl SnapshotLine {
     /// # Errors
     /// A message if the task lacks some of these facts, numbers or actions, or has others before
     /// them.
-    pub fn stand(&self, task: &Arc<Task>) -> Result<Stand, String> {
+    pub fn restored(&self, task: &Arc<Task>) -> Result<RunSnapshot, String> {
         for (index, name) in self.facts.keys().enumerate() {
-            if fact(task, name)? != FactId(narrow(index)) {
-                return Err(out_of_order(name));
+            if fact(task, name)? != FactId(to_u32(index)) {
+                return Err(position_error(name));
             }
         }
         for (index, name) in self.numbers.keys().enumerate() {
-            if fluent(task, name)? != FluentId(narrow(index)) {
-                return Err(out_of_order(name));
+            if fluent(task, name)? != FluentId(to_u32(index)) {
+                return Err(position_error(name));
             }
         }
         if self.timed > task.timed().len() {
@@ -223,7 +225,7 @@ impl SnapshotLine {
         let numbers_before = self.numbers_before.iter();
         let starts = self.starts.iter().map(|it| it.start(task));
         let starts = starts.collect::<Result<Vec<_>, String>>()?;
-        let parts = Parts {
+        let parts = BeliefStateParts {
             time: self.now.0.clone(),
             group: self.group.0.clone(),
             facts: self.facts.values().copied().collect(),
@@ -237,11 +239,15 @@ impl SnapshotLine {
             doubtful_facts: doubts(&self.doubtful_facts, |name| fact(task, name))?,
             doubtful_values: doubts(&self.doubtful_numbers, |name| fluent(task, name))?,
             timed: self.timed,
-            running: self.under_way.iter().map(UnderWayLine::parts).collect(),
+            running: self
+                .under_way
+                .iter()
+                .map(RunningActionLine::parts)
+                .collect(),
         };
         let doing = match (&self.plan, &self.since) {
-            (Some(plan), _) => Doing::TakesUp(Box::new(plan.takes_up(task, &starts)?)),
-            (None, Some(since)) => Doing::Rests {
+            (Some(plan), _) => RunPhase::Adopting(Box::new(plan.to_plan_adoption(task, &starts)?)),
+            (None, Some(since)) => RunPhase::Idle {
                 since: since.0.clone(),
                 is_unsolvable: self.unsolvable,
             },
@@ -249,19 +255,19 @@ impl SnapshotLine {
                 return Err("it says neither a plan nor since when there is none".to_owned());
             }
         };
-        let action = |ticket: Ticket| starts::action_of(&starts, ticket).cloned();
+        let action = |ticket: ActionHandle| starts::action_of(&starts, ticket).cloned();
         if let Some(unknown) = parts.running.keys().find(|it| action(**it).is_none()) {
             return Err(format!("{unknown} is running, and was not started"));
         }
         let refused = self.refused.iter();
-        Ok(Stand {
-            belief: Progression::of_parts(Arc::clone(task), parts, action),
+        Ok(RunSnapshot {
+            belief: BeliefState::from_parts(Arc::clone(task), parts, action),
             started: self.started,
             starts,
             allowance: self.allowance.0.clone(),
             answers: (self.answers_since.0.clone(), self.answers),
             replans: self.replans,
-            refusals: Refusals {
+            refusals: RefusalBackoff {
                 times: refused
                     .map(|(name, times)| (name.clone(), *times))
                     .collect(),
@@ -272,11 +278,11 @@ impl SnapshotLine {
                     .unwrap_or_default(),
             },
             goals: Goals {
-                open: taken_up::goals_of(&self.goals),
-                are_others: !self.problem_goals,
+                open: plan_adoption::goals_of(&self.goals),
+                are_changed: !self.problem_goals,
             },
             is_paused: self.paused,
-            doing,
+            phase: doing,
         })
     }
 
@@ -304,7 +310,7 @@ fn doubts<T: Ord>(
     for line in lines {
         let doubt = Doubt {
             since: line.since.0.clone(),
-            ticket: Ticket(line.ticket),
+            ticket: ActionHandle(line.ticket),
             action: line.action.clone(),
         };
         doubts.entry(read(&line.name)?).or_default().push(doubt);
@@ -312,10 +318,10 @@ fn doubts<T: Ord>(
     Ok(doubts)
 }
 
-fn out_of_order(name: &str) -> String {
+fn position_error(name: &str) -> String {
     format!("`{name}` has another position in the problem")
 }
 
-fn narrow(index: usize) -> u32 {
+fn to_u32(index: usize) -> u32 {
     u32::try_from(index).expect("fewer than 2^32 facts and fluents")
 }

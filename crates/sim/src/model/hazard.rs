@@ -24,7 +24,7 @@ pub struct Hazard {
 }
 
 /// Maximum number of facts with rates.
-pub(super) const MOST_FACTS: usize = 10_000;
+pub(super) const MAX_FACTS: usize = 10_000;
 
 impl WorldModel {
     /// Returns the rates of a fact, `(predicate object …)`; `None` if it never changes by itself.

@@ -3,7 +3,7 @@
 use elbowroom_num::Rational;
 use rand::Rng;
 
-use super::Failing;
+use super::FailureRule;
 
 /// A possible outcome of a failure.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,31 +23,31 @@ pub struct Outcome {
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutcomeChange {
     /// The fact or fluent.
-    pub what: Template,
+    pub target: Template,
     /// Its change.
-    pub becomes: Becoming,
+    pub change: FactOutcome,
 }
 
 /// A change of a fact or a fluent.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Becoming {
+pub enum FactOutcome {
     /// The fact becomes true or false.
     Truth(bool),
     /// The fluent gets a value.
     Value(Rational),
     /// The number is added to the fluent's value; a fluent without a value does not get one.
-    Grown(Rational),
+    ChangedBy(Rational),
 }
 
 /// A fact or a fluent, with objects and arguments of an action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Template {
     pub(super) name: String,
-    pub(super) objects: Vec<Word>,
+    pub(super) objects: Vec<TemplateArgument>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Word {
+pub(super) enum TemplateArgument {
     Object(String),
     /// The argument of the action at this index.
     Argument(usize),
@@ -56,7 +56,7 @@ pub(super) enum Word {
 impl Template {
     /// Returns the ground name, `(predicate object …)` or `(function object …)`, for the action
     /// `(name object …)`.
-    pub fn of(&self, action: &str) -> String {
+    pub fn instantiate(&self, action: &str) -> String {
         let action: Vec<&str> = action
             .trim_matches(['(', ')'])
             .split_whitespace()
@@ -66,8 +66,10 @@ impl Template {
         for word in &self.objects {
             name.push(' ');
             name.push_str(match word {
-                Word::Object(object) => object,
-                Word::Argument(place) => action.get(*place).copied().unwrap_or_default(),
+                TemplateArgument::Object(object) => object,
+                TemplateArgument::Argument(place) => {
+                    action.get(*place).copied().unwrap_or_default()
+                }
             });
         }
         name.push(')');
@@ -75,7 +77,7 @@ impl Template {
     }
 }
 
-impl Failing {
+impl FailureRule {
     /// Draws the outcome of a failure; `None` if none of them applies.
     pub fn outcome(&self, rng: &mut impl Rng) -> Option<&Outcome> {
         let mut left = rng.random::<f64>();

@@ -10,13 +10,13 @@ use elbowroom_num::Rational;
 use elbowroom_text::{Diagnostic, Severity, Source, Span};
 use toml::Spanned;
 
-use super::{Amount, Exogenous, ExogenousChange, Reports, Rule, WorldModel};
+use super::{Amount, ExogenousChange, ExogenousEvent, ReportReliability, Rule, WorldModel};
 use crate::draw::Distribution;
-use crate::pattern::{ActionPattern, Names};
+use crate::pattern::{ActionPattern, NameKind};
 use section::{File, Section, Shape};
 
 /// A distribution with its position, its minimum and its maximum.
-type Found = (Span, Distribution, Limit, Limit);
+type ParsedDistribution = (Span, Distribution, Limit, Limit);
 
 /// A minimum or a maximum, with its position.
 type Limit = Option<(Span, f64)>;
@@ -33,26 +33,26 @@ pub(super) fn read(source: &Source, problem: &Problem) -> Read<WorldModel> {
     let reader = Reader { source, problem };
     let file: File = elbowroom_text::toml::read(source)?;
     if file.format.get_ref() != "elbowroom-world" {
-        return Err(reader.wrong(&file.format.span(), "write format = \"elbowroom-world\""));
+        return Err(reader.error_at(&file.format.span(), "write format = \"elbowroom-world\""));
     }
     if *file.version.get_ref() != 1 {
-        return Err(reader.wrong(&file.version.span(), "this program reads version 1"));
+        return Err(reader.error_at(&file.version.span(), "this program reads version 1"));
     }
-    let mut model = WorldModel::as_planned();
+    let mut model = WorldModel::without_deviations();
     if let Some(resolution) = &file.resolution {
         let value = Rational::from_f64_as_written(*resolution.get_ref());
         model.resolution = value
             .filter(Rational::is_positive)
-            .ok_or_else(|| reader.wrong(&resolution.span(), "it must be greater than 0"))?;
+            .ok_or_else(|| reader.error_at(&resolution.span(), "it must be greater than 0"))?;
     }
     for section in &file.duration {
         let rule = reader.rule_of(section, "[[duration]]", &["action", "relative"])?;
-        let rule = reader.not_negative(section, rule)?;
+        let rule = reader.check_not_negative(section, rule)?;
         model.durations.push((reader.action(section)?, rule));
     }
     for section in &file.delay {
         let rule = reader.rule_of(section, "[[delay]]", &["action"])?;
-        let rule = reader.not_negative(section, rule)?;
+        let rule = reader.check_not_negative(section, rule)?;
         model.delays.push((reader.action(section)?, rule));
     }
     for section in &file.amount {
@@ -76,37 +76,40 @@ pub(super) fn read(source: &Source, problem: &Problem) -> Read<WorldModel> {
 }
 
 impl Reader<'_> {
-    fn wrong(&self, at: &Span, message: impl Into<String>) -> Diagnostic {
+    fn error_at(&self, at: &Span, message: impl Into<String>) -> Diagnostic {
         let message = message.into().trim().replace('\n', " ");
         Diagnostic::new(Severity::Error, self.source, at.clone(), message)
     }
 
-    fn pattern(&self, text: &Spanned<String>, names: Names) -> Read<ActionPattern> {
+    fn pattern(&self, text: &Spanned<String>, names: NameKind) -> Read<ActionPattern> {
         ActionPattern::read(text.get_ref(), names, self.problem)
-            .map_err(|problem| self.wrong(&text.span(), problem))
+            .map_err(|problem| self.error_at(&text.span(), problem))
     }
 
     fn action(&self, section: &Spanned<Section>) -> Read<ActionPattern> {
         let action = section.get_ref().action.as_ref();
-        let action = action.ok_or_else(|| self.wrong(&section.span(), "`action` is missing"))?;
-        self.pattern(action, Names::Actions)
+        let action = action.ok_or_else(|| self.error_at(&section.span(), "`action` is missing"))?;
+        self.pattern(action, NameKind::Actions)
     }
 
     /// Reads the distribution of a section that has no other keys than `own`.
     fn rule_of(&self, section: &Spanned<Section>, name: &str, own: &[&str]) -> Read<Rule> {
-        match section.get_ref().excess(name, own, true) {
-            Some((span, message)) => Err(self.wrong(&span, message)),
+        match section.get_ref().first_superfluous_key(name, own, true) {
+            Some((span, message)) => Err(self.error_at(&span, message)),
             None => self.rule(section),
         }
     }
 
     /// Checks a rule for times, which must not be negative.
-    fn not_negative(&self, section: &Spanned<Section>, rule: Rule) -> Read<Rule> {
-        if !rule.means_negative() {
+    fn check_not_negative(&self, section: &Spanned<Section>, rule: Rule) -> Read<Rule> {
+        if !rule.can_be_negative() {
             return Ok(rule);
         }
-        Err(self.wrong(
-            &section.get_ref().place().unwrap_or_else(|| section.span()),
+        Err(self.error_at(
+            &section
+                .get_ref()
+                .distribution_span()
+                .unwrap_or_else(|| section.span()),
             "time is never negative; correct the number, or give a `minimum`",
         ))
     }
@@ -114,14 +117,14 @@ impl Reader<'_> {
     fn amount(&self, section: &Spanned<Section>) -> Read<Amount> {
         let rule = self.rule_of(section, "[[amount]]", &["action", "fluent", "relative"])?;
         let fluent = section.get_ref().fluent.as_ref();
-        let fluent = fluent.ok_or_else(|| self.wrong(&section.span(), "`fluent` is missing"))?;
+        let fluent = fluent.ok_or_else(|| self.error_at(&section.span(), "`fluent` is missing"))?;
         let amount = Amount {
             action: self.action(section)?,
-            fluent: self.pattern(fluent, Names::Functions)?,
+            fluent: self.pattern(fluent, NameKind::Functions)?,
             rule,
         };
-        match changes::is_in_vain(&amount, self.problem) {
-            Some(message) => Err(self.wrong(&fluent.span(), message)),
+        match changes::ineffective_amount_reason(&amount, self.problem) {
+            Some(message) => Err(self.error_at(&fluent.span(), message)),
             None => Ok(amount),
         }
     }
@@ -130,14 +133,14 @@ impl Reader<'_> {
         if (0.0..=1.0).contains(value.get_ref()) {
             Ok(*value.get_ref())
         } else {
-            Err(self.wrong(&value.span(), "a probability lies between 0 and 1"))
+            Err(self.error_at(&value.span(), "a probability lies between 0 and 1"))
         }
     }
 
     /// Reads the distribution of a section, which must be the only one.
     fn rule(&self, section: &Spanned<Section>) -> Read<Rule> {
         let given = section.get_ref();
-        let mut found: Vec<Found> = Vec::new();
+        let mut found: Vec<ParsedDistribution> = Vec::new();
         let limit = |limit: &Option<Spanned<f64>>| {
             let limit = limit.as_ref();
             limit.map(|limit| (limit.span(), *limit.get_ref()))
@@ -166,32 +169,32 @@ impl Reader<'_> {
             if let Some(shape) = shape {
                 let distribution = self.distribution(name, shape)?;
                 let limits = shape.get_ref();
-                let minimum = self.once(limit(&limits.minimum), &beside.0)?;
-                let maximum = self.once(limit(&limits.maximum), &beside.1)?;
+                let minimum = self.merge_limits(limit(&limits.minimum), &beside.0)?;
+                let maximum = self.merge_limits(limit(&limits.maximum), &beside.1)?;
                 found.push((shape.span(), distribution, minimum, maximum));
             }
         }
         let Some((span, distribution, minimum, maximum)) = found.pop() else {
-            return Err(self.wrong(
+            return Err(self.error_at(
                 &section.span(),
                 "say how it is distributed: constant, normal, lognormal, uniform, triangular or values",
             ));
         };
         if !found.is_empty() {
-            return Err(self.wrong(&span, "one distribution is enough"));
+            return Err(self.error_at(&span, "one distribution is enough"));
         }
         if let Some(problem) = distribution.problem() {
-            return Err(self.wrong(&span, problem));
+            return Err(self.error_at(&span, problem));
         }
         for (span, limit) in minimum.iter().chain(&maximum) {
             if !limit.is_finite() {
-                return Err(self.wrong(span, "a limit must be finite; leave it out for none"));
+                return Err(self.error_at(span, "a limit must be finite; leave it out for none"));
             }
         }
         if let (Some((_, minimum)), Some((span, maximum))) = (&minimum, &maximum)
             && minimum > maximum
         {
-            return Err(self.wrong(span, "`maximum` must not be less than `minimum`"));
+            return Err(self.error_at(span, "`maximum` must not be less than `minimum`"));
         }
         Ok(Rule {
             distribution,
@@ -203,9 +206,9 @@ impl Reader<'_> {
 
     /// Returns the limit inside the braces or the one beside them. It is an error if there are
     /// both.
-    fn once(&self, inside: Limit, beside: &Limit) -> Read<Limit> {
+    fn merge_limits(&self, inside: Limit, beside: &Limit) -> Read<Limit> {
         match (inside, beside) {
-            (Some((span, _)), Some(_)) => Err(self.wrong(
+            (Some((span, _)), Some(_)) => Err(self.error_at(
                 &span,
                 "write this limit once: inside the braces, or beside them",
             )),
@@ -216,7 +219,9 @@ impl Reader<'_> {
     fn distribution(&self, name: &str, shape: &Spanned<Shape>) -> Read<Distribution> {
         let given = shape.get_ref();
         let need = |value: Option<f64>, what: &str| {
-            value.ok_or_else(|| self.wrong(&shape.span(), format!("`{what}` of {name} is missing")))
+            value.ok_or_else(|| {
+                self.error_at(&shape.span(), format!("`{what}` of {name} is missing"))
+            })
         };
         let excess = |wanted: &[&str]| {
             let all = [
@@ -231,7 +236,7 @@ impl Reader<'_> {
                 .find(|(name, value)| value.is_some() && !wanted.contains(name));
             match excess {
                 Some((what, _)) => {
-                    Err(self.wrong(&shape.span(), format!("{name} has no `{what}`")))
+                    Err(self.error_at(&shape.span(), format!("{name} has no `{what}`")))
                 }
                 None => Ok(()),
             }
@@ -267,42 +272,43 @@ impl Reader<'_> {
         })
     }
 
-    fn exogenous(&self, section: &Spanned<Section>) -> Read<Exogenous> {
+    fn exogenous(&self, section: &Spanned<Section>) -> Read<ExogenousEvent> {
         let given = section.get_ref();
         let own = ["fact", "fluent", "becomes", "probability", "reported"];
         let time = self.rule_of(section, "[[event]]", &own)?;
-        let time = self.not_negative(section, time)?;
+        let time = self.check_not_negative(section, time)?;
         let becomes = given.becomes.as_ref();
-        let becomes = becomes.ok_or_else(|| self.wrong(&section.span(), "`becomes` is missing"))?;
+        let becomes =
+            becomes.ok_or_else(|| self.error_at(&section.span(), "`becomes` is missing"))?;
         let value = match becomes.get_ref() {
-            toml::Value::Boolean(truth) => Becomes::Truth(*truth),
-            toml::Value::Integer(value) => Becomes::Value(Some(Rational::from(*value))),
-            toml::Value::Float(value) => Becomes::Value(Rational::from_f64_as_written(*value)),
+            toml::Value::Boolean(truth) => NewValue::Truth(*truth),
+            toml::Value::Integer(value) => NewValue::Value(Some(Rational::from(*value))),
+            toml::Value::Float(value) => NewValue::Value(Rational::from_f64_as_written(*value)),
             _ => {
                 let message = "write true or false for a fact, or a number for a fluent";
-                return Err(self.wrong(&becomes.span(), message));
+                return Err(self.error_at(&becomes.span(), message));
             }
         };
         let change = match (&given.fact, &given.fluent, value) {
-            (Some(fact), None, Becomes::Truth(truth)) => {
-                self.pattern(fact, Names::Predicates)?;
+            (Some(fact), None, NewValue::Truth(truth)) => {
+                self.pattern(fact, NameKind::Predicates)?;
                 ExogenousChange::Fact(self.ground(fact)?, truth)
             }
-            (None, Some(fluent), Becomes::Value(value)) => {
-                self.pattern(fluent, Names::Functions)?;
-                let value =
-                    value.ok_or_else(|| self.wrong(&becomes.span(), "the value must be finite"))?;
+            (None, Some(fluent), NewValue::Value(value)) => {
+                self.pattern(fluent, NameKind::Functions)?;
+                let value = value
+                    .ok_or_else(|| self.error_at(&becomes.span(), "the value must be finite"))?;
                 ExogenousChange::Value(self.ground(fluent)?, value)
             }
             _ => {
-                return Err(self.wrong(
+                return Err(self.error_at(
                     &section.span(),
                     "write `fact` with becomes = true or false, or `fluent` with a number",
                 ));
             }
         };
         let probability = given.probability.as_ref();
-        Ok(Exogenous {
+        Ok(ExogenousEvent {
             time,
             probability: probability.map_or(Ok(1.0), |value| self.probability(value))?,
             change,
@@ -320,7 +326,7 @@ impl Reader<'_> {
         };
         let words = name.trim_matches(['(', ')']).split_whitespace();
         if words.clone().any(|word| word == "_" || word == "*") {
-            return Err(self.wrong(
+            return Err(self.error_at(
                 &text.span(),
                 "name one fact or fluent, with all its objects",
             ));
@@ -328,30 +334,33 @@ impl Reader<'_> {
         Ok(format!("({})", words.collect::<Vec<_>>().join(" ")))
     }
 
-    fn reports(&self, section: &Spanned<Section>) -> Read<Reports> {
+    fn reports(&self, section: &Spanned<Section>) -> Read<ReportReliability> {
         let given = section.get_ref();
         let probability = |value: &Option<Spanned<f64>>| match value {
             Some(value) => self.probability(value),
             None => Ok(0.0),
         };
         let own = ["lost", "duplicated", "late", "contradicted"];
-        if let Some((span, message)) = given.excess("[reports]", &own, true) {
-            return Err(self.wrong(&span, message));
+        if let Some((span, message)) = given.first_superfluous_key("[reports]", &own, true) {
+            return Err(self.error_at(&span, message));
         }
         let late = probability(&given.late)?;
         let lateness = if late > 0.0 || given.is_distributed() {
             let lateness = self.rule(section)?;
-            self.not_negative(section, lateness)?
+            self.check_not_negative(section, lateness)?
         } else {
             Distribution::Constant(0.0).into()
         };
         if given.late.is_none() && given.is_distributed() {
-            return Err(self.wrong(
-                &section.get_ref().place().unwrap_or_else(|| section.span()),
+            return Err(self.error_at(
+                &section
+                    .get_ref()
+                    .distribution_span()
+                    .unwrap_or_else(|| section.span()),
                 "`late` is missing: how likely it is that a report comes so late",
             ));
         }
-        Ok(Reports {
+        Ok(ReportReliability {
             lost: probability(&given.lost)?,
             duplicated: probability(&given.duplicated)?,
             late,
@@ -362,7 +371,7 @@ impl Reader<'_> {
 }
 
 /// The new value of a fact or a fluent; the value is `None` if it is not finite.
-enum Becomes {
+enum NewValue {
     Truth(bool),
     Value(Option<Rational>),
 }

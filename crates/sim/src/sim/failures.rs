@@ -2,30 +2,30 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::{Event, Ticket};
+use elbowroom_execution::{ActionHandle, Event};
 use elbowroom_model::ground::{Action, Change};
 
-use super::{Coming, SimWorld};
-use crate::model::{Becoming, Outcome};
+use super::{ComingEvent, SimWorld};
+use crate::model::{FactOutcome, Outcome};
 
 impl SimWorld<'_> {
     /// Makes an action break down. It fails at once, or after the delay of its outcome.
-    pub(super) fn break_down(&mut self, ticket: Ticket) {
+    pub(super) fn break_down(&mut self, ticket: ActionHandle) {
         let Some(commanded) = self.actions.get_mut(&ticket) else {
             return;
         };
         commanded.is_broken = true;
         match commanded.outcome.map(|outcome| &outcome.delay) {
             Some(delay) if delay.is_positive() => {
-                self.put(&self.now + delay, Coming::Fail(ticket));
+                self.schedule(&self.now + delay, ComingEvent::Fail(ticket));
             }
-            _ => self.fail_at_last(ticket),
+            _ => self.fail_broken_action(ticket),
         }
     }
 
     /// Makes a broken action fail, undoes its start effects if the rule says so, and applies its
     /// outcome.
-    pub(super) fn fail_at_last(&mut self, ticket: Ticket) {
+    pub(super) fn fail_broken_action(&mut self, ticket: ActionHandle) {
         let Some(commanded) = self.actions.get(&ticket).cloned() else {
             return;
         };
@@ -36,12 +36,12 @@ impl SimWorld<'_> {
             "it did not start"
         };
         self.fail(ticket, why);
-        let failing = self.model.failing(&action.name);
+        let failing = self.model.failure_rule(&action.name);
         if commanded.has_started && failing.is_some_and(|failing| failing.is_undone) {
             self.undo_start(action);
         }
         if let Some(outcome) = commanded.outcome {
-            self.leave(outcome, action);
+            self.apply_outcome(outcome, action);
         }
     }
 
@@ -63,16 +63,16 @@ impl SimWorld<'_> {
                 Change::Delete(_) | Change::Update { .. } => continue,
             };
             self.truth.change_fact(fact, truth);
-            self.tell(Event::Fact { fact, truth });
+            self.report(Event::Fact { fact, truth });
         }
     }
 
-    fn leave(&mut self, outcome: &Outcome, action: &Action) {
+    fn apply_outcome(&mut self, outcome: &Outcome, action: &Action) {
         let task = Arc::clone(self.truth.task());
         for change in &outcome.changes {
-            let name = change.what.of(&action.name);
-            let event = match &change.becomes {
-                Becoming::Truth(truth) => {
+            let name = change.target.instantiate(&action.name);
+            let event = match &change.change {
+                FactOutcome::Truth(truth) => {
                     // Facts with objects of the wrong type do not exist and are ignored.
                     let Some(fact) = task.fact_named(&name) else {
                         continue;
@@ -81,11 +81,11 @@ impl SimWorld<'_> {
                     self.truth.change_fact(fact, truth);
                     Event::Fact { fact, truth }
                 }
-                Becoming::Value(number) | Becoming::Grown(number) => {
+                FactOutcome::Value(number) | FactOutcome::ChangedBy(number) => {
                     let Some(fluent) = task.fluent_named(&name) else {
                         continue;
                     };
-                    let value = if matches!(change.becomes, Becoming::Value(_)) {
+                    let value = if matches!(change.change, FactOutcome::Value(_)) {
                         number.clone()
                     } else if let Some(value) = self.truth.value(fluent) {
                         value + number
@@ -97,7 +97,7 @@ impl SimWorld<'_> {
                 }
             };
             if outcome.is_reported {
-                self.tell(event);
+                self.report(event);
             }
         }
     }

@@ -6,14 +6,14 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::Exp1;
 
-use super::{Coming, SimWorld};
+use super::{ComingEvent, SimWorld};
 use crate::draw::{Purpose, keyed, rounded};
 
 /// The moments at which a fact changes unless it already has that value: a Poisson process.
 /// Restricted to the moments at which the fact has the other value, it is memoryless as well, and
 /// independent of the executor's actions.
 #[derive(Clone, Debug)]
-pub(super) struct Chance {
+pub(super) struct PoissonProcess {
     fact: FactId,
     becomes: bool,
     /// Changes per second.
@@ -26,7 +26,7 @@ pub(super) struct Chance {
 
 impl SimWorld<'_> {
     /// Adds the first such moment of each fact from now on to the agenda.
-    pub(super) fn expose(&mut self) {
+    pub(super) fn schedule_spontaneous_changes(&mut self) {
         let task = self.truth.task().clone();
         for (name, hazard) in self.model.hazardous(task.problem()) {
             // The arguments have the right types, so the fact exists.
@@ -36,7 +36,7 @@ impl SimWorld<'_> {
             for becomes in [false, true] {
                 let rate = hazard.rate(becomes);
                 if rate > 0.0 {
-                    self.chances.push(Chance {
+                    self.spontaneous_changes.push(PoissonProcess {
                         fact,
                         becomes,
                         rate,
@@ -44,31 +44,31 @@ impl SimWorld<'_> {
                         at: self.now.to_f64(),
                         rng: keyed(self.seed, &name, u64::from(becomes), Purpose::Hazard),
                     });
-                    self.come_again(self.chances.len() - 1);
+                    self.schedule_next_change(self.spontaneous_changes.len() - 1);
                 }
             }
         }
     }
 
     /// Adds the next such moment to the agenda.
-    fn come_again(&mut self, index: usize) {
-        let chance = &mut self.chances[index];
+    fn schedule_next_change(&mut self, index: usize) {
+        let chance = &mut self.spontaneous_changes[index];
         let pause: f64 = chance.rng.sample(Exp1);
         chance.at += pause / chance.rate;
         let time = rounded(chance.at, &self.model.resolution);
-        self.put(time, Coming::Chance(index));
+        self.schedule(time, ComingEvent::SpontaneousChange(index));
     }
 
     /// Processes such a moment: changes the fact if it has the other value.
-    pub(super) fn take_chance(&mut self, index: usize) {
-        let chance = &self.chances[index];
+    pub(super) fn process_spontaneous_change(&mut self, index: usize) {
+        let chance = &self.spontaneous_changes[index];
         let (fact, truth, is_reported) = (chance.fact, chance.becomes, chance.is_reported);
         if self.truth.fact(fact) != truth {
             self.truth.change_fact(fact, truth);
             if is_reported {
-                self.tell(Event::Fact { fact, truth });
+                self.report(Event::Fact { fact, truth });
             }
         }
-        self.come_again(index);
+        self.schedule_next_change(index);
     }
 }

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::{Command, Ending, Event, Observation, Passage, World, WorldError};
+use elbowroom_execution::{Command, Ending, Event, Observation, TimeAdvance, World, WorldError};
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
 
-use super::{Coming, Commanded, SimWorld};
+use super::{ComingEvent, CommandedAction, SimWorld};
 use crate::draw::{Purpose, keyed};
 
 impl World for SimWorld<'_> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-        self.proceed(now, false);
+        self.advance(now, false);
         match command {
             Command::Start {
                 ticket,
@@ -23,7 +23,7 @@ impl World for SimWorld<'_> {
                 *count += 1;
                 self.actions.insert(
                     *ticket,
-                    Commanded {
+                    CommandedAction {
                         action: Arc::clone(action),
                         planned: duration.clone(),
                         occurrence,
@@ -35,20 +35,20 @@ impl World for SimWorld<'_> {
                 let mut rng = keyed(self.seed, &action.name, occurrence, Purpose::Delay);
                 let delay = self.model.delay(&action.name, &mut rng);
                 if delay.is_positive() {
-                    self.put(&self.now + delay, Coming::Start(*ticket));
+                    self.schedule(&self.now + delay, ComingEvent::Start(*ticket));
                 } else {
                     self.start(*ticket);
                 }
             }
             Command::Cancel { ticket } => {
                 // An action that has broken down ends when it fails, and not before.
-                let is_broken = |own: &Commanded<'_>| own.is_broken;
+                let is_broken = |own: &CommandedAction<'_>| own.is_broken;
                 if self.actions.get(ticket).is_some_and(is_broken) {
                     return Ok(());
                 }
                 if self.actions.remove(ticket).is_some() {
                     self.truth.stop(*ticket);
-                    self.tell(Event::Ended {
+                    self.report(Event::Ended {
                         ticket: *ticket,
                         ending: Ending::Cancelled,
                         measured: Vec::new(),
@@ -59,11 +59,11 @@ impl World for SimWorld<'_> {
         Ok(())
     }
 
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        self.proceed(until, true);
-        Ok(Passage {
+    fn wait(&mut self, until: &Rational) -> Result<TimeAdvance, WorldError> {
+        self.advance(until, true);
+        Ok(TimeAdvance {
             now: self.now.clone(),
-            observations: std::mem::take(&mut self.untold),
+            observations: std::mem::take(&mut self.unreported),
         })
     }
 

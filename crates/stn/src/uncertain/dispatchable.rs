@@ -5,7 +5,7 @@ use super::{Extended, Ground, LinkId, Step, UncertainNetwork};
 use crate::{Constraint, Network, NodeId, Weight};
 
 /// The limit on the steps in the explanation of an edge.
-const MOST_STEPS: usize = 1_000;
+const MAX_STEPS: usize = 1_000;
 
 /// Dynamically controllable network with all edges needed for its execution: each event has to be
 /// propagated to its neighbours only (Morris 2014; Hunsberger & Posenato, ICAART 2024, call it an
@@ -94,7 +94,7 @@ impl<W: Weight> Dispatchable<W> {
                 _ => {}
             }
         }
-        form.follow_at_once();
+        form.add_zero_bound_predecessors();
         for before in &mut form.before {
             before.sort_unstable();
             before.dedup();
@@ -105,8 +105,8 @@ impl<W: Weight> Dispatchable<W> {
     /// Makes nodes wait for nodes that are required to be earlier or simultaneous. A requirement
     /// with bound 0 does not fix the order of simultaneous events. Nodes that must be simultaneous
     /// do not wait for each other, but each of them waits for nodes that the world decides on.
-    fn follow_at_once(&mut self) {
-        let together = self.together();
+    fn add_zero_bound_predecessors(&mut self) {
+        let together = self.simultaneous_groups();
         let requirements = &self.network.requirements;
         // The requirements are the first edges.
         for (edge, constraint) in requirements.constraints().iter().enumerate() {
@@ -115,12 +115,12 @@ impl<W: Weight> Dispatchable<W> {
             if later == first
                 || constraint.bound != W::zero()
                 || self.network.is_contingent(later)
-                || (is_together && !self.is_up_to_the_world(first))
+                || (is_together && !self.is_uncontrolled(first))
             {
                 continue;
             }
             self.before[later.index()].push(first);
-            if !self.is_up_to_the_world(first) {
+            if !self.is_uncontrolled(first) {
                 self.not_after[later.index()].push((first, edge));
             }
         }
@@ -132,7 +132,7 @@ impl<W: Weight> Dispatchable<W> {
     }
 
     /// Returns `true` if the world can choose when a node happens.
-    fn is_up_to_the_world(&self, node: NodeId) -> bool {
+    fn is_uncontrolled(&self, node: NodeId) -> bool {
         let mut at = node;
         while let Some(link) = self.network.ending_at(at) {
             let link = self.network.link(link);
@@ -145,7 +145,7 @@ impl<W: Weight> Dispatchable<W> {
     }
 
     /// Returns a number for each node; nodes that have to happen at the same time share it.
-    fn together(&self) -> Vec<usize> {
+    fn simultaneous_groups(&self) -> Vec<usize> {
         let requirements = self.network.requirements.constraints().iter();
         let mut zero = Network::with_nodes(self.network.requirements.node_count());
         for constraint in requirements.filter(|constraint| constraint.bound == W::zero()) {
@@ -197,7 +197,7 @@ impl<W: Weight> Dispatchable<W> {
     ///
     /// Includes waits of nodes that the world decides on. No executor enforces these, but other
     /// waits are derived from them.
-    pub fn waits_found(&self) -> impl Iterator<Item = (NodeId, LinkId, Option<W>)> {
+    pub fn derived_waits(&self) -> impl Iterator<Item = (NodeId, LinkId, Option<W>)> {
         self.graph.edges.iter().filter_map(|edge| match edge.kind {
             Kind::Upper(link) if !matches!(edge.origin, Origin::Link(_)) => {
                 Some((edge.from, link, edge.bound.negated().into_finite()))
@@ -235,9 +235,9 @@ impl<W: Weight> Dispatchable<W> {
     }
 
     /// Returns the path that implies an edge, from its beginning to its end.
-    pub(super) fn behind(&self, edge: EdgeId) -> Vec<Step<W>> {
+    pub(super) fn implying_path(&self, edge: EdgeId) -> Vec<Step<W>> {
         let mut edges = Vec::new();
-        self.graph.spelt_out(edge, MOST_STEPS, &mut edges);
+        self.graph.expand(edge, MAX_STEPS, &mut edges);
         edges.into_iter().map(|id| self.graph.step(id)).collect()
     }
 

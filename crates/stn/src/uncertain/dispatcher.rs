@@ -1,6 +1,6 @@
 //! Execution of a dispatchable network.
 
-mod beyond;
+mod bound_violation;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use elbowroom_num::Rational;
 
 use super::graph::EdgeId;
 use super::{Dispatchable, LinkId, Step};
-use crate::{NodeId, Weight, WindowEnd, spend_step};
+use crate::{NodeId, Weight, WindowEnd, count_step};
 
 /// Executes a [`Dispatchable`] network by the rules of RTE* (Hunsberger & Posenato, ICAART 2024):
 ///
@@ -40,7 +40,7 @@ pub struct Dispatcher<W = Rational> {
     ready: BTreeSet<NodeId>,
     /// Running links that may end later than their upper bound, each with its latest end; `None` if
     /// it has none.
-    prolonged: Vec<(LinkId, Option<W>)>,
+    extended_links: Vec<(LinkId, Option<W>)>,
 }
 
 #[derive(Clone, Debug)]
@@ -61,9 +61,9 @@ pub struct Missed<W = Rational> {
     /// Limit that this end of the window set.
     pub limit: W,
     /// Amount of the violation; positive.
-    pub by: W,
+    pub amount: W,
     /// Path that implies that end, from the event that it is relative to.
-    pub behind: Vec<Step<W>>,
+    pub implying_path: Vec<Step<W>>,
     /// `true` if the time violates only the bounds of the link that ends at the node, and no other
     /// constraint. The remaining network may then still be executable: see [`Dispatcher::bears`].
     pub is_only_link: bool,
@@ -96,7 +96,7 @@ impl<W: Weight> Dispatcher<W> {
             waits: vec![Vec::new(); count],
             waiting_for: vec![Vec::new(); form.network().links().len()],
             ready,
-            prolonged: Vec::new(),
+            extended_links: Vec::new(),
             form,
         }
     }
@@ -107,7 +107,7 @@ impl<W: Weight> Dispatcher<W> {
     }
 
     /// Returns the time at which a node happened.
-    pub fn happened(&self, node: NodeId) -> Option<&W> {
+    pub fn event_time(&self, node: NodeId) -> Option<&W> {
         self.happened[node.index()].as_ref()
     }
 
@@ -167,7 +167,7 @@ impl<W: Weight> Dispatcher<W> {
 
     /// Returns the path that implies the earliest, or the latest, time of a node, from the event
     /// that it is relative to.
-    pub fn behind(&self, node: NodeId, end: WindowEnd) -> Vec<Step<W>> {
+    pub fn implying_path(&self, node: NodeId, end: WindowEnd) -> Vec<Step<W>> {
         let window = &self.windows[node.index()][end as usize];
         let mut last = window.as_ref().map(|(time, edge)| (time, *edge));
         if end == WindowEnd::Earliest {
@@ -177,13 +177,13 @@ impl<W: Weight> Dispatcher<W> {
                     _ => true,
                 };
                 if is_later {
-                    let steps = self.form.behind(wait.edge);
+                    let steps = self.form.implying_path(wait.edge);
                     return steps;
                 }
             }
         }
         last.take()
-            .map(|(_, edge)| self.form.behind(edge))
+            .map(|(_, edge)| self.form.implying_path(edge))
             .unwrap_or_default()
     }
 
@@ -192,8 +192,8 @@ impl<W: Weight> Dispatcher<W> {
     ///
     /// # Errors
     /// If that is outside its window.
-    pub fn happen(&mut self, node: NodeId, time: &W) -> Result<(), Missed<W>> {
-        let missed = self.missed(node, time);
+    pub fn record(&mut self, node: NodeId, time: &W) -> Result<(), Missed<W>> {
+        let missed = self.violation(node, time);
         if self.happened[node.index()].replace(time.clone()).is_some() {
             return missed.map_or(Ok(()), Err);
         }
@@ -225,7 +225,7 @@ impl<W: Weight> Dispatcher<W> {
             }
         }
         if let Some(link) = form.network().ending_at(node) {
-            self.prolonged.retain(|(other, _)| *other != link);
+            self.extended_links.retain(|(other, _)| *other != link);
             for waiting in std::mem::take(&mut self.waiting_for[link.index()]) {
                 self.waits[waiting.index()].retain(|wait| wait.link != link);
             }
@@ -238,7 +238,7 @@ impl<W: Weight> Dispatcher<W> {
         let form = Arc::clone(&self.form);
         let mut limited = vec![(node, edge)];
         while let Some((node, edge)) = limited.pop() {
-            spend_step();
+            count_step();
             if self.happened[node.index()].is_some() {
                 continue;
             }
@@ -257,14 +257,14 @@ impl<W: Weight> Dispatcher<W> {
         }
     }
 
-    fn missed(&self, node: NodeId, time: &W) -> Option<Missed<W>> {
+    fn violation(&self, node: NodeId, time: &W) -> Option<Missed<W>> {
         let (earliest, latest) = self.bounds(node);
         let missed = |end, limit: &W, by: W| Missed {
             node,
             end,
             limit: limit.clone(),
-            by,
-            behind: self.behind(node, end),
+            amount: by,
+            implying_path: self.implying_path(node, end),
             is_only_link: self.permits(node, time),
         };
         if let Some(earliest) = earliest.filter(|earliest| time < earliest) {
@@ -280,9 +280,9 @@ impl<W: Weight> Dispatcher<W> {
         let (mut earliest, mut latest) = (earliest.cloned(), latest.cloned());
         if let Some(id) = self.form.network().ending_at(node) {
             let link = self.form.network().link(id);
-            if let Some(begun) = self.happened(link.activation) {
+            if let Some(begun) = self.event_time(link.activation) {
                 let least = begun.plus(&link.lower);
-                let most = self.last_end(id, begun);
+                let most = self.latest_end(id, begun);
                 earliest = earliest.into_iter().chain([least]).max();
                 latest = latest.into_iter().chain(most).min();
             }

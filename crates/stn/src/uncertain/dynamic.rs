@@ -35,13 +35,13 @@ use std::ops::ControlFlow;
 use super::conflict::Conflict;
 use super::dispatchable::Dispatchable;
 use super::extended::Extended;
-use super::graph::{Edge, EdgeId, Graph, Kind, Origin, Way, WayId};
+use super::graph::{Edge, EdgeId, Graph, Kind, Origin, Path, PathId};
 use super::{LinkId, UncertainNetwork};
-use crate::few::Few;
-use crate::{NodeId, Weight, spend_step};
+use crate::small_map::SmallMap;
+use crate::{NodeId, Weight, count_step};
 
 /// The limit on the steps of a conflict.
-const MOST_STEPS: usize = 10_000;
+const MAX_STEPS: usize = 10_000;
 
 impl<W: Weight> UncertainNetwork<W> {
     /// Returns the network's dispatchable form with all edges found, if it is dynamically
@@ -94,7 +94,7 @@ impl<W: Weight> UncertainNetwork<W> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {
     New,
-    Underway,
+    InProgress,
     Done,
 }
 
@@ -114,7 +114,7 @@ pub(super) struct Search<'a, W> {
 
 /// Callback for cycles: receives the place where a cycle closes and its ways in order, and returns
 /// whether the search continues.
-type OnCycle<'a, W> = dyn FnMut(&Graph<W>, Closed, &[WayId]) -> ControlFlow<()> + 'a;
+type OnCycle<'a, W> = dyn FnMut(&Graph<W>, ClosedCycle, &[PathId]) -> ControlFlow<()> + 'a;
 
 /// Negative node being processed.
 struct Frame<W> {
@@ -126,8 +126,8 @@ struct Frame<W> {
     /// Plain edges that waits have turned into.
     plain: Vec<EdgeId>,
     /// `true` once the plain edges are being followed.
-    is_last: bool,
-    reached: Few<NodeId, Reached<W>>,
+    is_plain_pass: bool,
+    reached: SmallMap<NodeId, Reached<W>>,
     /// Edges that close a cycle at the node in this pass, other than that of the shortest one. The
     /// newest edges, which may contain the others, are processed first.
     others: BTreeSet<EdgeId>,
@@ -148,7 +148,7 @@ impl<W: Weight> Frame<W> {
 
 /// Place where the ways of the current frames close a cycle.
 #[derive(Clone, Copy)]
-pub(super) enum Closed {
+pub(super) enum ClosedCycle {
     /// At a node that is being processed, by the shortest way to it.
     At(NodeId),
     /// At the node of the last frame, by a longer way that begins with this edge.
@@ -161,7 +161,7 @@ struct Reached<W> {
     /// Its first edge.
     edge: EdgeId,
     /// The way, once it is known to be the shortest.
-    way: Option<WayId>,
+    path: Option<PathId>,
 }
 
 impl<'a, W: Weight> Search<'a, W> {
@@ -184,8 +184,8 @@ impl<'a, W: Weight> Search<'a, W> {
 
     /// Processes a node, and the nodes that have to be processed before it.
     pub(super) fn settle(&mut self, node: NodeId) -> Result<(), Conflict<W>> {
-        self.begin(node);
-        match self.go_on() {
+        self.push_frame(node);
+        match self.run() {
             None => Ok(()),
             Some(closed) => Err(self.conflict(closed)),
         }
@@ -200,8 +200,8 @@ impl<'a, W: Weight> Search<'a, W> {
         node: NodeId,
         on_cycle: &mut OnCycle<'_, W>,
     ) -> ControlFlow<()> {
-        self.begin(node);
-        while let Some(closed) = self.go_on() {
+        self.push_frame(node);
+        while let Some(closed) = self.run() {
             let cycle = self.cycle(closed);
             on_cycle(self.graph, closed, &cycle)?;
         }
@@ -210,11 +210,11 @@ impl<'a, W: Weight> Search<'a, W> {
 
     /// Processes all frames until a cycle closes, and returns its place. The next call continues
     /// without that cycle.
-    fn go_on(&mut self) -> Option<Closed> {
+    fn run(&mut self) -> Option<ClosedCycle> {
         while let Some(frame) = self.frames.last_mut() {
             let Some(Reverse((distance, node))) = frame.queue.pop() else {
                 if let Some(edge) = frame.others.pop_last() {
-                    return Some(Closed::By(edge));
+                    return Some(ClosedCycle::By(edge));
                 }
                 if !self.next_pass() {
                     let done = self.frames.pop().expect("the last frame is there");
@@ -224,23 +224,23 @@ impl<'a, W: Weight> Search<'a, W> {
                 continue;
             };
             let reached = frame.reached.get_mut(node).expect("queued when reached");
-            if reached.distance < distance || reached.way.is_some() {
+            if reached.distance < distance || reached.path.is_some() {
                 continue;
             }
             if !distance.is_negative() {
-                self.keep(node);
+                self.record_edge(node);
                 continue;
             }
             match self.stage[node.index()] {
-                Stage::Underway => return Some(Closed::At(node)),
+                Stage::InProgress => return Some(ClosedCycle::At(node)),
                 Stage::New => {
                     // This node is continued when that node has been processed.
                     frame.queue.push(Reverse((distance, node)));
-                    self.begin(node);
+                    self.push_frame(node);
                 }
                 Stage::Done => {
                     frame.region.push(node);
-                    if self.keep(node) {
+                    if self.record_edge(node) {
                         self.extend(node);
                     }
                 }
@@ -249,7 +249,7 @@ impl<'a, W: Weight> Search<'a, W> {
         None
     }
 
-    fn begin(&mut self, node: NodeId) {
+    fn push_frame(&mut self, node: NodeId) {
         let index = node.index();
         if self.stage[index] != Stage::New {
             return;
@@ -259,14 +259,14 @@ impl<'a, W: Weight> Search<'a, W> {
             self.stage[index] = Stage::Done;
             return;
         }
-        self.stage[index] = Stage::Underway;
+        self.stage[index] = Stage::InProgress;
         self.frames.push(Frame {
             node,
             upper,
             label: None,
             plain: Vec::new(),
-            is_last: false,
-            reached: Few::default(),
+            is_plain_pass: false,
+            reached: SmallMap::default(),
             others: BTreeSet::new(),
             region: Vec::new(),
             queue: BinaryHeap::new(),
@@ -279,7 +279,7 @@ impl<'a, W: Weight> Search<'a, W> {
         let Some(frame) = self.frames.last_mut() else {
             return false;
         };
-        if frame.is_last {
+        if frame.is_plain_pass {
             return false;
         }
         frame.reached.clear();
@@ -291,7 +291,7 @@ impl<'a, W: Weight> Search<'a, W> {
             vec![edge]
         } else {
             frame.label = None;
-            frame.is_last = true;
+            frame.is_plain_pass = true;
             let mut first = self.graph.negative_into[frame.node.index()].clone();
             first.append(&mut frame.plain);
             first
@@ -326,7 +326,7 @@ impl<'a, W: Weight> Search<'a, W> {
         let reached = Reached {
             distance,
             edge,
-            way: None,
+            path: None,
         };
         frame.reached.insert(from, reached);
     }
@@ -334,20 +334,20 @@ impl<'a, W: Weight> Search<'a, W> {
     /// Records the shortest way from a node to the last frame's node as an edge. Returns `false` if
     /// the way need not be extended in its current form: a wait that is redundant, or that has
     /// become a plain edge.
-    fn keep(&mut self, node: NodeId) -> bool {
-        let way = self.way(node);
+    fn record_edge(&mut self, node: NodeId) -> bool {
+        let way = self.shortest_path(node);
         let links = self.links;
         let Some(frame) = self.frames.last_mut() else {
             return false;
         };
         let distance = frame.distance(node);
-        let is_one_edge = self.graph.ways[way].rest().is_none();
+        let is_one_edge = self.graph.paths[way].rest().is_none();
         let edge = |kind| Edge {
             from: node,
             to: frame.node,
             bound: distance.clone(),
             kind,
-            origin: Origin::Way(way),
+            origin: Origin::Path(way),
         };
         match frame.label {
             // The node comes after the link's end anyway.
@@ -396,31 +396,31 @@ impl<'a, W: Weight> Search<'a, W> {
     }
 
     /// Returns the shortest way from a node to the last frame's node, and fixes it.
-    fn way(&mut self, node: NodeId) -> WayId {
-        let way = self.way_to(self.frames.len() - 1, node);
+    fn shortest_path(&mut self, node: NodeId) -> PathId {
+        let way = self.path_to(self.frames.len() - 1, node);
         let frame = self.frames.last_mut();
         if let Some(reached) = frame.and_then(|frame| frame.reached.get_mut(node)) {
-            reached.way = Some(way);
+            reached.path = Some(way);
         }
         way
     }
 
     /// Returns the shortest known way from a node to that frame's node.
-    fn way_to(&mut self, frame: usize, node: NodeId) -> WayId {
+    fn path_to(&mut self, frame: usize, node: NodeId) -> PathId {
         let edge = self.frames[frame].at(node).edge;
-        self.way_by(frame, edge)
+        self.path_by_edge(frame, edge)
     }
 
     /// Returns the shortest known way to that frame's node that begins with this edge.
-    fn way_by(&mut self, frame: usize, edge: EdgeId) -> WayId {
+    fn path_by_edge(&mut self, frame: usize, edge: EdgeId) -> PathId {
         let frame = &self.frames[frame];
         let next = self.graph.edges[edge].to;
         let rest = match frame.reached.get(next) {
-            Some(reached) if next != frame.node => reached.way,
+            Some(reached) if next != frame.node => reached.path,
             _ => None,
         };
-        self.graph.ways.push(Way::new(edge, rest));
-        self.graph.ways.len() - 1
+        self.graph.paths.push(Path::new(edge, rest));
+        self.graph.paths.len() - 1
     }
 
     /// Follows the edges that end at a node.
@@ -443,30 +443,30 @@ impl<'a, W: Weight> Search<'a, W> {
 
     /// Returns the cycle that closes there: the ways from that place to the last frame's node, and
     /// from each frame's node to the previous one, back to that place.
-    fn cycle(&mut self, closed: Closed) -> Vec<WayId> {
+    fn cycle(&mut self, closed: ClosedCycle) -> Vec<PathId> {
         let node = match closed {
-            Closed::At(node) => node,
-            Closed::By(edge) => {
-                return vec![self.way_by(self.frames.len() - 1, edge)];
+            ClosedCycle::At(node) => node,
+            ClosedCycle::By(edge) => {
+                return vec![self.path_by_edge(self.frames.len() - 1, edge)];
             }
         };
-        let first = self.first_of(node);
+        let first = self.frame_index(node);
         let mut from = node;
         let ways = (first..self.frames.len()).rev().map(|index| {
-            let way = self.way_to(index, from);
+            let way = self.path_to(index, from);
             from = self.frames[index].node;
             way
         });
         ways.collect()
     }
 
-    fn first_of(&self, node: NodeId) -> usize {
+    fn frame_index(&self, node: NodeId) -> usize {
         let first = self.frames.iter().position(|frame| frame.node == node);
         first.expect("an active node has a frame")
     }
 
     /// Returns the conflict that closes there, step by step.
-    fn conflict(&mut self, closed: Closed) -> Conflict<W> {
+    fn conflict(&mut self, closed: ClosedCycle) -> Conflict<W> {
         let mut total = Extended::zero();
         let mut steps = Vec::new();
         let mut is_whole = true;
@@ -474,14 +474,14 @@ impl<'a, W: Weight> Search<'a, W> {
             let mut edges = Vec::new();
             let mut next = Some(way);
             while let Some(way) = next {
-                spend_step();
-                let edge = self.graph.ways[way].edge();
+                count_step();
+                let edge = self.graph.paths[way].edge();
                 total = total.plus(&self.graph.edges[edge].bound);
-                is_whole &= self.graph.spelt_out(edge, MOST_STEPS, &mut edges);
-                next = self.graph.ways[way].rest();
+                is_whole &= self.graph.expand(edge, MAX_STEPS, &mut edges);
+                next = self.graph.paths[way].rest();
             }
             for edge in edges {
-                if steps.len() < MOST_STEPS {
+                if steps.len() < MAX_STEPS {
                     steps.push(self.graph.step(edge));
                 } else {
                     is_whole = false;

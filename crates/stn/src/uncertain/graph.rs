@@ -6,7 +6,7 @@ use super::conflict::{Ground, Step};
 use super::extended::Extended;
 use super::order::Order;
 use super::{LinkId, UncertainNetwork};
-use crate::{ConstraintId, NodeId, Weight, spend_step};
+use crate::{ConstraintId, NodeId, Weight, count_step};
 
 /// Identifier of an edge: its position in [`Graph::edges`].
 pub(super) type EdgeId = usize;
@@ -38,29 +38,29 @@ pub(super) enum Origin {
     Requirement(ConstraintId),
     Link(LinkId),
     /// Derived from a way.
-    Way(WayId),
+    Path(PathId),
 }
 
 /// Redundant edges are detected if the search has found more than `FEW` times the network's own
 /// edges, or if the network has at most `SMALL` edges.
-const FEW: usize = 2;
-const SMALL: usize = 100;
+const REDUNDANCY_FACTOR: usize = 2;
+const SMALL_GRAPH: usize = 100;
 
 /// Identifier of a way: its position in [`Graph::ways`].
-pub(super) type WayId = usize;
+pub(super) type PathId = usize;
 
 /// An edge, and the way that follows it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
+pub(super) struct Path {
     edge: u32,
     /// One more than the identifier of the way.
     rest: Option<NonZero<u32>>,
 }
 
-impl Way {
+impl Path {
     /// Creates a way from an edge and the way that follows it. Numbers are stored in 32 bits,
     /// because a network may have millions of ways.
-    pub(super) fn new(edge: EdgeId, rest: Option<WayId>) -> Self {
+    pub(super) fn new(edge: EdgeId, rest: Option<PathId>) -> Self {
         let short = |number: usize| u32::try_from(number).expect("fewer than 2^32 ways");
         Self {
             edge: short(edge),
@@ -72,7 +72,7 @@ impl Way {
         self.edge as usize
     }
 
-    pub(super) fn rest(self) -> Option<WayId> {
+    pub(super) fn rest(self) -> Option<PathId> {
         self.rest.map(|way| way.get() as usize - 1)
     }
 }
@@ -81,7 +81,7 @@ impl Way {
 #[derive(Clone, Debug)]
 pub(super) struct Graph<W> {
     pub(super) edges: Vec<Edge<W>>,
-    pub(super) ways: Vec<Way>,
+    pub(super) paths: Vec<Path>,
     /// For each node, the edges that end there and are not negative, except upper-case ones: those
     /// of the network, then those found.
     pub(super) positive_into: Vec<Vec<EdgeId>>,
@@ -97,7 +97,7 @@ pub(super) struct Graph<W> {
     /// `true` if redundant edges are kept as well.
     pub(super) is_full: bool,
     /// The number of the network's own edges: two for each link, after those of the requirements.
-    pub(super) given: usize,
+    pub(super) given_edges: usize,
 }
 
 impl<W: Weight> Graph<W> {
@@ -105,14 +105,14 @@ impl<W: Weight> Graph<W> {
         let count = network.requirements.node_count();
         let mut graph = Self {
             edges: Vec::with_capacity(network.requirements.constraints().len()),
-            ways: Vec::new(),
+            paths: Vec::new(),
             positive_into: vec![Vec::new(); count],
             negative_into: vec![Vec::new(); count],
             upper_into: vec![Vec::new(); count],
             earlier: vec![Vec::new(); count],
             order: None,
             is_full: false,
-            given: 0,
+            given_edges: 0,
         };
         for id in network.requirements.constraint_ids() {
             let constraint = network.requirements.constraint(id);
@@ -157,13 +157,13 @@ impl<W: Weight> Graph<W> {
                 origin: Origin::Link(id),
             });
         }
-        graph.given = graph.edges.len();
+        graph.given_edges = graph.edges.len();
         graph
     }
 
     /// Returns the lower-case and the upper-case edge of a link.
     pub(super) fn edges_of(&self, network: &UncertainNetwork<W>, link: LinkId) -> [EdgeId; 2] {
-        let first = self.given - 2 * (network.links.len() - link.index());
+        let first = self.given_edges - 2 * (network.links.len() - link.index());
         [first, first + 1]
     }
 
@@ -179,14 +179,14 @@ impl<W: Weight> Graph<W> {
         });
         Graph {
             edges: edges.collect(),
-            ways: self.ways,
+            paths: self.paths,
             positive_into: Vec::new(),
             negative_into: Vec::new(),
             upper_into: Vec::new(),
             earlier: Vec::new(),
             order: None,
             is_full: self.is_full,
-            given: self.given,
+            given_edges: self.given_edges,
         }
     }
 
@@ -205,7 +205,8 @@ impl<W: Weight> Graph<W> {
     /// Returns `true` if a node comes after another in every execution. Always `false` while the
     /// search has found few edges in a large network, because the computation would not pay off.
     pub(super) fn is_after(&mut self, later: NodeId, first: NodeId) -> bool {
-        let is_little = self.given > SMALL && self.edges.len() <= FEW * self.given;
+        let is_little = self.given_edges > SMALL_GRAPH
+            && self.edges.len() <= REDUNDANCY_FACTOR * self.given_edges;
         if self.is_full || is_little {
             return false;
         }
@@ -217,10 +218,10 @@ impl<W: Weight> Graph<W> {
     /// at most `most`.
     ///
     /// Returns `true` if these are all.
-    pub(super) fn spelt_out(&self, edge: EdgeId, most: usize, into: &mut Vec<EdgeId>) -> bool {
+    pub(super) fn expand(&self, edge: EdgeId, most: usize, into: &mut Vec<EdgeId>) -> bool {
         let mut stack = vec![edge];
         while let Some(id) = stack.pop() {
-            let Origin::Way(way) = self.edges[id].origin else {
+            let Origin::Path(way) = self.edges[id].origin else {
                 if into.len() >= most {
                     return false;
                 }
@@ -230,9 +231,9 @@ impl<W: Weight> Graph<W> {
             let mut along = Vec::new();
             let mut next = Some(way);
             while let Some(way) = next {
-                spend_step();
-                along.push(self.ways[way].edge());
-                next = self.ways[way].rest();
+                count_step();
+                along.push(self.paths[way].edge());
+                next = self.paths[way].rest();
             }
             stack.extend(along.into_iter().rev());
         }
@@ -246,7 +247,7 @@ impl<W: Weight> Graph<W> {
             (_, Origin::Requirement(id)) => Ground::Requirement(id),
             (Kind::Lower(link), _) => Ground::Early(link),
             (Kind::Upper(link), _) | (_, Origin::Link(link)) => Ground::Late(link),
-            (_, Origin::Way(_)) => unreachable!("ways are spelt out"),
+            (_, Origin::Path(_)) => unreachable!("ways are spelt out"),
         };
         Step {
             from: edge.from,

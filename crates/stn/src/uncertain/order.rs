@@ -3,7 +3,7 @@
 use crate::NodeId;
 
 /// Limit on chains: each takes one number per node.
-const MOST_CHAINS: usize = 64;
+const MAX_CHAINS: usize = 64;
 
 /// Order of nodes: chains of nodes that follow each other, and for each node the last node of each
 /// chain that precedes it.
@@ -14,7 +14,7 @@ pub(super) struct Order {
     /// For each node, its chain and its position there, from 1.
     places: Vec<Option<(usize, u32)>>,
     /// For each node and chain, the last position that precedes it, or its own; 0 for none.
-    latest: Vec<[u32; MOST_CHAINS]>,
+    latest: Vec<[u32; MAX_CHAINS]>,
 }
 
 impl Order {
@@ -30,7 +30,7 @@ impl Order {
         let mut missing: Vec<usize> = earlier.iter().map(Vec::len).collect();
         let mut order = Self {
             places: vec![None; count],
-            latest: vec![[0; MOST_CHAINS]; count],
+            latest: vec![[0; MAX_CHAINS]; count],
         };
         let mut lengths: Vec<u32> = Vec::new();
         let mut ready: Vec<usize> = (0..count).filter(|&node| missing[node] == 0).collect();
@@ -57,7 +57,7 @@ impl Order {
         later: &[Vec<usize>],
         lengths: &mut Vec<u32>,
     ) {
-        let mut latest = [0; MOST_CHAINS];
+        let mut latest = [0; MAX_CHAINS];
         for first in before {
             for (own, theirs) in latest.iter_mut().zip(&self.latest[first.index()]) {
                 *own = (*own).max(*theirs);
@@ -75,9 +75,9 @@ impl Order {
         let chain = direct.min().map(|(_, chain)| chain).or_else(any);
         let chain = chain.or_else(|| {
             lengths.push(0);
-            Some(lengths.len() - 1).filter(|&chain| chain < MOST_CHAINS)
+            Some(lengths.len() - 1).filter(|&chain| chain < MAX_CHAINS)
         });
-        lengths.truncate(MOST_CHAINS);
+        lengths.truncate(MAX_CHAINS);
         if let Some(chain) = chain {
             lengths[chain] += 1;
             latest[chain] = lengths[chain];
@@ -102,7 +102,7 @@ mod tests {
     proptest! {
         /// Each node comes after some nodes with smaller numbers, or, with cycles, after any nodes.
         #[test]
-        fn what_is_known_is_so_and_in_narrow_orders_all_is_known(
+        fn known_order_is_correct_and_complete_for_narrow_orders(
             edges in prop::collection::vec((0..40_usize, 0..40_usize), 0..80),
             has_circles in any::<bool>(),
         ) {

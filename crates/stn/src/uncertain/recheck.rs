@@ -7,7 +7,7 @@ use super::{Conflict, LinkId, UncertainNetwork};
 use crate::{NodeId, Weight};
 
 /// Limit on unused results of earlier searches, as a multiple of one search's results.
-const MOST_LEFTOVERS: usize = 4;
+const MAX_LEFTOVERS: usize = 4;
 
 /// Dynamically controllable network that supports changes of link bounds, one link at a time.
 ///
@@ -27,7 +27,7 @@ pub struct Recheck<W> {
 }
 
 /// The earlier result for a node that is processed again.
-struct Before {
+struct EarlierResult {
     node: NodeId,
     found: Vec<EdgeId>,
     region: Vec<NodeId>,
@@ -47,7 +47,7 @@ impl<W: Weight> Recheck<W> {
         }
         let regions = search.regions;
         Ok(Self {
-            fresh: graph.edges.len() + graph.ways.len(),
+            fresh: graph.edges.len() + graph.paths.len(),
             network,
             graph,
             regions,
@@ -83,13 +83,13 @@ impl<W: Weight> Recheck<W> {
         let mut first = vec![link.activation];
         if lower != link.lower {
             // Ways through the link's end may continue along its lower-case edge.
-            first.extend(self.nodes_by_way_of(link.end));
+            first.extend(self.nodes_through(link.end));
         }
         let dirty = self.depending_on(first);
         let old = (link.lower, link.upper);
         self.set(id, lower, upper);
-        let sizes = (self.graph.edges.len(), self.graph.ways.len());
-        let before = self.forget(&dirty);
+        let sizes = (self.graph.edges.len(), self.graph.paths.len());
+        let before = self.reset_nodes(&dirty);
 
         let mut search = Search::new(&self.network, &mut self.graph, false);
         search.stage.fill(Stage::Done);
@@ -100,8 +100,8 @@ impl<W: Weight> Recheck<W> {
         let mut regions = search.regions;
         if let Err(conflict) = found {
             self.graph.edges.truncate(sizes.0);
-            self.graph.ways.truncate(sizes.1);
-            for Before {
+            self.graph.paths.truncate(sizes.1);
+            for EarlierResult {
                 node,
                 found,
                 region,
@@ -118,7 +118,7 @@ impl<W: Weight> Recheck<W> {
         for node in dirty {
             self.regions[node.index()] = std::mem::take(&mut regions[node.index()]);
         }
-        if self.graph.edges.len() + self.graph.ways.len() > MOST_LEFTOVERS * self.fresh {
+        if self.graph.edges.len() + self.graph.paths.len() > MAX_LEFTOVERS * self.fresh {
             *self = Self::new(self.network.clone())?;
         }
         Ok(())
@@ -134,8 +134,8 @@ impl<W: Weight> Recheck<W> {
     }
 
     /// Removes the edges found for these nodes, and returns them.
-    fn forget(&mut self, nodes: &[NodeId]) -> Vec<Before> {
-        let before = nodes.iter().map(|&node| Before {
+    fn reset_nodes(&mut self, nodes: &[NodeId]) -> Vec<EarlierResult> {
+        let before = nodes.iter().map(|&node| EarlierResult {
             node,
             found: self.graph.positive_into[node.index()].split_off(self.given[node.index()]),
             region: std::mem::take(&mut self.regions[node.index()]),
@@ -144,7 +144,7 @@ impl<W: Weight> Recheck<W> {
     }
 
     /// Returns the nodes to which negative ways lead through `node`.
-    fn nodes_by_way_of(&self, node: NodeId) -> impl Iterator<Item = NodeId> + '_ {
+    fn nodes_through(&self, node: NodeId) -> impl Iterator<Item = NodeId> + '_ {
         let nodes = self.network.requirements.nodes();
         nodes.filter(move |other| self.regions[other.index()].contains(&node))
     }

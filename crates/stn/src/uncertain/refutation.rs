@@ -3,21 +3,21 @@
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
-use super::dynamic::{Closed, Search};
-use super::graph::{EdgeId, Graph, Kind, Origin, WayId};
+use super::dynamic::{ClosedCycle, Search};
+use super::graph::{EdgeId, Graph, Kind, Origin, PathId};
 use super::{Ground, LinkId, UncertainNetwork};
 use crate::{ConstraintId, Weight};
 
 /// Limit on the parts of a refutation, or one for each node if the network has more nodes. Shared
 /// parts are written out at each occurrence.
-const MOST_PARTS: usize = 10_000;
+const MAX_PARTS: usize = 10_000;
 
 /// The limit on the parts of all refutations of a network, for each of its nodes.
-const MOST_PARTS_A_NODE: usize = 8;
+const MAX_PARTS_PER_NODE: usize = 8;
 
 /// Limit on the nesting of ways. Derivations along a long plan can be nested as deeply as the plan
 /// is long.
-const MOST_DEPTH: usize = 200;
+const MAX_DEPTH: usize = 200;
 
 /// One part of a way through the graph of a network, from its beginning to its end.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,12 +30,12 @@ pub enum Part {
     /// The upper-case edge of a link, from end to activation: minus its upper bound.
     Late(LinkId),
     /// A way that counts as one edge.
-    Way(Way),
+    Path(RefutationPath),
 }
 
 /// Sequence of parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Way {
+pub struct RefutationPath {
     /// The parts; each begins where the previous one ends.
     pub parts: Vec<Part>,
     /// If present, the way is a wait for the end of that link, used as an edge that always holds,
@@ -53,7 +53,7 @@ pub struct Way {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refutation {
     /// The cycle; each way begins where the previous one ends.
-    pub cycle: Vec<Way>,
+    pub cycle: Vec<RefutationPath>,
     /// `true` if the ways are nested so deeply that only their steps are given, as one way. With
     /// other bounds such a refutation proves something only if it contains no link both as
     /// [`Part::Early`] and as [`Part::Late`]. The steps are then a cycle of bounds, and if they add
@@ -67,7 +67,7 @@ pub enum Refuted {
     /// The network is dynamically controllable.
     No,
     /// It is not, and each of these is a proof.
-    Because(Vec<Refutation>),
+    Refutations(Vec<Refutation>),
     /// It is not, but all proofs found are too long.
     TooLong,
 }
@@ -83,34 +83,37 @@ impl<W: Weight> UncertainNetwork<W> {
         let mut found = Vec::new();
         let mut is_refuted = false;
         let node_count = self.requirements.node_count();
-        let most_parts = MOST_PARTS.max(MOST_PARTS_A_NODE * node_count);
+        let most_parts = MAX_PARTS.max(MAX_PARTS_PER_NODE * node_count);
         let mut all_parts = 0;
-        let mut told = Told {
+        let mut told = UsedEdges {
             edges: BTreeSet::new(),
-            most: MOST_PARTS.max(node_count),
+            most: MAX_PARTS.max(node_count),
         };
-        let mut on_cycle = |graph: &Graph<W>, closed: Closed, cycle: &[WayId]| {
+        let mut on_cycle = |graph: &Graph<W>, closed: ClosedCycle, cycle: &[PathId]| {
             is_refuted = true;
-            if matches!(closed, Closed::By(_)) && cycle.iter().all(|&way| told.has(graph, way)) {
+            if matches!(closed, ClosedCycle::By(_)) && cycle.iter().all(|&way| told.has(graph, way))
+            {
                 return ControlFlow::Continue(());
             }
             let mut parts = 0;
             let ways = cycle
                 .iter()
-                .map(|&way| told.spelt_out(graph, way, &mut parts, 0));
+                .map(|&way| told.expand(graph, way, &mut parts, 0));
             match ways.collect::<Result<_, _>>() {
                 Ok(cycle) => found.push(Refutation {
                     cycle,
                     is_flat: false,
                 }),
-                Err(TooMuch::Deep) => found.extend(told.flat(graph, cycle).map(|steps| {
-                    parts = steps.parts.len();
-                    Refutation {
-                        cycle: vec![steps],
-                        is_flat: true,
-                    }
-                })),
-                Err(TooMuch::Long) => {}
+                Err(RefutationLimit::Deep) => {
+                    found.extend(told.flat_path(graph, cycle).map(|steps| {
+                        parts = steps.parts.len();
+                        Refutation {
+                            cycle: vec![steps],
+                            is_flat: true,
+                        }
+                    }));
+                }
+                Err(RefutationLimit::Long) => {}
             }
             all_parts += parts + cycle.len();
             if found.len() < most && all_parts < most_parts {
@@ -127,45 +130,45 @@ impl<W: Weight> UncertainNetwork<W> {
         match (is_refuted, found.is_empty()) {
             (false, _) => Refuted::No,
             (true, true) => Refuted::TooLong,
-            (true, false) => Refuted::Because(found),
+            (true, false) => Refuted::Refutations(found),
         }
     }
 }
 
 /// Record of the edges that refutations have used so far.
-struct Told {
+struct UsedEdges {
     /// The used edges, except requirements.
     edges: BTreeSet<EdgeId>,
     /// The limit on the parts of one refutation.
     most: usize,
 }
 
-impl Told {
+impl UsedEdges {
     /// Returns `true` if all edges of a way, requirements excepted, have been used before.
-    fn has<W: Weight>(&self, graph: &Graph<W>, way: WayId) -> bool {
-        let mut edges = ways_from(graph, way).map(|way| graph.ways[way].edge());
+    fn has<W: Weight>(&self, graph: &Graph<W>, way: PathId) -> bool {
+        let mut edges = path_suffixes(graph, way).map(|way| graph.paths[way].edge());
         edges.all(|id| {
             matches!(graph.edges[id].origin, Origin::Requirement(_)) || self.edges.contains(&id)
         })
     }
 
     /// Returns the parts of a way.
-    fn spelt_out<W: Weight>(
+    fn expand<W: Weight>(
         &mut self,
         graph: &Graph<W>,
-        way: WayId,
+        way: PathId,
         count: &mut usize,
         depth: usize,
-    ) -> Result<Way, TooMuch> {
-        if depth > MOST_DEPTH {
-            return Err(TooMuch::Deep);
+    ) -> Result<RefutationPath, RefutationLimit> {
+        if depth > MAX_DEPTH {
+            return Err(RefutationLimit::Deep);
         }
         // Exact capacity, because there are many ways, most of them short.
-        let mut parts = Vec::with_capacity(ways_from(graph, way).count());
-        for way in ways_from(graph, way) {
-            parts.push(self.part(graph, graph.ways[way].edge(), count, depth)?);
+        let mut parts = Vec::with_capacity(path_suffixes(graph, way).count());
+        for way in path_suffixes(graph, way) {
+            parts.push(self.part(graph, graph.paths[way].edge(), count, depth)?);
         }
-        Ok(Way {
+        Ok(RefutationPath {
             parts,
             unlabelled: None,
         })
@@ -177,10 +180,10 @@ impl Told {
         id: EdgeId,
         count: &mut usize,
         depth: usize,
-    ) -> Result<Part, TooMuch> {
+    ) -> Result<Part, RefutationLimit> {
         *count += 1;
         if *count > self.most {
-            return Err(TooMuch::Long);
+            return Err(RefutationLimit::Long);
         }
         let edge = &graph.edges[id];
         if !matches!(edge.origin, Origin::Requirement(_)) {
@@ -191,27 +194,31 @@ impl Told {
             (Origin::Link(link), Kind::Lower(_)) => Part::Early(link),
             (Origin::Link(link), Kind::Upper(_)) => Part::Late(link),
             // A link of duration 0: its end comes at least that much after its activation.
-            (Origin::Link(link), Kind::Plain) => Part::Way(Way {
+            (Origin::Link(link), Kind::Plain) => Part::Path(RefutationPath {
                 parts: vec![Part::Late(link)],
                 unlabelled: Some(link),
             }),
-            (Origin::Way(way), kind) => {
-                let mut spelt = self.spelt_out(graph, way, count, depth + 1)?;
+            (Origin::Path(way), kind) => {
+                let mut spelt = self.expand(graph, way, count, depth + 1)?;
                 if kind == Kind::Plain {
                     spelt.unlabelled = label(graph, way);
                 }
-                Part::Way(spelt)
+                Part::Path(spelt)
             }
         })
     }
 
     /// Returns the steps of a cycle as one way; `None` if there are too many.
-    fn flat<W: Weight>(&mut self, graph: &Graph<W>, cycle: &[WayId]) -> Option<Way> {
+    fn flat_path<W: Weight>(
+        &mut self,
+        graph: &Graph<W>,
+        cycle: &[PathId],
+    ) -> Option<RefutationPath> {
         let mut edges = Vec::new();
-        for way in cycle.iter().flat_map(|&way| ways_from(graph, way)) {
-            let edge = graph.ways[way].edge();
+        for way in cycle.iter().flat_map(|&way| path_suffixes(graph, way)) {
+            let edge = graph.paths[way].edge();
             self.edges.insert(edge);
-            if !graph.spelt_out(edge, self.most, &mut edges) {
+            if !graph.expand(edge, self.most, &mut edges) {
                 return None;
             }
         }
@@ -220,7 +227,7 @@ impl Told {
             Ground::Early(link) => Part::Early(link),
             Ground::Late(link) => Part::Late(link),
         };
-        Some(Way {
+        Some(RefutationPath {
             parts: edges.into_iter().map(part).collect(),
             unlabelled: None,
         })
@@ -228,7 +235,7 @@ impl Told {
 }
 
 /// Reason why a refutation cannot be given part by part.
-enum TooMuch {
+enum RefutationLimit {
     /// Too many parts.
     Long,
     /// Nested too deeply.
@@ -236,14 +243,14 @@ enum TooMuch {
 }
 
 /// Returns a way, its remainder after the first edge, and so on.
-fn ways_from<W>(graph: &Graph<W>, way: WayId) -> impl Iterator<Item = WayId> + '_ {
-    std::iter::successors(Some(way), |&way| graph.ways[way].rest())
+fn path_suffixes<W>(graph: &Graph<W>, way: PathId) -> impl Iterator<Item = PathId> + '_ {
+    std::iter::successors(Some(way), |&way| graph.paths[way].rest())
 }
 
 /// Returns the link whose end a way waits for.
-fn label<W: Weight>(graph: &Graph<W>, way: WayId) -> Option<LinkId> {
-    let last = ways_from(graph, way).last()?;
-    match graph.edges[graph.ways[last].edge()].kind {
+fn label<W: Weight>(graph: &Graph<W>, way: PathId) -> Option<LinkId> {
+    let last = path_suffixes(graph, way).last()?;
+    match graph.edges[graph.paths[last].edge()].kind {
         Kind::Upper(link) => Some(link),
         Kind::Plain | Kind::Lower(_) => None,
     }

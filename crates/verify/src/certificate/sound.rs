@@ -134,13 +134,13 @@ pub struct Condition {
     /// Proof that the condition cannot fail. The first case is split into the others. If there are
     /// none, the condition is assumed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub cases: Vec<Failing>,
+    pub cases: Vec<FailureCase>,
 }
 
 /// Proof that a condition cannot fail, in one case.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Failing {
+pub enum FailureCase {
     /// The moment is at or after the time of this point (in the first case), or before it.
     Either {
         /// The point.
@@ -151,13 +151,13 @@ pub enum Failing {
     /// There is no such moment: a contradictory sum of bounds and differences.
     Never(Vec<Summand>),
     /// Possible violations, each refuted.
-    Ways(Vec<Way>),
+    Ways(Vec<Violation>),
 }
 
 /// Possible violation of a condition: all of these inequalities hold.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Way {
+pub struct Violation {
     /// Bounds on differences of times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub differences: Vec<Difference>,
@@ -198,7 +198,7 @@ pub struct Inequality {
     pub constant: elbowroom_num::Rational,
     /// Terms in times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub times: Vec<Timed>,
+    pub times: Vec<TimeTerm>,
     /// Terms in values of parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Factor>,
@@ -213,7 +213,7 @@ pub struct Inequality {
 /// Term in the time of a point.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Timed {
+pub struct TimeTerm {
     /// The point.
     pub point: usize,
     /// Factor.

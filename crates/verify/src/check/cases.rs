@@ -9,10 +9,10 @@ use crate::probability::Span;
 
 /// Unprocessed case: its position, the inequalities that hold in it (proof and position), and the
 /// spans of the variables.
-type Open = (usize, Vec<(usize, usize)>, Vec<Span>);
+type PendingCase = (usize, Vec<(usize, usize)>, Vec<Span>);
 
 /// Computes the bound on the objective from a sum, the factors of variables in it, and their spans.
-type Follows<'a> = dyn Fn(&Total, &[Rational], &[Span]) -> Option<Rational> + 'a;
+type BoundFunction<'a> = dyn Fn(&Total, &[Rational], &[Span]) -> Option<Rational> + 'a;
 
 impl Checker<'_> {
     /// Returns the spans of the variables before any split.
@@ -25,13 +25,13 @@ impl Checker<'_> {
         });
         let mut spans: Vec<Span> = spans.collect();
         if is_probability {
-            self.chances.narrow(&mut spans);
+            self.chances.restrict_spans(&mut spans);
         }
         spans
     }
 
     /// Returns the spans of the variables in the two parts of a split.
-    fn parts(
+    fn split_spans(
         &self,
         variable: usize,
         at: &Rational,
@@ -39,8 +39,8 @@ impl Checker<'_> {
     ) -> Result<[Vec<Span>; 2], Flaw> {
         let own = spans
             .get(variable)
-            .ok_or(Flaw::NoSuch("variable", variable))?;
-        let is_there = self.chances.jumps(variable, at);
+            .ok_or(Flaw::UnknownReference("variable", variable))?;
+        let is_there = self.chances.has_jump_at(variable, at);
         let is_inside = own.least < *at && own.far.as_ref().is_some_and(|far| at <= far);
         if !is_there || !is_inside {
             return Err(Flaw::Jump(variable));
@@ -57,7 +57,9 @@ impl Checker<'_> {
         let mut all: Vec<Option<Vec<Span>>> = vec![None; cases.len()];
         let mut open = vec![(0, self.spans())];
         while let Some((index, spans)) = open.pop() {
-            let case = cases.get(index).ok_or(Flaw::NoSuch("case", index))?;
+            let case = cases
+                .get(index)
+                .ok_or(Flaw::UnknownReference("case", index))?;
             if all[index].is_some() {
                 return Err(Flaw::Tree(index));
             }
@@ -70,7 +72,7 @@ impl Checker<'_> {
                     at,
                     cases,
                 } => {
-                    let parts = self.parts(*variable, at, &spans)?;
+                    let parts = self.split_spans(*variable, at, &spans)?;
                     open.extend(cases.iter().copied().zip(parts));
                 }
                 Case::Sum(_) | Case::Impossible(_) => {}
@@ -82,18 +84,27 @@ impl Checker<'_> {
 
     /// Checks that the cases are exhaustive, and returns the greatest of their bounds. The bound of
     /// a case follows from the sum of its inequalities.
-    pub(super) fn cases(&self, cases: &[Case], follows: &Follows<'_>) -> Result<Rational, Flaw> {
+    pub(super) fn cases(
+        &self,
+        cases: &[Case],
+        follows: &BoundFunction<'_>,
+    ) -> Result<Rational, Flaw> {
         let mut bound: Option<Rational> = None;
         let mut is_seen = vec![false; cases.len()];
-        let mut open: Vec<Open> = vec![(0, Vec::new(), self.spans())];
+        let mut open: Vec<PendingCase> = vec![(0, Vec::new(), self.spans())];
         while let Some((index, chosen, spans)) = open.pop() {
-            let case = cases.get(index).ok_or(Flaw::NoSuch("case", index))?;
+            let case = cases
+                .get(index)
+                .ok_or(Flaw::UnknownReference("case", index))?;
             if std::mem::replace(&mut is_seen[index], true) {
                 return Err(Flaw::Tree(index));
             }
             match case {
                 Case::Either { proof, cases } => {
-                    let rows = self.rows.get(*proof).ok_or(Flaw::NoSuch("proof", *proof))?;
+                    let rows = self
+                        .rows
+                        .get(*proof)
+                        .ok_or(Flaw::UnknownReference("proof", *proof))?;
                     if rows.len() != cases.len() {
                         return Err(Flaw::Count {
                             what: "cases",
@@ -112,7 +123,7 @@ impl Checker<'_> {
                     at,
                     cases,
                 } => {
-                    let parts = self.parts(*variable, at, &spans)?;
+                    let parts = self.split_spans(*variable, at, &spans)?;
                     for (case, spans) in cases.iter().zip(parts) {
                         open.push((*case, chosen.clone(), spans));
                     }
@@ -162,11 +173,16 @@ impl Checker<'_> {
             }
             match *source {
                 Source::Row(proof, row) => {
-                    let rows = self.rows.get(proof).ok_or(Flaw::NoSuch("proof", proof))?;
+                    let rows = self
+                        .rows
+                        .get(proof)
+                        .ok_or(Flaw::UnknownReference("proof", proof))?;
                     if rows.len() != 1 && !chosen.contains(&(proof, row)) {
-                        return Err(Flaw::NotThere(case));
+                        return Err(Flaw::InequalityNotInCase(case));
                     }
-                    let row = rows.get(row).ok_or(Flaw::NoSuch("inequality", row))?;
+                    let row = rows
+                        .get(row)
+                        .ok_or(Flaw::UnknownReference("inequality", row))?;
                     for (sum, own) in factors.iter_mut().zip(&row.factors) {
                         *sum += own * factor;
                     }
@@ -179,13 +195,13 @@ impl Checker<'_> {
                         (Some(own), Some(far)) => Some(own.min(far)),
                         (own, far) => own.or(far),
                     };
-                    let most = most.ok_or(Flaw::NoSuch("variable", variable))?;
+                    let most = most.ok_or(Flaw::UnknownReference("variable", variable))?;
                     factors[variable] += factor;
                     bound += most * factor;
                 }
                 Source::Least(variable) => {
                     let sum = factors.get_mut(variable);
-                    *sum.ok_or(Flaw::NoSuch("variable", variable))? -= factor;
+                    *sum.ok_or(Flaw::UnknownReference("variable", variable))? -= factor;
                     bound -= &spans[variable].least * factor;
                 }
             }

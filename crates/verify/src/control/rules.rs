@@ -10,7 +10,7 @@ use crate::intervals::Intervals;
 use crate::sound::{Affine, Schedules};
 
 /// Largest number of times to check, for all cases together.
-const MOST_TIMES: usize = 1_000_000;
+const MAX_TIMES: usize = 1_000_000;
 
 /// Checks that the cases have a schedule for all values in the box.
 ///
@@ -22,13 +22,15 @@ pub(super) fn check(
     cases: &[Schedules],
 ) -> Result<(), Flaw> {
     let points = certificate.points.len();
-    if cases.len().saturating_mul(points) > MOST_TIMES {
+    if cases.len().saturating_mul(points) > MAX_TIMES {
         return Err(Flaw::TooLong);
     }
     let mut is_seen = vec![false; cases.len()];
     let mut open = vec![(0, intervals.clone())];
     while let Some((index, intervals)) = open.pop() {
-        let case = cases.get(index).ok_or(Flaw::NoSuch("schedule", index))?;
+        let case = cases
+            .get(index)
+            .ok_or(Flaw::UnknownReference("schedule", index))?;
         if std::mem::replace(&mut is_seen[index], true) {
             return Err(Flaw::Schedules(index));
         }
@@ -61,23 +63,25 @@ pub(super) fn check(
 fn rule(certificate: &Certificate, intervals: &Intervals, times: &[Affine]) -> Result<(), Flaw> {
     for (point, time) in times.iter().enumerate() {
         let is_zero = time.constant.is_zero() && time.parameters.is_empty();
-        let before = Sum::default().with(time, -1);
+        let before = Sum::default().plus_scaled(time, -1);
         let is_early = before
             .greatest(intervals)
             .is_none_or(|own| own.is_positive());
         if is_early || (point == 0 && !is_zero) {
-            return Err(Flaw::Early(point));
+            return Err(Flaw::BeforeTimeZero(point));
         }
     }
     for (index, constraint) in certificate.constraints.iter().enumerate() {
         let (from, to) = (&times[constraint.from], &times[constraint.to]);
         for (limit, sign) in [(&constraint.upper, 1), (&constraint.lower, -1)] {
-            let sum = Sum::default().with(to, sign).with(from, -sign);
-            let Some(sum) = sum.less(limit, sign) else {
+            let sum = Sum::default()
+                .plus_scaled(to, sign)
+                .plus_scaled(from, -sign);
+            let Some(sum) = sum.minus_limit(limit, sign) else {
                 continue;
             };
             if sum.greatest(intervals).is_none_or(|own| own.is_positive()) {
-                return Err(Flaw::Unmet(index));
+                return Err(Flaw::ConstraintViolated(index));
             }
         }
     }
@@ -92,7 +96,7 @@ struct Sum {
 }
 
 impl Sum {
-    fn with(mut self, other: &Affine, sign: i64) -> Self {
+    fn plus_scaled(mut self, other: &Affine, sign: i64) -> Self {
         let sign = Rational::from(sign);
         self.constant += &other.constant * &sign;
         for own in &other.parameters {
@@ -102,7 +106,7 @@ impl Sum {
     }
 
     /// Subtracts `sign` times a limit. Returns `None` if there is no limit.
-    fn less(mut self, limit: &Limit, sign: i64) -> Option<Self> {
+    fn minus_limit(mut self, limit: &Limit, sign: i64) -> Option<Self> {
         match limit {
             Limit::None => return None,
             Limit::Number(number) => self.constant -= &number.0 * &Rational::from(sign),

@@ -61,7 +61,7 @@ pub(super) fn check(
             return Err(Flaw::Range("wait", index));
         }
     }
-    network.has_no_negative_circle()?;
+    network.has_no_negative_cycle()?;
     network.is_closed()
 }
 
@@ -163,7 +163,7 @@ impl Closed {
 
     /// Checks that the negative edges form no cycle: repeatedly removes points without incoming
     /// negative edges.
-    fn has_no_negative_circle(&self) -> Result<(), Flaw> {
+    fn has_no_negative_cycle(&self) -> Result<(), Flaw> {
         let leaving = self.negative();
         let mut entering = vec![0_usize; self.points];
         leaving.iter().flatten().for_each(|&to| entering[to] += 1);
@@ -180,7 +180,7 @@ impl Closed {
         }
         let left = entering.iter().position(|&count| count > 0);
         match left.filter(|_| taken < self.points) {
-            Some(point) => Err(Flaw::Circle(point)),
+            Some(point) => Err(Flaw::NegativeCycle(point)),
             None => Ok(()),
         }
     }
@@ -204,7 +204,8 @@ impl Closed {
             for &(from, first, _) in entering {
                 for &(to, second) in &leaving[point] {
                     let sum = first + second;
-                    self.has_edge(from, to, &sum).ok_or(Flaw::Open(point))?;
+                    self.has_edge(from, to, &sum)
+                        .ok_or(Flaw::NotClosed(point))?;
                 }
             }
         }
@@ -214,7 +215,7 @@ impl Closed {
                 if of != Some(*index) {
                     let delay = delay.as_ref().map(|delay| delay - first);
                     let is_there = self.has_wait(from, *index, delay.as_ref());
-                    is_there.ok_or(Flaw::Open(*point))?;
+                    is_there.ok_or(Flaw::NotClosed(*point))?;
                 }
             }
         }

@@ -38,13 +38,13 @@ pub(super) fn check(
         let is_zero = time.as_ref().is_some_and(|time| time.0.is_zero());
         let is_early = time.as_ref().is_some_and(|time| time.0.is_negative());
         if is_early || (point == 0 && !is_zero) {
-            return Err(Flaw::Early(point));
+            return Err(Flaw::BeforeTimeZero(point));
         }
     }
     let schedule = Times {
         certificate,
         intervals,
-        told: times,
+        scheduled: times,
         ended_by: &ended_by,
     };
     for (index, constraint) in certificate.constraints.iter().enumerate() {
@@ -53,7 +53,7 @@ pub(super) fn check(
             continue;
         }
         let Constraint { from, to, .. } = *constraint;
-        let broken = || Flaw::Unmet(index);
+        let broken = || Flaw::ConstraintViolated(index);
         // An upper bound counts with its least value, a lower bound with its greatest value.
         if let Some(most) = limit(&constraint.upper, intervals, false, index)? {
             let difference = schedule.greatest(from, to)?.ok_or_else(broken)?;
@@ -80,7 +80,9 @@ pub(super) fn limit(
         Limit::Number(number) => Ok(Some(number.0.clone())),
         Limit::Parameter(parameter) => {
             let end = &intervals.of(*parameter)?[usize::from(is_lower)];
-            end.clone().map(Some).ok_or(Flaw::Unmet(constraint))
+            end.clone()
+                .map(Some)
+                .ok_or(Flaw::ConstraintViolated(constraint))
         }
     }
 }
@@ -88,7 +90,7 @@ pub(super) fn limit(
 struct Times<'a> {
     certificate: &'a Certificate,
     intervals: &'a Intervals,
-    told: &'a [Option<Exact>],
+    scheduled: &'a [Option<Exact>],
     ended_by: &'a [Option<usize>],
 }
 
@@ -109,7 +111,7 @@ impl Times<'_> {
     fn greatest(&self, from: usize, to: usize) -> Result<Option<Rational>, Flaw> {
         let ((from, before), (to, after)) = (self.chain(from), self.chain(to));
         let time = |point: usize| {
-            let time = self.told[point].as_ref();
+            let time = self.scheduled[point].as_ref();
             time.ok_or(Flaw::NotChosen(point))
         };
         let mut difference = &time(to)?.0 - &time(from)?.0;

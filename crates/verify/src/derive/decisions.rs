@@ -7,9 +7,9 @@ use elbowroom_model::ground::{Body, Condition};
 use super::NotDerived;
 use super::distances::Distances;
 use super::failures::Failure;
-use super::histories::{Histories, Unsettled};
+use super::histories::{Histories, Undetermined};
 use super::linear::Inequality;
-use super::subject::What;
+use super::subject::PointKind;
 
 /// A condition of an effect: the point, the position of the effect there, and the part of the condition.
 pub(super) type GuardId = (usize, usize, usize);
@@ -23,7 +23,7 @@ pub(super) struct Decision {
 }
 
 /// The limit on decisions whose opposites are all tried.
-const MOST_DECISIONS: usize = 6;
+const MAX_DECISIONS: usize = 6;
 
 impl Histories<'_> {
     /// Returns `true` if no plan with other decisions is valid at any times: in each schedule some
@@ -33,7 +33,7 @@ impl Histories<'_> {
     /// values and the plan's own times, some decisions change first.
     pub(super) fn needs_decisions(&self, widest: &mut Distances) -> bool {
         let known: BTreeSet<GuardId> = self.decisions.iter().map(|own| own.id).collect();
-        if known.len() > MOST_DECISIONS {
+        if known.len() > MAX_DECISIONS {
             return false;
         }
         let known: Vec<GuardId> = known.into_iter().collect();
@@ -53,13 +53,15 @@ impl Histories<'_> {
     fn always_fails(&self) -> bool {
         let subject = self.subject;
         let fails = |point: usize| {
-            let condition = match subject.points[point].what {
-                What::Zero | What::Timed(_) => return false,
-                What::Instant(step) | What::Start(step) => match &subject.steps[step].action.body {
-                    Body::Instantaneous(snap) => &snap.condition,
-                    Body::Durative(body) => &body.start.condition,
-                },
-                What::End(step) => match &subject.steps[step].action.body {
+            let condition = match subject.points[point].kind {
+                PointKind::Zero | PointKind::Timed(_) => return false,
+                PointKind::Instant(step) | PointKind::Start(step) => {
+                    match &subject.steps[step].action.body {
+                        Body::Instantaneous(snap) => &snap.condition,
+                        Body::Durative(body) => &body.start.condition,
+                    }
+                }
+                PointKind::End(step) => match &subject.steps[step].action.body {
                     Body::Instantaneous(_) => return false,
                     Body::Durative(body) => &body.end.condition,
                 },
@@ -83,8 +85,8 @@ impl Histories<'_> {
         };
         let found = self.arrival(at, &mut |reading| match reading.holds(condition) {
             Ok(truth) => Ok(Err(truth)),
-            Err(Unsettled::Undefined) => Err(NotDerived::Unknown(what())),
-            Err(Unsettled::Varying) => {
+            Err(Undetermined::Undefined) => Err(NotDerived::Unknown(what())),
+            Err(Undetermined::Varying) => {
                 let ways = [false, true].map(|wanted| reading.alternatives(condition, wanted));
                 let [no, yes] = ways;
                 let ways = no.and_then(|no| Ok([no, yes?]));
@@ -99,7 +101,7 @@ impl Histories<'_> {
         let is_so = yes.iter().any(holds);
         let other = if is_so { no } else { yes };
         let otherwise = other.into_iter().map(|inequalities| Failure {
-            what: what(),
+            description: what(),
             moment: None,
             inequalities,
         });

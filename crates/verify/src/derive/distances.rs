@@ -101,7 +101,7 @@ impl Distances {
             rounds[point] += 1;
             // Without a negative cycle, the number of points limits the improvements of each point.
             if rounds[point] > self.edges.len() {
-                return Err(Flaw::Circle(point));
+                return Err(Flaw::NegativeCycle(point));
             }
             let Some(here) = most[point].clone() else {
                 continue;

@@ -8,18 +8,18 @@ use super::NotDerived;
 use super::distances::Distances;
 use super::histories::{Histories, Value};
 use super::linear::{Inequality, Linear};
-use super::places::Places;
-use super::reading::{Reading, compared};
-use super::subject::{Subject, What};
+use super::offset_components::OffsetComponents;
+use super::point_state::{PointState, compared};
+use super::subject::{PointKind, Subject};
 
 /// The limit on the sets of points that can come before a moment inside an action.
-const MOST_SETS: usize = 4096;
+const MAX_SETS: usize = 4096;
 
 /// Possible violation of a condition: all inequalities hold.
 #[derive(Clone, Debug)]
 pub(super) struct Failure {
     /// The condition, in words.
-    pub(super) what: String,
+    pub(super) description: String,
     /// For a condition throughout an action: where it fails.
     pub(super) moment: Option<Place>,
     pub(super) inequalities: Vec<Inequality>,
@@ -42,15 +42,15 @@ pub(super) struct Place {
 pub(super) fn at_points(
     subject: &Subject<'_>,
     histories: &Histories<'_>,
-    places: &Places,
+    places: &OffsetComponents,
     is_open: &dyn Fn(usize) -> bool,
 ) -> Result<Vec<Failure>, NotDerived> {
     let mut failures = Vec::new();
     for (index, point) in subject.points.iter().enumerate() {
-        let (step, is_end) = match point.what {
-            What::Zero | What::Timed(_) => continue,
-            What::Start(step) | What::Instant(step) => (step, false),
-            What::End(step) => (step, true),
+        let (step, is_end) = match point.kind {
+            PointKind::Zero | PointKind::Timed(_) => continue,
+            PointKind::Start(step) | PointKind::Instant(step) => (step, false),
+            PointKind::End(step) => (step, true),
         };
         let (snap, bounds): (&SnapAction, &[DurationConstraint]) =
             match &subject.steps[step].action.body {
@@ -86,7 +86,7 @@ pub(super) fn at_points(
 /// Returns the failures of a condition at one moment.
 fn of_condition(
     subject: &Subject<'_>,
-    reading: &Reading<'_>,
+    reading: &PointState<'_>,
     condition: &Condition,
     label: &str,
 ) -> Result<Vec<Failure>, NotDerived> {
@@ -110,7 +110,7 @@ fn failures(
     alternatives: Vec<Vec<Inequality>>,
 ) -> Vec<Failure> {
     let failures = alternatives.into_iter().map(|inequalities| Failure {
-        what: what(),
+        description: what(),
         moment: moment.cloned(),
         inequalities,
     });
@@ -121,7 +121,7 @@ fn failures(
 /// none of them where it is part of the network. A plan file with constraints need not have it.
 fn of_bound(
     subject: &Subject<'_>,
-    reading: &Reading<'_>,
+    reading: &PointState<'_>,
     bound: &DurationConstraint,
     duration: &Linear,
     label: &str,
@@ -238,7 +238,7 @@ fn sets(
             }
         }
         sets = more;
-        if sets.len() > MOST_SETS {
+        if sets.len() > MAX_SETS {
             return Err(NotDerived::Unknown(format!(
                 "the order of events for {}",
                 what()

@@ -164,7 +164,7 @@ impl<'a> Given<'a> {
     }
 
     /// Returns `true` if the duration of an instance is a parameter or a number.
-    pub(super) fn is_told(&self, instance: usize) -> bool {
+    pub(super) fn has_known_duration(&self, instance: usize) -> bool {
         let [start, end] = self.ends[instance];
         let is_told = |own: &Constraint| own.lower == own.upper && own.lower != Limit::None;
         let mut constraints = self.constraints.iter();

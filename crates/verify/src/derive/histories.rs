@@ -18,9 +18,9 @@ use super::NotDerived;
 use super::decisions::{Decision, GuardId};
 use super::distances::Distances;
 use super::linear::Linear;
-use super::places::Places;
-use super::reading::{Reading, combined, negated, quotient};
-use super::subject::{Subject, What, is_always_defined};
+use super::offset_components::OffsetComponents;
+use super::point_state::{PointState, combined, negated, quotient};
+use super::subject::{PointKind, Subject, is_always_defined};
 
 /// A number at one moment.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ pub(super) enum Value {
 
 /// The reason why the truth of a condition is not the same in all schedules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Unsettled {
+pub(super) enum Undetermined {
     /// A number has no value.
     Undefined,
     /// A number depends on times or parameters, or is unknown.
@@ -43,7 +43,7 @@ pub(super) enum Unsettled {
 
 /// A change of a fluent at a point.
 #[derive(Clone, Debug)]
-pub(super) enum Turn {
+pub(super) enum FluentChange {
     Set(Value),
     Shift(Value),
     /// A continuous change begins, with this rate.
@@ -60,11 +60,11 @@ const CONTINUOUS: usize = usize::MAX / 2;
 /// All changes of facts and fluents.
 pub(super) struct Histories<'a> {
     pub(super) subject: &'a Subject<'a>,
-    pub(super) places: &'a Places,
+    pub(super) places: &'a OffsetComponents,
     /// By fact: the points that set it, in order of time, with its truth value.
     pub(super) facts: BTreeMap<FactId, Vec<(usize, bool)>>,
     /// By fluent: its changes, in order of time.
-    pub(super) fluents: BTreeMap<FluentId, Vec<(usize, Turn)>>,
+    pub(super) fluents: BTreeMap<FluentId, Vec<(usize, FluentChange)>>,
     /// Conditions of effects that vary.
     pub(super) decisions: Vec<Decision>,
     /// By parameter: its nominal value.
@@ -80,7 +80,7 @@ impl<'a> Histories<'a> {
     /// When an effect depends on numbers in a way that the checker has no rule for.
     pub(super) fn new(
         subject: &'a Subject<'a>,
-        places: &'a Places,
+        places: &'a OffsetComponents,
         widest: &mut Distances,
         nominal: Vec<Rational>,
     ) -> Result<Self, NotDerived> {
@@ -89,7 +89,7 @@ impl<'a> Histories<'a> {
 
     pub(super) fn with(
         subject: &'a Subject<'a>,
-        places: &'a Places,
+        places: &'a OffsetComponents,
         widest: &mut Distances,
         (nominal, flipped): (Vec<Rational>, BTreeSet<GuardId>),
     ) -> Result<Self, NotDerived> {
@@ -112,27 +112,29 @@ impl<'a> Histories<'a> {
 
     fn happen(&mut self, point: usize, widest: &mut Distances) -> Result<(), NotDerived> {
         let subject = self.subject;
-        match subject.points[point].what {
-            What::Zero => Ok(()),
-            What::Timed(index) => {
+        match subject.points[point].kind {
+            PointKind::Zero => Ok(()),
+            PointKind::Timed(index) => {
                 let changes = subject.task.timed()[index].changes.iter();
                 self.apply(point, changes.collect())
             }
-            What::Instant(step) | What::Start(step) => match &subject.steps[step].action.body {
-                Body::Instantaneous(snap) => self.take(point, step, &snap.effects),
-                Body::Durative(body) => {
-                    self.take(point, step, &body.start.effects)?;
-                    self.start_continuous(point, step, body, widest)
+            PointKind::Instant(step) | PointKind::Start(step) => {
+                match &subject.steps[step].action.body {
+                    Body::Instantaneous(snap) => self.record_effects(point, step, &snap.effects),
+                    Body::Durative(body) => {
+                        self.record_effects(point, step, &body.start.effects)?;
+                        self.start_continuous(point, step, body, widest)
+                    }
                 }
-            },
-            What::End(step) => {
+            }
+            PointKind::End(step) => {
                 let Some(body) = subject.steps[step].action.durative() else {
                     return Ok(());
                 };
                 let arrival = self.changes(point, step, &body.end.effects)?;
                 let turns = self.turns(point, arrival)?;
                 for (index, effect) in body.continuous.iter().enumerate() {
-                    let turn = (point, Turn::Ends((step, index)));
+                    let turn = (point, FluentChange::Ends((step, index)));
                     self.fluents.entry(effect.fluent).or_default().push(turn);
                 }
                 self.record(point, turns);
@@ -142,7 +144,12 @@ impl<'a> Histories<'a> {
     }
 
     /// Records the effects of a snap action.
-    fn take(&mut self, point: usize, step: usize, effects: &'a [Effect]) -> Result<(), NotDerived> {
+    fn record_effects(
+        &mut self,
+        point: usize,
+        step: usize,
+        effects: &'a [Effect],
+    ) -> Result<(), NotDerived> {
         let changes = self.changes(point, step, effects)?;
         self.apply(point, changes)
     }
@@ -153,7 +160,7 @@ impl<'a> Histories<'a> {
         Ok(())
     }
 
-    fn record(&mut self, point: usize, turns: Vec<(FluentId, Turn)>) {
+    fn record(&mut self, point: usize, turns: Vec<(FluentId, FluentChange)>) {
         for (fluent, turn) in turns {
             self.fluents.entry(fluent).or_default().push((point, turn));
         }
@@ -207,7 +214,7 @@ impl<'a> Histories<'a> {
         &mut self,
         point: usize,
         changes: Vec<&Change>,
-    ) -> Result<Vec<(FluentId, Turn)>, NotDerived> {
+    ) -> Result<Vec<(FluentId, FluentChange)>, NotDerived> {
         let mut facts: BTreeMap<FactId, bool> = BTreeMap::new();
         let mut turns = Vec::new();
         let mut operators: BTreeMap<FluentId, bool> = BTreeMap::new();
@@ -250,7 +257,7 @@ impl<'a> Histories<'a> {
         operator: UpdateOperator,
         fluent: FluentId,
         expression: &Expression,
-    ) -> Result<Turn, NotDerived> {
+    ) -> Result<FluentChange, NotDerived> {
         let (amount, before) = self.arrival(point, &mut |reading| {
             (reading.expression(expression), reading.fluent(fluent))
         });
@@ -271,11 +278,13 @@ impl<'a> Histories<'a> {
             return Err(NotDerived::Unknown(what));
         }
         Ok(match operator {
-            UpdateOperator::Assign => Turn::Set(amount),
-            UpdateOperator::Increase => Turn::Shift(amount),
-            UpdateOperator::Decrease => Turn::Shift(negated(amount)),
-            UpdateOperator::ScaleUp => Turn::Set(combined(&before, &amount, Linear::product)),
-            UpdateOperator::ScaleDown => Turn::Set(combined(&before, &amount, quotient)),
+            UpdateOperator::Assign => FluentChange::Set(amount),
+            UpdateOperator::Increase => FluentChange::Shift(amount),
+            UpdateOperator::Decrease => FluentChange::Shift(negated(amount)),
+            UpdateOperator::ScaleUp => {
+                FluentChange::Set(combined(&before, &amount, Linear::product))
+            }
+            UpdateOperator::ScaleDown => FluentChange::Set(combined(&before, &amount, quotient)),
         })
     }
 
@@ -315,20 +324,20 @@ impl<'a> Histories<'a> {
                 }
                 rate = Value::Unknown;
             }
-            let turn = (point, Turn::Starts((step, index), rate));
+            let turn = (point, FluentChange::Starts((step, index), rate));
             self.fluents.entry(effect.fluent).or_default().push(turn);
         }
         Ok(())
     }
 
     /// Calls `read` with the state on arrival at a point.
-    pub(super) fn arrival<T>(&self, point: usize, read: &mut dyn FnMut(&Reading<'_>) -> T) -> T {
+    pub(super) fn arrival<T>(&self, point: usize, read: &mut dyn FnMut(&PointState<'_>) -> T) -> T {
         let subject = self.subject;
         let time = &subject.points[point].time;
         let planned = |step: usize| subject.steps[step].duration.clone();
-        let duration = match subject.points[point].what {
-            What::Start(step) => planned(step).map(Linear::number),
-            What::End(step) => {
+        let duration = match subject.points[point].kind {
+            PointKind::Start(step) => planned(step).map(Linear::number),
+            PointKind::End(step) => {
                 let start = self.places.time(subject.ends[step][0]);
                 Some(self.places.time(point).minus(&start))
             }
@@ -343,7 +352,7 @@ impl<'a> Histories<'a> {
     }
 
     /// Calls `read` with the state at the end of the plan.
-    pub(super) fn finally<T>(&self, read: &mut dyn FnMut(&Reading<'_>) -> T) -> T {
+    pub(super) fn finally<T>(&self, read: &mut dyn FnMut(&PointState<'_>) -> T) -> T {
         // Nothing changes any more, so the time does not count.
         self.at(&|_| true, Linear::default(), None, read)
     }
@@ -354,9 +363,9 @@ impl<'a> Histories<'a> {
         has_happened: &dyn Fn(usize) -> bool,
         time: Linear,
         duration: Option<Linear>,
-        read: &mut dyn FnMut(&Reading<'_>) -> T,
+        read: &mut dyn FnMut(&PointState<'_>) -> T,
     ) -> T {
-        read(&Reading {
+        read(&PointState {
             histories: self,
             has_happened,
             time,
@@ -386,7 +395,7 @@ impl<'a> Histories<'a> {
         !is_initially_open
             && turns.is_none_or(|turns| {
                 turns.iter().all(|(_, turn)| {
-                matches!(turn, Turn::Set(Value::Known(value)) if value.as_number().is_some())
+                matches!(turn, FluentChange::Set(Value::Known(value)) if value.as_number().is_some())
             })
             })
     }

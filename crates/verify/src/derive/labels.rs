@@ -20,7 +20,7 @@ pub(crate) struct Label {
 }
 
 /// Words that an answer uses for a parameter. Older answers do not have all of them.
-pub(crate) struct Told<'a> {
+pub(crate) struct LabelText<'a> {
     pub(crate) name: &'a str,
     pub(crate) kind: Option<&'a str>,
     pub(crate) action: Option<&'a str>,
@@ -29,7 +29,7 @@ pub(crate) struct Told<'a> {
 
 impl Label {
     /// Returns `true` if the words mean this parameter. `earlier` are the names of the parameters before it.
-    pub(crate) fn is_told(&self, told: &Told<'_>, earlier: &[&str]) -> bool {
+    pub(crate) fn is_denoted_by(&self, told: &LabelText<'_>, earlier: &[&str]) -> bool {
         let is_named = |name: &String| told.name == unused(name, earlier);
         let names = self.names.as_ref();
         told.kind.is_none_or(|kind| kind == self.kind)

@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use elbowroom_model::Footprint;
 use elbowroom_num::Rational;
 
-use super::course::Course;
 use super::histories::Histories;
-use super::subject::{Point, Subject, What};
+use super::subject::{Point, PointKind, Subject};
+use super::trajectory::TrajectoryDerivation;
 use super::{NotDerived, Quantity};
 use crate::certificate::{Certificate, Constraint, Guarantee, Limit, Part, Proof};
 
@@ -19,7 +19,7 @@ use crate::certificate::{Certificate, Constraint, Guarantee, Limit, Part, Proof}
 pub(super) fn check(
     certificate: &Certificate,
     histories: &Histories<'_>,
-    course: &Course,
+    course: &TrajectoryDerivation,
 ) -> Result<Vec<Quantity>, NotDerived> {
     let subject = histories.subject;
     let mut reader = Reader {
@@ -34,7 +34,7 @@ pub(super) fn check(
     for (index, constraint) in certificate.constraints.iter().enumerate() {
         let is_needed =
             reader.sets(constraint)? || reader.orders(constraint) || course.implies(constraint);
-        if !is_needed && !reader.narrows(index) {
+        if !is_needed && !reader.fixes_controllable_duration(index) {
             let [from, to] = [constraint.from, constraint.to].map(|point| reader.name(point));
             let what = format!("constraint {index}, from `{from}` to `{to}`, is none of the plan");
             return Err(if subject.is_plain {
@@ -46,7 +46,7 @@ pub(super) fn check(
     }
     reader.proofs_leave_out_narrowed()?;
     let durations = subject.durative().map(|(step, _)| subject.ends[step][1]);
-    let timed = |point: &usize| matches!(subject.points[*point].what, What::Timed(_));
+    let timed = |point: &usize| matches!(subject.points[*point].kind, PointKind::Timed(_));
     let timed = (0..subject.points.len()).filter(timed);
     for point in durations.chain(timed) {
         if !reader.set.contains(&point) {
@@ -93,13 +93,13 @@ impl Reader<'_> {
     /// plan and the domain have it, and is the first to do so.
     fn sets(&mut self, constraint: &Constraint) -> Result<bool, NotDerived> {
         let subject = self.subject;
-        let what = |point: usize| subject.points.get(point).map(|own| own.what);
+        let what = |point: usize| subject.points.get(point).map(|own| own.kind);
         let (step, planned) = match (what(constraint.from), what(constraint.to)) {
-            (Some(What::Start(start)), Some(What::End(end))) if start == end => {
+            (Some(PointKind::Start(start)), Some(PointKind::End(end))) if start == end => {
                 let step = subject.steps[start];
                 (Some(start), step.duration.clone().unwrap_or_default())
             }
-            (Some(What::Zero), Some(What::Timed(_))) => {
+            (Some(PointKind::Zero), Some(PointKind::Timed(_))) => {
                 (None, subject.points[constraint.to].time.clone())
             }
             _ => return Ok(false),
@@ -144,8 +144,8 @@ impl Reader<'_> {
 
     /// Returns `true` if the constraint sets a duration to the planned one.
     fn is_as_planned(&self, constraint: &Constraint) -> bool {
-        let what = |point: usize| self.subject.points.get(point).map(|own| own.what);
-        let (Some(What::Start(start)), Some(What::End(end))) =
+        let what = |point: usize| self.subject.points.get(point).map(|own| own.kind);
+        let (Some(PointKind::Start(start)), Some(PointKind::End(end))) =
             (what(constraint.from), what(constraint.to))
         else {
             return false;
@@ -160,7 +160,7 @@ impl Reader<'_> {
 
     /// Returns `true` if the constraint keeps a duration that the executor could choose at the planned one. Schedules
     /// of the network are some of all schedules then, so the box is inside the envelope if these are enough.
-    fn narrows(&mut self, index: usize) -> bool {
+    fn fixes_controllable_duration(&mut self, index: usize) -> bool {
         let constraint = &self.certificate.constraints[index];
         let is_weak = self.certificate.guarantee == Guarantee::Weak;
         if !is_weak || !self.is_as_planned(constraint) {
@@ -229,10 +229,12 @@ impl Reader<'_> {
             );
             return Err(NotDerived::differs(what));
         }
-        let (step, group) = match self.subject.points[point].what {
-            What::Timed(group) => (None, Some(group)),
-            What::Start(step) | What::Instant(step) | What::End(step) => (Some(step), None),
-            What::Zero => (None, None),
+        let (step, group) = match self.subject.points[point].kind {
+            PointKind::Timed(group) => (None, Some(group)),
+            PointKind::Start(step) | PointKind::Instant(step) | PointKind::End(step) => {
+                (Some(step), None)
+            }
+            PointKind::Zero => (None, None),
         };
         let action = step.map(|step| self.subject.steps[step].action.name.clone());
         let kind = if step.is_some() { "duration" } else { "timed" };
@@ -263,7 +265,10 @@ impl Reader<'_> {
         let (Some(first), Some(second)) = (points.get(from), points.get(to)) else {
             return false;
         };
-        let are_timed = matches!((first.what, second.what), (What::Timed(_), What::Timed(_)));
+        let are_timed = matches!(
+            (first.kind, second.kind),
+            (PointKind::Timed(_), PointKind::Timed(_))
+        );
         let interfere =
             first.time < second.time && first.footprint.interferes_with(&second.footprint);
         // Timed initials may be as near to each other as in the problem.
@@ -271,14 +276,15 @@ impl Reader<'_> {
         if are_timed {
             apart = apart.min(&second.time - &first.time);
         }
-        let keeps_apart = self.sides.contains(&(from, to)) || self.are_in_turn(first, second);
+        let keeps_apart =
+            self.sides.contains(&(from, to)) || self.is_end_before_next_start(first, second);
         (interfere && least.0 <= apart) || (keeps_apart && least.0 <= Rational::ZERO)
     }
 
     /// Returns `true` if the first point ends an instance of an action, and the second one starts another instance
     /// of the same action, no earlier.
-    fn are_in_turn(&self, first: &Point, second: &Point) -> bool {
-        let (What::End(ended), What::Start(started)) = (first.what, second.what) else {
+    fn is_end_before_next_start(&self, first: &Point, second: &Point) -> bool {
+        let (PointKind::End(ended), PointKind::Start(started)) = (first.kind, second.kind) else {
             return false;
         };
         // The end of an action without duration is no later than its own start, but need not be.

@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 use super::distances::Distances;
 use super::failures::{Failure, Place};
 use super::linear::{Inequality, Linear};
-use super::places::Places;
+use super::offset_components::OffsetComponents;
 use crate::certificate::{Certificate, End, Sum};
 use crate::flaw::Flaw;
 use crate::intervals::Intervals;
@@ -19,7 +19,7 @@ use crate::sound;
 pub(super) struct Numbers<'a> {
     pub(super) certificate: &'a Certificate,
     pub(super) intervals: &'a Intervals,
-    pub(super) places: &'a Places,
+    pub(super) places: &'a OffsetComponents,
     pub(super) distances: Distances,
     /// Returns `true` for parameters that are bounds between time points, which may be negative.
     pub(super) is_bound: &'a dyn Fn(usize) -> bool,
@@ -32,7 +32,7 @@ impl Numbers<'_> {
     /// When the network has no schedule.
     pub(super) fn refutes(&mut self, failure: &Failure) -> Result<bool, Flaw> {
         if let Some(place) = &failure.moment
-            && self.is_nowhere(place)?
+            && self.has_no_moment(place)?
         {
             return Ok(true);
         }
@@ -52,7 +52,7 @@ impl Numbers<'_> {
     }
 
     /// Returns `true` if there is no such moment.
-    fn is_nowhere(&mut self, place: &Place) -> Result<bool, Flaw> {
+    fn has_no_moment(&mut self, place: &Place) -> Result<bool, Flaw> {
         for &earlier in place.before.iter().chain([&place.start]) {
             for &later in place.after.iter().chain([&place.end]) {
                 if self.distances.is_before(later, earlier, &Rational::ZERO)? {
@@ -82,7 +82,8 @@ impl Numbers<'_> {
             (place.end, &place.after)
         };
         for &point in others.iter().chain([&edge]) {
-            let expression = moved(&inequality.expression, moment, &self.places.time(point));
+            let expression =
+                substitute_time(&inequality.expression, moment, &self.places.time(point));
             // The moment may be at the time of a point that comes before it, but of no other.
             let is_open = !is_early || point == edge;
             if self.is_positive(&expression, inequality.is_strict || is_open)? {
@@ -175,8 +176,8 @@ impl Numbers<'_> {
         while let Some(index) = open.pop() {
             match condition.cases.get(index) {
                 None => return Ok(false),
-                Some(sound::Failing::Never(_)) => {}
-                Some(sound::Failing::Either { event, cases }) => {
+                Some(sound::FailureCase::Never(_)) => {}
+                Some(sound::FailureCase::Either { event, cases }) => {
                     let Some(place) = &failure.moment else {
                         return Ok(false);
                     };
@@ -188,10 +189,10 @@ impl Numbers<'_> {
                         open.extend(cases);
                     }
                 }
-                Some(sound::Failing::Ways(ways)) => {
+                Some(sound::FailureCase::Ways(ways)) => {
                     let mut is_found = false;
                     for way in ways {
-                        is_found = is_found || self.is_that(failure, way)?;
+                        is_found = is_found || self.implies_violation(failure, way)?;
                     }
                     if !is_found {
                         return Ok(false);
@@ -203,7 +204,11 @@ impl Numbers<'_> {
     }
 
     /// Returns `true` if the failure implies all bounds of a way that the certificate refutes.
-    fn is_that(&mut self, failure: &Failure, way: &sound::Way) -> Result<bool, Flaw> {
+    fn implies_violation(
+        &mut self,
+        failure: &Failure,
+        way: &sound::Violation,
+    ) -> Result<bool, Flaw> {
         for own in &way.inequalities {
             let Some(own) = self.inequality(own) else {
                 return Ok(false);
@@ -233,7 +238,7 @@ impl Numbers<'_> {
             expression.add_parameter(value.parameter, &value.factor);
         }
         Some(Inequality {
-            expression: self.places.normal(&expression),
+            expression: self.places.normalised(&expression),
             is_strict: own.strict,
         })
     }
@@ -293,7 +298,8 @@ impl Numbers<'_> {
         let mut rows = Vec::new();
         let edges = [place.start, place.end];
         for &point in edges.iter().chain(&place.before).chain(&place.after) {
-            let expression = moved(&inequality.expression, moment, &self.places.time(point));
+            let expression =
+                substitute_time(&inequality.expression, moment, &self.places.time(point));
             if expression.times.is_empty()
                 && !expression.parameters.is_empty()
                 && self.is_possible(place, point, &expression)?
@@ -378,7 +384,7 @@ impl Numbers<'_> {
 }
 
 /// Returns an expression with one time in the place of a point's.
-fn moved(expression: &Linear, point: usize, time: &Linear) -> Linear {
+fn substitute_time(expression: &Linear, point: usize, time: &Linear) -> Linear {
     let mut moved = expression.clone();
     if let Some(factor) = moved.times.remove(&point) {
         moved.add_scaled(time, &factor);
@@ -388,9 +394,9 @@ fn moved(expression: &Linear, point: usize, time: &Linear) -> Linear {
 
 /// Returns `true` if one of these sums is not negative in each box where all expressions in `rows`
 /// are nowhere negative.
-pub(super) fn follows(rows: &[Linear], sums: &[Sum]) -> bool {
+pub(super) fn is_implied(rows: &[Linear], sums: &[Sum]) -> bool {
     sums.iter().any(|sum| {
-        lowest(sum).is_some_and(|own| {
+        minimum_expression(sum).is_some_and(|own| {
             rows.iter().any(|row| {
                 let factor = own.ratio(row);
                 factor.is_some_and(|factor| {
@@ -402,7 +408,7 @@ pub(super) fn follows(rows: &[Linear], sums: &[Sum]) -> bool {
 }
 
 /// Returns the expression whose least value in a box is the sum, or `None` if there is no such expression.
-fn lowest(sum: &Sum) -> Option<Linear> {
+fn minimum_expression(sum: &Sum) -> Option<Linear> {
     let mut lowest = Linear::number(sum.constant.clone());
     for term in &sum.terms {
         let is_lowest = match term.end {

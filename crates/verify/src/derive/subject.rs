@@ -16,7 +16,7 @@ use crate::certificate::Certificate;
 
 /// The event at a time point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum What {
+pub(super) enum PointKind {
     /// Time zero.
     Zero,
     /// The start of the step at this position.
@@ -31,7 +31,7 @@ pub(super) enum What {
 
 /// A time point of the plan.
 pub(super) struct Point {
-    pub(super) what: What,
+    pub(super) kind: PointKind,
     /// The time in the plan.
     pub(super) time: Rational,
     pub(super) footprint: Footprint,
@@ -43,7 +43,7 @@ pub(super) struct Point {
 
 impl Point {
     /// Returns `true` if the fact has the wanted truth value after this point, in every state.
-    pub(super) fn makes(&self, fact: FactId, wanted: bool) -> bool {
+    pub(super) fn establishes(&self, fact: FactId, wanted: bool) -> bool {
         if wanted {
             self.adds.contains(&fact)
         } else {
@@ -52,7 +52,7 @@ impl Point {
     }
 
     /// Returns `true` if this point may change the fact from its wanted truth value.
-    pub(super) fn spoils(&self, fact: FactId, wanted: bool) -> bool {
+    pub(super) fn threatens(&self, fact: FactId, wanted: bool) -> bool {
         if wanted {
             self.footprint.deletes.contains(&fact) && !self.adds.contains(&fact)
         } else {
@@ -62,7 +62,7 @@ impl Point {
 
     /// Returns `true` if this point changes a fact or fluent in `read`.
     pub(super) fn writes(&self, read: &Footprint) -> bool {
-        self.footprint.writes_what_is_read_by(read)
+        self.footprint.writes_reads_of(read)
     }
 }
 
@@ -97,7 +97,7 @@ impl<'a> Subject<'a> {
         given: Option<&Given<'_>>,
         initials: BTreeMap<FluentId, usize>,
     ) -> Result<Self, NotDerived> {
-        if let Some(feature) = task.left_to_the_judge() {
+        if let Some(feature) = task.unsupported_by_analysis() {
             return Err(NotDerived::unknown(feature));
         }
         let (steps, names) = if let Some(given) = given {
@@ -116,22 +116,22 @@ impl<'a> Subject<'a> {
             initials,
             is_plain: true,
         };
-        subject.add(What::Zero, Rational::ZERO, Footprint::default(), &[]);
+        subject.add(PointKind::Zero, Rational::ZERO, Footprint::default(), &[]);
         for position in 0..subject.steps.len() {
             let step = subject.steps[position];
             let start = Footprint::of_start(task, &step.action);
             let first = subject.points.len();
             match (&step.action.body, &step.duration) {
                 (Body::Instantaneous(snap), None) => {
-                    let what = What::Instant(position);
+                    let what = PointKind::Instant(position);
                     subject.add(what, step.start.clone(), start, &snap.effects);
                     subject.ends.push([first, first]);
                 }
                 (Body::Durative(body), Some(_)) => {
-                    let what = What::Start(position);
+                    let what = PointKind::Start(position);
                     subject.add(what, step.start.clone(), start, &body.start.effects);
                     let end = Footprint::of_end(task, &step.action);
-                    subject.add(What::End(position), step.end(), end, &body.end.effects);
+                    subject.add(PointKind::End(position), step.end(), end, &body.end.effects);
                     subject.ends.push([first, first + 1]);
                 }
                 _ => {
@@ -143,17 +143,17 @@ impl<'a> Subject<'a> {
         for (index, timed) in task.timed().iter().enumerate() {
             let footprint = Footprint::of_timed(timed);
             subject.points.push(Point {
-                what: What::Timed(index),
+                kind: PointKind::Timed(index),
                 time: timed.time.clone(),
                 adds: footprint.adds.clone(),
                 deletes: footprint.deletes.clone(),
                 footprint,
             });
         }
-        subject.look_at_conditions()?;
+        subject.examine_conditions()?;
         if let Some(given) = given {
             for (step, body) in subject.durative() {
-                if !given.is_told(step) && Self::reads_duration_early(body) {
+                if !given.has_known_duration(step) && Self::reads_duration_early(body) {
                     let name = &subject.steps[step].action.name;
                     let what = format!("an effect that depends on the duration of {name}");
                     return Err(NotDerived::Unknown(what));
@@ -163,7 +163,7 @@ impl<'a> Subject<'a> {
         Ok(subject)
     }
 
-    fn add(&mut self, what: What, time: Rational, footprint: Footprint, effects: &[Effect]) {
+    fn add(&mut self, what: PointKind, time: Rational, footprint: Footprint, effects: &[Effect]) {
         let (mut adds, mut deletes) = (BTreeSet::new(), BTreeSet::new());
         for effect in effects.iter().filter(|effect| effect.guard.is_trivial()) {
             match effect.change {
@@ -177,7 +177,7 @@ impl<'a> Subject<'a> {
             }
         }
         self.points.push(Point {
-            what,
+            kind: what,
             time,
             footprint,
             adds,
@@ -187,10 +187,10 @@ impl<'a> Subject<'a> {
 
     /// Returns `true` if an effect of an action at this point has a condition.
     pub(super) fn has_guards(&self, point: usize) -> bool {
-        let (step, is_end) = match self.points[point].what {
-            What::Zero | What::Timed(_) => return false,
-            What::Start(step) | What::Instant(step) => (step, false),
-            What::End(step) => (step, true),
+        let (step, is_end) = match self.points[point].kind {
+            PointKind::Zero | PointKind::Timed(_) => return false,
+            PointKind::Start(step) | PointKind::Instant(step) => (step, false),
+            PointKind::End(step) => (step, true),
         };
         let effects = match &self.steps[step].action.body {
             Body::Instantaneous(snap) => &snap.effects,
@@ -224,12 +224,12 @@ impl<'a> Subject<'a> {
 
     /// Returns the name of the point in certificates.
     pub(super) fn label(&self, point: usize) -> String {
-        match self.points[point].what {
-            What::Zero => ".zero".to_owned(),
-            What::Start(step) => format!("{}.start", self.names[step]),
-            What::End(step) => format!("{}.end", self.names[step]),
-            What::Instant(step) => self.names[step].clone(),
-            What::Timed(index) => format!(".timed{index}"),
+        match self.points[point].kind {
+            PointKind::Zero => ".zero".to_owned(),
+            PointKind::Start(step) => format!("{}.start", self.names[step]),
+            PointKind::End(step) => format!("{}.end", self.names[step]),
+            PointKind::Instant(step) => self.names[step].clone(),
+            PointKind::Timed(index) => format!(".timed{index}"),
         }
     }
 
@@ -321,7 +321,7 @@ impl<'a> Subject<'a> {
 
     /// Determines whether the plan is plain, and checks that bounds on durations do not read
     /// durations.
-    fn look_at_conditions(&mut self) -> Result<(), NotDerived> {
+    fn examine_conditions(&mut self) -> Result<(), NotDerived> {
         let mut is_plain = true;
         for step in &self.steps {
             let (start, end) = match &step.action.body {

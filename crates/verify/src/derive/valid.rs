@@ -9,7 +9,7 @@ use super::failures::Failure;
 use super::histories::Histories;
 use super::linear::Inequality;
 use super::numbers::Numbers;
-use super::subject::{Subject, What, is_condition_of_state};
+use super::subject::{PointKind, Subject, is_condition_of_state};
 use super::{NotDerived, failures};
 
 /// Failures of conditions that no schedule has for values in the box.
@@ -42,7 +42,7 @@ pub(super) fn check(
         for condition in body.over_all.conjuncts() {
             let literal = subject.literal(condition);
             if let Some(literal) = literal
-                && checker.keeps(step, literal)?
+                && checker.is_preserved(step, literal)?
             {
                 continue;
             }
@@ -50,7 +50,7 @@ pub(super) fn check(
             let mut fluents = read.reads_fluents.iter();
             let has_steps_alone = fluents.all(|fluent| histories.has_steps_alone(*fluent))
                 && is_condition_of_state(condition);
-            if has_steps_alone && checker.keeps_sides(step, &read)? {
+            if has_steps_alone && checker.keeps_planned_values(step, &read)? {
                 continue;
             }
             let failures =
@@ -59,7 +59,7 @@ pub(super) fn check(
                 if !checker.numbers.refutes(failure)? {
                     let what = format!(
                         "in some schedules of the network, {} may fail",
-                        failure.what
+                        failure.description
                     );
                     return Err(if literal.is_some() {
                         NotDerived::differs(what)
@@ -113,7 +113,10 @@ impl Checker<'_, '_> {
                 } else {
                     (later, earlier)
                 };
-                let are_timed = matches!((one.what, other.what), (What::Timed(_), What::Timed(_)));
+                let are_timed = matches!(
+                    (one.kind, other.kind),
+                    (PointKind::Timed(_), PointKind::Timed(_))
+                );
                 let apart = (&one.time - &other.time).abs();
                 let least = if are_timed {
                     apart.min(epsilon.clone())
@@ -133,7 +136,7 @@ impl Checker<'_, '_> {
                 let mut expression = second.minus(&first);
                 expression.constant -= least;
                 failures.push(Failure {
-                    what: String::new(),
+                    description: String::new(),
                     moment: None,
                     inequalities: vec![Inequality {
                         expression,
@@ -148,10 +151,14 @@ impl Checker<'_, '_> {
     /// Returns `true` if a fact keeps its wanted truth value throughout a step. It has the value initially, or
     /// a point no later than the start establishes it. All points that may change it come before that point,
     /// or after the end.
-    fn keeps(&mut self, step: usize, (fact, wanted): (FactId, bool)) -> Result<bool, NotDerived> {
+    fn is_preserved(
+        &mut self,
+        step: usize,
+        (fact, wanted): (FactId, bool),
+    ) -> Result<bool, NotDerived> {
         let subject = self.subject;
         let [start, end] = subject.ends[step];
-        let spoils = |index: &usize| subject.points[*index].spoils(fact, wanted);
+        let spoils = |index: &usize| subject.points[*index].threatens(fact, wanted);
         let all = 1..subject.points.len();
         let mut spoiling = Vec::new();
         for point in all.clone().filter(spoils) {
@@ -162,7 +169,7 @@ impl Checker<'_, '_> {
         if spoiling.is_empty() && subject.task.initial().facts.contains(&fact) == wanted {
             return Ok(true);
         }
-        for since in all.filter(|index| subject.points[*index].makes(fact, wanted)) {
+        for since in all.filter(|index| subject.points[*index].establishes(fact, wanted)) {
             if since == end || (since != start && !self.is_before(since, start, &Rational::ZERO)?) {
                 continue;
             }
@@ -179,7 +186,7 @@ impl Checker<'_, '_> {
 
     /// Returns `true` if the facts and fluents in `read` have the same sequence of values throughout a step
     /// as in the plan: each writer is before the action, after it, or inside it in a fixed order.
-    fn keeps_sides(&mut self, step: usize, read: &Footprint) -> Result<bool, NotDerived> {
+    fn keeps_planned_values(&mut self, step: usize, read: &Footprint) -> Result<bool, NotDerived> {
         let subject = self.subject;
         let [start, end] = subject.ends[step];
         let time = |point: usize| &subject.points[point].time;

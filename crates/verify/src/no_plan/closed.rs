@@ -11,12 +11,12 @@
 //!
 //! A listed state covers more than itself. Its bounds cover all times within them. A number that it
 //! does not list may have any value. It may have more facts than the covered state if these never
-//! do harm (`welcome`). Interchangeable objects (`alike`) may be exchanged.
+//! do harm (`harmless_when_true`). Interchangeable objects (`alike`) may be exchanged.
 
-pub(super) mod alike;
-mod reading;
-mod view;
-mod written;
+mod format;
+mod partial_state;
+mod relevant_symbols;
+pub(super) mod symmetry;
 pub mod zone;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,10 +28,10 @@ use elbowroom_num::Rational;
 
 use super::instances::Instances;
 use super::processes::Process;
-use super::{NoPlanFlaw, Reached};
-use alike::Exchange;
-use view::{View, updated};
-pub use written::{Closed, ClosedState};
+use super::{NoPlanFlaw, ReachedFacts};
+pub use format::{ClosedSet, ClosedState};
+use partial_state::{View, updated};
+use symmetry::Exchange;
 use zone::Zone;
 
 /// Positions of time 0, of the current time, and of the first start of a running action among the
@@ -44,7 +44,7 @@ pub const FIRST_START: usize = 2;
 
 /// A running action, with the least and the greatest duration that it may have.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct UnderWay {
+pub struct RunningProcess {
     pub(super) process: usize,
     /// Least duration.
     pub least: Rational,
@@ -56,7 +56,7 @@ pub struct UnderWay {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Node {
     /// Running actions, sorted.
-    pub under_way: Vec<UnderWay>,
+    pub running: Vec<RunningProcess>,
     /// Number of pending timed initials that have happened.
     pub timed: usize,
     pub(super) facts: BTreeSet<FactId>,
@@ -79,7 +79,7 @@ pub struct Closure<'a> {
     /// Facts that something reads and something changes.
     pub(super) facts: BTreeSet<FactId>,
     /// Changing facts that do no harm when they are true.
-    welcome: BTreeSet<FactId>,
+    harmless_when_true: BTreeSet<FactId>,
     pub(super) fluents: BTreeSet<FluentId>,
     /// Processes by title. An action that may start and one that is running initially have
     /// different titles.
@@ -88,7 +88,7 @@ pub struct Closure<'a> {
 }
 
 /// Largest number of effects of one happening whose conditions may be undecided.
-const MOST_OPEN: usize = 4;
+const MAX_OPEN: usize = 4;
 
 impl<'a> Closure<'a> {
     /// Creates the closure of the instances that the list of facts allows, with classes of
@@ -98,14 +98,14 @@ impl<'a> Closure<'a> {
     /// When the problem has an unsupported feature, or objects are not interchangeable.
     pub fn of(
         instances: &'a Instances,
-        reached: &Reached,
+        reached: &ReachedFacts,
         alike: &[Vec<ObjectId>],
     ) -> Result<Self, NoPlanFlaw> {
         if !instances.task.problem().rules.is_empty() {
             return Err(NoPlanFlaw::Unknown("derived predicates among states"));
         }
         let processes = instances.processes(reached);
-        let reading = reading::Reading::of(instances, &processes);
+        let reading = relevant_symbols::RelevantSymbols::of(instances, &processes);
         let mut names = BTreeMap::new();
         for (number, process) in processes.iter().enumerate() {
             if names.insert(process.title(), number).is_some() {
@@ -114,31 +114,31 @@ impl<'a> Closure<'a> {
         }
         let mut closure = Self {
             instances,
-            timed: &instances.beginning.timed,
+            timed: &instances.initial.timed,
             read: reading.read,
             read_fluents: reading.read_fluents,
             flowing: reading.flowing,
             facts: reading.facts,
-            welcome: reading.welcome,
+            harmless_when_true: reading.harmless_when_true,
             fluents: reading.fluents,
             names,
             exchanges: Vec::new(),
             processes,
         };
-        closure.exchanges = alike::exchanges(&closure, alike)?;
+        closure.exchanges = symmetry::exchanges(&closure, alike)?;
         Ok(closure)
     }
 
     /// Returns the initial state.
     pub fn initial(&self) -> Node {
         let state = self.instances.task.initial();
-        let now = &self.instances.beginning.now;
+        let now = &self.instances.initial.now;
         let mut under_way = Vec::new();
         let mut starts = Vec::new();
         for (process, own) in self.processes.iter().enumerate() {
-            if let Some(begun) = &own.begun {
+            if let Some(begun) = &own.initial_start {
                 let (least, most) = (own.least.clone(), own.most.clone());
-                under_way.push(UnderWay {
+                under_way.push(RunningProcess {
                     process,
                     least,
                     most,
@@ -157,7 +157,7 @@ impl<'a> Closure<'a> {
             .iter()
             .filter(|(own, _)| self.fluents.contains(own));
         Node {
-            under_way,
+            running: under_way,
             timed: 0,
             facts: state.facts.intersection(&self.facts).copied().collect(),
             values: values.map(|(own, value)| (*own, value.clone())).collect(),
@@ -173,7 +173,7 @@ impl<'a> Closure<'a> {
             node,
             duration: None,
         };
-        node.under_way.is_empty()
+        node.running.is_empty()
             && node.timed == self.timed.len()
             && view.may_hold(self.instances.task.goal())
     }
@@ -189,7 +189,7 @@ impl<'a> Closure<'a> {
                 self.start(node, number, &mut found)?;
             }
         }
-        for place in 0..node.under_way.len() {
+        for place in 0..node.running.len() {
             self.end(node, place, &mut found)?;
         }
         if let Some(happening) = self.timed.get(node.timed)
@@ -198,7 +198,7 @@ impl<'a> Closure<'a> {
             let sure: Vec<Effect> = happening.changes.iter().map(always).collect();
             for mut after in self.changed(node, &sure, None)? {
                 after.timed += 1;
-                after.zone = zone.select(&times(node.under_way.len(), &zone));
+                after.zone = zone.select(&times(node.running.len(), &zone));
                 self.keep(after, &mut found);
             }
         }
@@ -239,7 +239,7 @@ impl<'a> Closure<'a> {
             if most.as_ref().is_some_and(|most| *most < least) {
                 return Ok(());
             }
-            own = Some(UnderWay {
+            own = Some(RunningProcess {
                 process: number,
                 least,
                 most,
@@ -252,10 +252,10 @@ impl<'a> Closure<'a> {
             .as_ref()
             .and_then(|own| (own.most.as_ref() == Some(&own.least)).then(|| own.least.clone()));
         for mut after in self.changed(node, &snap.effects, duration)? {
-            let mut order = times(node.under_way.len(), &zone);
+            let mut order = times(node.running.len(), &zone);
             if let Some(own) = &own {
-                let place = after.under_way.partition_point(|other| other <= own);
-                after.under_way.insert(place, own.clone());
+                let place = after.running.partition_point(|other| other <= own);
+                after.running.insert(place, own.clone());
                 order.insert(FIRST_START + place, zone.size() - 1);
             }
             after.zone = zone.select(&order);
@@ -265,7 +265,7 @@ impl<'a> Closure<'a> {
     }
 
     fn end(&self, node: &Node, place: usize, found: &mut Vec<Node>) -> Result<(), NoPlanFlaw> {
-        let own = &node.under_way[place];
+        let own = &node.running[place];
         let Some(body) = self.processes[own.process].durative() else {
             return Ok(());
         };
@@ -282,8 +282,8 @@ impl<'a> Closure<'a> {
             return Ok(());
         };
         for mut after in self.changed(node, &body.end.effects, duration)? {
-            after.under_way.remove(place);
-            let mut order = times(node.under_way.len(), &zone);
+            after.running.remove(place);
+            let mut order = times(node.running.len(), &zone);
             order.remove(FIRST_START + place);
             after.zone = zone.select(&order);
             self.keep(after, found);
@@ -298,7 +298,7 @@ impl<'a> Closure<'a> {
         let mut zone = node.zone.with_another();
         let then = zone.size() - 1;
         zone.limit(NOW, then, &Rational::ZERO);
-        for (place, own) in node.under_way.iter().enumerate() {
+        for (place, own) in node.running.iter().enumerate() {
             if let Some(most) = &own.most {
                 zone.limit(then, FIRST_START + place, most);
             }
@@ -360,7 +360,7 @@ impl<'a> Closure<'a> {
             }
             Change::Add(fact) | Change::Delete(fact) => self.facts.contains(fact),
         });
-        if open.len() > MOST_OPEN {
+        if open.len() > MAX_OPEN {
             return Err(NoPlanFlaw::Unknown("too many effects that are undecided"));
         }
         let subsets = (0..1_usize << open.len()).map(|subset| {
@@ -394,11 +394,11 @@ impl<'a> Closure<'a> {
             node: &node,
             duration: None,
         };
-        let is_kept = |own: &UnderWay| {
+        let is_kept = |own: &RunningProcess| {
             let mut literals = self.processes[own.process].over_all.iter();
             literals.all(|(fact, is_true)| view.is_true(*fact) == *is_true)
         };
-        if node.under_way.iter().all(is_kept) {
+        if node.running.iter().all(is_kept) {
             found.push(node);
         }
     }
@@ -406,13 +406,13 @@ impl<'a> Closure<'a> {
     /// Returns `true` if `node` covers `other`.
     pub fn covers(&self, node: &Node, other: &Node) -> bool {
         let has = |fact: &FactId| node.facts.contains(fact);
-        node.under_way == other.under_way
+        node.running == other.running
             && node.timed == other.timed
             && other.facts.iter().all(has)
             && node
                 .facts
                 .iter()
-                .all(|fact| other.facts.contains(fact) || self.welcome.contains(fact))
+                .all(|fact| other.facts.contains(fact) || self.harmless_when_true.contains(fact))
             && node
                 .values
                 .iter()
@@ -421,7 +421,7 @@ impl<'a> Closure<'a> {
     }
 
     /// Returns a representative of the states that result from exchanges of objects.
-    pub fn settled(&self, mut node: Node) -> Node {
+    pub fn canonical(&self, mut node: Node) -> Node {
         loop {
             let images = self.exchanges.iter().map(|own| own.image(&node));
             let Some(least) = images.min().filter(|least| *least < node) else {
@@ -436,16 +436,16 @@ impl<'a> Closure<'a> {
     /// # Errors
     /// The first flaw.
     pub fn check(&self, nodes: &[Node]) -> Result<(), NoPlanFlaw> {
-        let mut by_kind: BTreeMap<(&[UnderWay], usize), Vec<&Node>> = BTreeMap::new();
+        let mut by_kind: BTreeMap<(&[RunningProcess], usize), Vec<&Node>> = BTreeMap::new();
         for node in nodes {
             by_kind
-                .entry((&node.under_way, node.timed))
+                .entry((&node.running, node.timed))
                 .or_default()
                 .push(node);
         }
         let is_covered = |node: Node| {
-            let node = self.settled(node);
-            let known = by_kind.get(&(&node.under_way[..], node.timed));
+            let node = self.canonical(node);
+            let known = by_kind.get(&(&node.running[..], node.timed));
             known.is_some_and(|known| known.iter().any(|own| self.covers(own, &node)))
         };
         if !is_covered(self.initial()) {

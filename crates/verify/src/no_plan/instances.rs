@@ -7,10 +7,10 @@ use elbowroom_model::problem::{self, Condition, ObjectId, PredicateId, SchemaId,
 use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::Rational;
 
-use super::beginning::{Beginning, lasting};
-use super::lasting::Lasting;
-use super::moments::HeldTo;
-use super::{Fact, Moments, NoPlanFlaw, Reached};
+use super::earliest_times::ConditionContext;
+use super::initial_state::{InitialState, lasting};
+use super::static_facts::StaticFacts;
+use super::{EarliestTimes, Fact, NoPlanFlaw, ReachedFacts};
 
 /// A fact that can become true although it is not listed, or earlier than listed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,8 +27,8 @@ pub struct Breach {
 #[derive(Debug)]
 pub struct Instances {
     pub(super) task: Task,
-    pub(super) beginning: Beginning,
-    pub(super) lasting: Lasting,
+    pub(super) initial: InitialState,
+    pub(super) static_facts: StaticFacts,
     pub(super) actions: Vec<Action>,
     known: BTreeSet<(SchemaId, Vec<ObjectId>)>,
     /// By schema.
@@ -58,12 +58,12 @@ impl Instances {
     /// # Errors
     /// When the task has a feature that the checker does not support.
     pub fn from(task: &Task, situation: &Situation) -> Result<Self, NoPlanFlaw> {
-        if let Some(feature) = task.left_to_the_judge() {
+        if let Some(feature) = task.unsupported_by_analysis() {
             return Err(NoPlanFlaw::Unknown(feature));
         }
         // Ids of facts that only the checker mentions belong to its own copy of the task.
-        let (beginning, task) = Beginning::of(task, situation);
-        let lasting = Lasting::of(&task, &beginning);
+        let (beginning, task) = InitialState::of(task, situation);
+        let lasting = StaticFacts::of(&task, &beginning);
         let schemas = task.problem().schemas.iter();
         let heads = task.problem().rules.iter().map(|rule| rule.predicate);
         let derived: BTreeSet<PredicateId> = heads.collect();
@@ -71,8 +71,8 @@ impl Instances {
             .map(|schema| needs(schema, &lasting, &derived))
             .collect();
         Ok(Self {
-            beginning,
-            lasting,
+            initial: beginning,
+            static_facts: lasting,
             actions: Vec::new(),
             known: BTreeSet::new(),
             needs,
@@ -86,7 +86,7 @@ impl Instances {
     /// When the task has a feature that the checker does not support.
     pub fn with_assumed_values(task: &Task, situation: &Situation) -> Result<Self, NoPlanFlaw> {
         let mut instances = Self::from(task, situation)?;
-        instances.lasting.assumes_values = true;
+        instances.static_facts.assumes_values = true;
         Ok(instances)
     }
 
@@ -94,7 +94,7 @@ impl Instances {
     ///
     /// # Errors
     /// [`NoPlanFlaw::TooMany`] after `most_steps` tries.
-    pub fn extend(&mut self, reached: &Reached, most_steps: u64) -> Result<u64, NoPlanFlaw> {
+    pub fn extend(&mut self, reached: &ReachedFacts, most_steps: u64) -> Result<u64, NoPlanFlaw> {
         let mut steps = most_steps;
         for number in 0..self.needs.len() {
             let mut binding = Vec::new();
@@ -107,7 +107,7 @@ impl Instances {
     fn bind(
         &mut self,
         schema: SchemaId,
-        reached: &Reached,
+        reached: &ReachedFacts,
         binding: &mut Vec<ObjectId>,
         steps: &mut u64,
     ) -> Result<(), NoPlanFlaw> {
@@ -122,9 +122,9 @@ impl Instances {
             {
                 // No plan contains an instance that reads a fluent without a value.
                 let mut valueless = BTreeSet::new();
-                self.lasting
+                self.static_facts
                     .read_by_action(&self.task, &action, &mut valueless);
-                if valueless.is_empty() || self.lasting.assumes_values {
+                if valueless.is_empty() || self.static_facts.assumes_values {
                     self.actions.push(action);
                 }
             }
@@ -140,7 +140,7 @@ impl Instances {
     }
 
     /// Returns `true` if all needs that the last bound parameter completes can be satisfied.
-    fn may_be_bound(&self, schema: SchemaId, reached: &Reached, binding: &[ObjectId]) -> bool {
+    fn may_be_bound(&self, schema: SchemaId, reached: &ReachedFacts, binding: &[ObjectId]) -> bool {
         let Needs { atoms, pairs } = &self.needs[schema.index()];
         let object = |term: &Term| match term {
             Term::Variable(variable) => binding.get(*variable).copied(),
@@ -155,7 +155,7 @@ impl Instances {
                 let objects: Option<Vec<ObjectId>> = atom.arguments.iter().map(object).collect();
                 let Some(objects) = objects else { return true };
                 let fact = (atom.predicate, objects);
-                match self.lasting.spans(&fact) {
+                match self.static_facts.spans(&fact) {
                     Some(spans) => !spans.is_empty(),
                     None => reached.contains_key(&fact),
                 }
@@ -174,20 +174,20 @@ impl Instances {
 
     /// Returns all violations of the list, with the earliest time of each fact. If there are none,
     /// and all instances have been added, the list is an invariant.
-    pub fn breaches(&self, reached: &Reached) -> Vec<Breach> {
+    pub fn breaches(&self, reached: &ReachedFacts) -> Vec<Breach> {
         let mut breaches = Vec::new();
         let mut note = |fact: Fact, time: &Rational, by: &dyn Fn() -> String| {
             let is_listed = reached.get(&fact).is_some_and(|from| from <= time);
-            if !is_listed && self.lasting.spans(&fact).is_none() {
+            if !is_listed && self.static_facts.spans(&fact).is_none() {
                 let (time, by) = (time.clone(), by());
                 breaches.push(Breach { fact, time, by });
             }
         };
         for &fact in &self.task.initial().facts {
             let by = || "the initial state".to_owned();
-            note(self.task.atom(fact), &self.beginning.now, &by);
+            note(self.task.atom(fact), &self.initial.now, &by);
         }
-        for happening in &self.beginning.timed {
+        for happening in &self.initial.timed {
             for change in &happening.changes {
                 if let Change::Add(fact) = change {
                     let by = || "a timed initial".to_owned();
@@ -195,21 +195,21 @@ impl Instances {
                 }
             }
         }
-        let moments = self.moments(reached);
+        let moments = self.earliest_times(reached);
         for action in &self.actions {
-            for (fact, time) in brought_about(&moments, action) {
+            for (fact, time) in achievable_facts(&moments, action) {
                 note(fact, &time, &|| format!("`{}`", action.name));
             }
         }
-        for running in &self.beginning.running {
-            for (fact, time) in brought_about_by_end(&moments, running) {
+        for running in &self.initial.running {
+            for (fact, time) in facts_achieved_by_end(&moments, running) {
                 note(fact, &time, &|| {
                     format!("`{}`, under way", running.action.name)
                 });
             }
         }
         for rule in self.task.rules().iter() {
-            if let Some(time) = moments.next(&rule.body, &self.beginning.now, HeldTo::All) {
+            if let Some(time) = moments.next(&rule.body, &self.initial.now, ConditionContext::All) {
                 note(self.task.atom(rule.head), &time, &|| "a rule".to_owned());
             }
         }
@@ -217,22 +217,23 @@ impl Instances {
     }
 
     /// Returns `true` if the list does not exclude the goal.
-    pub fn is_goal_in_reach(&self, reached: &Reached) -> bool {
-        self.moments(reached).can_hold_in_the_end(self.task.goal())
+    pub fn is_goal_in_reach(&self, reached: &ReachedFacts) -> bool {
+        self.earliest_times(reached)
+            .can_hold_at_end(self.task.goal())
     }
 
-    pub(super) fn moments<'a>(&'a self, reached: &'a Reached) -> Moments<'a> {
-        Moments {
+    pub(super) fn earliest_times<'a>(&'a self, reached: &'a ReachedFacts) -> EarliestTimes<'a> {
+        EarliestTimes {
             task: &self.task,
-            lasting: &self.lasting,
+            static_facts: &self.static_facts,
             reached,
-            now: &self.beginning.now,
+            now: &self.initial.now,
         }
     }
 }
 
 /// Returns the facts that an action adds, with their earliest times.
-fn brought_about(moments: &Moments<'_>, action: &Action) -> Vec<(Fact, Rational)> {
+fn achievable_facts(moments: &EarliestTimes<'_>, action: &Action) -> Vec<(Fact, Rational)> {
     let mut facts = Vec::new();
     let mut add = |effects: &[Effect], start: &Rational, time: &Rational| {
         for effect in effects {
@@ -240,8 +241,8 @@ fn brought_about(moments: &Moments<'_>, action: &Action) -> Vec<(Fact, Rational)
                 continue;
             };
             let guard = &effect.guard;
-            let reads = moments.next(&guard.at_start, start, HeldTo::All);
-            let happens = moments.next(&guard.now, time, HeldTo::All);
+            let reads = moments.next(&guard.at_start, start, ConditionContext::All);
+            let happens = moments.next(&guard.now, time, ConditionContext::All);
             if let (Some(_), Some(time)) = (reads, happens) {
                 facts.push((moments.task.atom(fact), time));
             }
@@ -254,10 +255,10 @@ fn brought_about(moments: &Moments<'_>, action: &Action) -> Vec<(Fact, Rational)
             }
         }
         Body::Durative(body) => {
-            if let Some((start, _)) = moments.ends(body, HeldTo::Lasting) {
+            if let Some((start, _)) = moments.ends(body, ConditionContext::StaticOnly) {
                 add(&body.start.effects, &start, &start);
             }
-            if let Some((start, end)) = moments.ends(body, HeldTo::All) {
+            if let Some((start, end)) = moments.ends(body, ConditionContext::All) {
                 add(&body.end.effects, &start, &end);
             }
         }
@@ -266,14 +267,17 @@ fn brought_about(moments: &Moments<'_>, action: &Action) -> Vec<(Fact, Rational)
 }
 
 /// Returns the facts that the end of a running action adds, with their earliest times.
-fn brought_about_by_end(moments: &Moments<'_>, running: &RunningAction) -> Vec<(Fact, Rational)> {
+fn facts_achieved_by_end(
+    moments: &EarliestTimes<'_>,
+    running: &RunningAction,
+) -> Vec<(Fact, Rational)> {
     let Some(body) = running.action.durative() else {
         return Vec::new();
     };
     let (least, most) = lasting(running, moments.now);
     let earliest = &running.start + &least;
     // The over-all condition is ignored: another happening may establish it at once.
-    let Some(end) = moments.next(&body.end.condition, &earliest, HeldTo::All) else {
+    let Some(end) = moments.next(&body.end.condition, &earliest, ConditionContext::All) else {
         return Vec::new();
     };
     if most.is_some_and(|most| end > &running.start + &most) {
@@ -283,7 +287,7 @@ fn brought_about_by_end(moments: &Moments<'_>, running: &RunningAction) -> Vec<(
         let Change::Add(fact) = effect.change else {
             return None;
         };
-        let time = moments.next(&effect.guard.now, &end, HeldTo::All)?;
+        let time = moments.next(&effect.guard.now, &end, ConditionContext::All)?;
         Some((moments.task.atom(fact), time))
     });
     adds.collect()
@@ -291,7 +295,11 @@ fn brought_about_by_end(moments: &Moments<'_>, running: &RunningAction) -> Vec<(
 
 /// Returns the [`Needs`] of a schema. Derived facts are left out, because their rules are ground
 /// only for instances that mention them.
-fn needs(schema: &problem::Schema, lasting: &Lasting, derived: &BTreeSet<PredicateId>) -> Needs {
+fn needs(
+    schema: &problem::Schema,
+    lasting: &StaticFacts,
+    derived: &BTreeSet<PredicateId>,
+) -> Needs {
     let mut needs = Needs::default();
     let is_basic = |atom: &problem::Atom| !derived.contains(&atom.predicate);
     match &schema.body {
@@ -309,7 +317,7 @@ fn needs(schema: &problem::Schema, lasting: &Lasting, derived: &BTreeSet<Predica
             // instances.
             let is_fixed = |atom: &problem::Atom| lasting.is_fixed(atom.predicate);
             collect(at_end, &is_fixed, &mut needs);
-            if takes_time(schema) {
+            if has_positive_duration(schema) {
                 collect(over_all, &is_fixed, &mut needs);
             }
         }
@@ -318,7 +326,7 @@ fn needs(schema: &problem::Schema, lasting: &Lasting, derived: &BTreeSet<Predica
 }
 
 /// Returns `true` if a constant lower bound implies that all instances have a positive duration.
-fn takes_time(schema: &problem::Schema) -> bool {
+fn has_positive_duration(schema: &problem::Schema) -> bool {
     let problem::Body::Durative { duration, .. } = &schema.body else {
         return false;
     };

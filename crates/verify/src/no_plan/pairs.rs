@@ -26,9 +26,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use elbowroom_model::ground::{Change, Condition};
 use elbowroom_num::Rational;
 
-use super::Reached;
+use super::ReachedFacts;
+use super::earliest_times::{ConditionContext, EarliestTimes};
 use super::instances::Instances;
-use super::moments::{HeldTo, Moments};
 use super::processes::{Literal, Process, Snap};
 pub use rules::Claims;
 
@@ -119,7 +119,7 @@ pub(super) struct Operator {
 /// Atoms and happenings of a problem.
 #[derive(Debug)]
 pub struct Structure<'a> {
-    moments: Moments<'a>,
+    earliest_times: EarliestTimes<'a>,
     epsilon: &'a Rational,
     pub(super) processes: Vec<Process>,
     pub(super) atoms: Vec<Atom>,
@@ -131,11 +131,11 @@ pub struct Structure<'a> {
     times: Vec<Rational>,
     is_initial: Vec<bool>,
     /// Earliest time of each atom by the delete relaxation.
-    floor: Vec<Earliest>,
+    relaxed_times: Vec<Earliest>,
     /// Time just before the beginning.
     before: Earliest,
     /// Atoms that each atom implies: the over-all literals of a running action.
-    company: Vec<Vec<usize>>,
+    implied_atoms: Vec<Vec<usize>>,
     /// Literals of each atom.
     literals: Vec<Vec<Literal>>,
     /// Alternatives of the goal, each with its known atoms. One of them has to be true at the end.
@@ -143,16 +143,16 @@ pub struct Structure<'a> {
 }
 
 /// Largest number of alternatives of a goal with disjunctions.
-const MOST_GOALS: usize = 64;
+const MAX_GOALS: usize = 64;
 
 impl<'a> Structure<'a> {
     /// Creates the structure of the instances that the list of facts allows.
-    pub fn of(instances: &'a Instances, reached: &'a Reached) -> Self {
+    pub fn of(instances: &'a Instances, reached: &'a ReachedFacts) -> Self {
         let processes = instances.processes(reached);
-        let moments = instances.moments(reached);
-        let beginning = &instances.beginning;
+        let moments = instances.earliest_times(reached);
+        let beginning = &instances.initial;
         let mut structure = Self {
-            moments,
+            earliest_times: moments,
             epsilon: instances.task.epsilon(),
             atoms: Vec::new(),
             numbers: BTreeMap::new(),
@@ -161,9 +161,9 @@ impl<'a> Structure<'a> {
             start_of: vec![None; processes.len()],
             times: beginning.timed.iter().map(|own| own.time.clone()).collect(),
             is_initial: Vec::new(),
-            floor: Vec::new(),
+            relaxed_times: Vec::new(),
             before: Earliest::From(&beginning.now - instances.task.epsilon()),
-            company: Vec::new(),
+            implied_atoms: Vec::new(),
             literals: Vec::new(),
             goals: Vec::new(),
             processes,
@@ -211,7 +211,9 @@ impl<'a> Structure<'a> {
         // A fact that actions make false is an atom, even if no action makes it true.
         let snaps = self.processes.iter();
         let snaps = snaps.flat_map(|process| process.start.iter().chain(&process.end));
-        let makes: BTreeSet<Literal> = snaps.flat_map(|snap| snap.makes.iter().copied()).collect();
+        let makes: BTreeSet<Literal> = snaps
+            .flat_map(|snap| snap.may_make_true.iter().copied())
+            .collect();
         let is_timed_only = |(fact, is_true): &Literal| {
             *is_true && !makes.contains(&(*fact, false)) && instances.is_timed_only(*fact)
         };
@@ -220,9 +222,9 @@ impl<'a> Structure<'a> {
         for literal in wanted {
             let is_initial = facts.contains(&literal.0) == literal.1;
             let fact = instances.task.atom(literal.0);
-            let spans = instances.lasting.spans(&fact);
+            let spans = instances.static_facts.spans(&fact);
             let first = spans.map(|spans| spans.first().map(|span| &span.0));
-            let from = first.unwrap_or_else(|| self.moments.reached.get(&fact));
+            let from = first.unwrap_or_else(|| self.earliest_times.reached.get(&fact));
             let floor = match (literal.1, from) {
                 _ if is_initial => self.before.clone(),
                 (true, None) => Earliest::Never,
@@ -237,7 +239,7 @@ impl<'a> Structure<'a> {
                 continue;
             }
             let over_all = process.over_all.clone();
-            let is_begun = process.begun.is_some();
+            let is_begun = process.initial_start.is_some();
             self.add_atom(
                 Atom::Running(number),
                 is_begun,
@@ -253,7 +255,7 @@ impl<'a> Structure<'a> {
                 Atom::Running(process) => self.known(&self.processes[process].over_all),
                 _ => Vec::new(),
             };
-            self.company.push(company);
+            self.implied_atoms.push(company);
         }
     }
 
@@ -261,7 +263,7 @@ impl<'a> Structure<'a> {
         self.numbers.insert(atom, self.atoms.len());
         self.atoms.push(atom);
         self.is_initial.push(is_initial);
-        self.floor.push(floor);
+        self.relaxed_times.push(floor);
         self.literals.push(literals);
     }
 
@@ -278,7 +280,7 @@ impl<'a> Structure<'a> {
             let process = &self.processes[number];
             let running = self.numbers.get(&Atom::Running(number)).copied();
             let over_all = self.known(&process.over_all);
-            let moments = &self.moments;
+            let moments = &self.earliest_times;
             let now = moments.now;
             if let Some(start) = &process.start {
                 let mut operator = self.operator(Kind::Start(number), start);
@@ -286,7 +288,12 @@ impl<'a> Structure<'a> {
                 operator.holds = over_all.iter().copied().filter(is_others).collect();
                 operator.adds.extend(running);
                 let first = if let Some(body) = process.durative() {
-                    let first = moments.starts(body, now, HeldTo::Lasting, HeldTo::Lasting);
+                    let first = moments.starts(
+                        body,
+                        now,
+                        ConditionContext::StaticOnly,
+                        ConditionContext::StaticOnly,
+                    );
                     operator.has_windows = moments.is_timed(&body.start.condition)
                         || moments.is_timed(&body.over_all)
                         || moments.is_timed(&body.end.condition);
@@ -294,7 +301,7 @@ impl<'a> Structure<'a> {
                 } else {
                     let condition = process.instant();
                     operator.has_windows = moments.is_timed(condition);
-                    moments.next(condition, now, HeldTo::Lasting)
+                    moments.next(condition, now, ConditionContext::StaticOnly)
                 };
                 operator.is_possible = first.is_some();
                 self.start_of[number] = Some(self.operators.len());
@@ -305,11 +312,11 @@ impl<'a> Structure<'a> {
                 let mut operator = self.operator(Kind::End(number), end);
                 operator.holds = over_all;
                 operator.holds.extend(running);
-                if process.begun.is_some() {
+                if process.initial_start.is_some() {
                     operator.adds.extend(self.numbers.get(&Atom::Ended(number)));
                     operator.ends.extend(running);
                 }
-                let moments = &self.moments;
+                let moments = &self.earliest_times;
                 operator.has_windows =
                     moments.is_timed(&body.end.condition) || moments.is_timed(&body.over_all);
                 self.operators.push(operator);
@@ -327,7 +334,7 @@ impl<'a> Structure<'a> {
             kind,
             reads: self.known(&snap.reads),
             holds: Vec::new(),
-            adds: self.known(&snap.makes),
+            adds: self.known(&snap.may_make_true),
             ends: (0..self.atoms.len()).filter(is_ended).collect(),
             has_windows: false,
             is_possible: true,
@@ -414,7 +421,7 @@ fn split(condition: &Condition, truth: bool) -> Vec<Vec<Literal>> {
             let mut all: Vec<Vec<Literal>> = vec![Vec::new()];
             for part in parts {
                 let own = split(part, truth);
-                if all.len() * own.len() > MOST_GOALS {
+                if all.len() * own.len() > MAX_GOALS {
                     continue;
                 }
                 let both = all
@@ -426,7 +433,7 @@ fn split(condition: &Condition, truth: bool) -> Vec<Vec<Literal>> {
         }
         (Condition::Or(parts), true) | (Condition::And(parts), false) => {
             let all: Vec<_> = parts.iter().flat_map(|part| split(part, truth)).collect();
-            if all.len() > MOST_GOALS {
+            if all.len() > MAX_GOALS {
                 vec![Vec::new()]
             } else {
                 all

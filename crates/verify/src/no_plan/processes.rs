@@ -8,7 +8,7 @@
 //! conditions are satisfied: the start comes after the happenings at that time that make the
 //! literal true, and the end before those that make it false. Such an order exists unless starts,
 //! or ends, wait for each other in a cycle. Literals for which a cycle is possible are left out of
-//! [`Process::over_all`] ([`leave_out_circles`]), and so are all literals of an action that may
+//! [`Process::over_all`] ([`drop_cyclic_literals`]), and so are all literals of an action that may
 //! have duration 0.
 //!
 //! Numbers and disjunctions of over-all conditions are left out as well.
@@ -20,9 +20,9 @@ use elbowroom_model::ground::{Action, Body, Change, Condition, DurativeBody, Fac
 use elbowroom_model::problem::{ObjectId, SchemaId};
 use elbowroom_num::Rational;
 
-use super::beginning::lasting;
+use super::initial_state::lasting;
 use super::instances::Instances;
-use super::{Fact, Reached};
+use super::{Fact, ReachedFacts};
 
 /// A fact and its truth value.
 pub(super) type Literal = (FactId, bool);
@@ -45,7 +45,7 @@ pub(super) struct Process {
     /// Literals that hold while it is running.
     pub(super) over_all: Vec<Literal>,
     /// Start time, if it is running initially.
-    pub(super) begun: Option<Rational>,
+    pub(super) initial_start: Option<Rational>,
 }
 
 /// Literals that a happening reads and makes true.
@@ -54,9 +54,9 @@ pub(super) struct Snap {
     /// Literals among the conjuncts of its condition.
     pub(super) reads: Vec<Literal>,
     /// Literals that it may make true.
-    pub(super) makes: Vec<Literal>,
+    pub(super) may_make_true: Vec<Literal>,
     /// Literals that its effects certainly make true.
-    pub(super) leaves: Vec<Literal>,
+    pub(super) surely_makes_true: Vec<Literal>,
     /// `true` if it changes numbers.
     changes_numbers: bool,
 }
@@ -91,18 +91,18 @@ impl Snap {
             *known |= is_sure;
         }
         for (fact, is_sure) in &adds {
-            snap.makes.push((*fact, true));
+            snap.may_make_true.push((*fact, true));
             if *is_sure {
-                snap.leaves.push((*fact, true));
+                snap.surely_makes_true.push((*fact, true));
             }
         }
         for (fact, is_sure) in &deletes {
             let added = adds.get(fact);
             if added != Some(&true) {
-                snap.makes.push((*fact, false));
+                snap.may_make_true.push((*fact, false));
             }
             if *is_sure && added.is_none() {
-                snap.leaves.push((*fact, false));
+                snap.surely_makes_true.push((*fact, false));
             }
         }
         snap
@@ -110,7 +110,7 @@ impl Snap {
 
     /// Returns `true` if the literal is certainly false after it.
     pub(super) fn ends(&self, literal: Literal) -> bool {
-        self.leaves.contains(&(literal.0, !literal.1))
+        self.surely_makes_true.contains(&(literal.0, !literal.1))
     }
 }
 
@@ -136,8 +136,8 @@ pub(super) fn literals(condition: &Condition) -> Vec<Literal> {
 impl Instances {
     /// Returns all processes: first those that may start, by schema and arguments, then those that
     /// are running initially, in the order of the situation.
-    pub(super) fn processes(&self, reached: &Reached) -> Vec<Process> {
-        let moments = self.moments(reached);
+    pub(super) fn processes(&self, reached: &ReachedFacts) -> Vec<Process> {
+        let moments = self.earliest_times(reached);
         let of = |action: &Action| {
             let (start, end, bounds, over_all) = match &action.body {
                 Body::Instantaneous(snap) => (snap, None, None, Vec::new()),
@@ -162,7 +162,7 @@ impl Instances {
                 },
                 least,
                 most,
-                begun: None,
+                initial_start: None,
             })
         };
         let mut processes: Vec<Process> = self.actions.iter().filter_map(of).collect();
@@ -171,11 +171,11 @@ impl Instances {
             (one.schema, &one.arguments).cmp(&(other.schema, &other.arguments))
         });
         let truth = &self.task.initial().facts;
-        for running in &self.beginning.running {
+        for running in &self.initial.running {
             let Some(body) = running.action.durative() else {
                 continue;
             };
-            let (least, most) = lasting(running, &self.beginning.now);
+            let (least, most) = lasting(running, &self.initial.now);
             let mut over_all = literals(&body.over_all);
             // Literals that are false initially are left out: another happening may establish them
             // at once.
@@ -190,20 +190,20 @@ impl Instances {
                 least,
                 most,
                 over_all,
-                begun: Some(running.start.clone()),
+                initial_start: Some(running.start.clone()),
             });
         }
         for process in &mut processes {
             process.over_all.retain(|own| !self.task.is_derived(own.0));
         }
-        leave_out_circles(&mut processes);
+        drop_cyclic_literals(&mut processes);
         processes
     }
 
     /// Returns `true` if only timed initials make the fact true, so that its intervals are known.
     pub(super) fn is_timed_only(&self, fact: FactId) -> bool {
         let fact: Fact = self.task.atom(fact);
-        self.lasting.spans(&fact).is_some()
+        self.static_facts.spans(&fact).is_some()
     }
 }
 
@@ -211,13 +211,13 @@ impl Process {
     /// Returns its name in certificates, which distinguishes actions that may start from those
     /// running initially.
     pub(super) fn title(&self) -> String {
-        titled(self.begun.is_some(), &self.name)
+        titled(self.initial_start.is_some(), &self.name)
     }
 
     /// Returns its name with other arguments.
     pub(super) fn title_with(&self, task: &Task, arguments: &[ObjectId]) -> String {
         titled(
-            self.begun.is_some(),
+            self.initial_start.is_some(),
             &task.action_name(self.schema, arguments),
         )
     }
@@ -239,13 +239,16 @@ impl Process {
 
     /// Returns `true` if two instances that end together also started together, and together have
     /// the effects of a single one.
-    fn counts_once(&self) -> bool {
+    fn is_idempotent(&self) -> bool {
         let is_fixed = self.most.as_ref() == Some(&self.least);
         let snaps = self.start.iter().chain(&self.end);
         let flows = self
             .durative()
             .is_some_and(|body| !body.continuous.is_empty());
-        is_fixed && self.begun.is_none() && !flows && snaps.into_iter().all(|s| !s.changes_numbers)
+        is_fixed
+            && self.initial_start.is_none()
+            && !flows
+            && snaps.into_iter().all(|s| !s.changes_numbers)
     }
 }
 
@@ -259,7 +262,7 @@ fn titled(is_begun: bool, name: &str) -> String {
 
 /// Removes over-all literals for which simultaneous starts, or ends, might wait for each other in a
 /// cycle; see the module.
-fn leave_out_circles(processes: &mut [Process]) {
+fn drop_cyclic_literals(processes: &mut [Process]) {
     // A start waits for the starts that make true an over-all literal that it neither reads nor
     // establishes itself.
     let loose = |process: &Process| -> Vec<Literal> {
@@ -267,7 +270,7 @@ fn leave_out_circles(processes: &mut [Process]) {
             return Vec::new();
         };
         let own = process.over_all.iter().copied();
-        own.filter(|own| !start.reads.contains(own) && !start.leaves.contains(own))
+        own.filter(|own| !start.reads.contains(own) && !start.surely_makes_true.contains(own))
             .collect()
     };
     let waits: Vec<Vec<Literal>> = processes.iter().map(loose).collect();
@@ -275,10 +278,10 @@ fn leave_out_circles(processes: &mut [Process]) {
         process
             .start
             .as_ref()
-            .map_or_else(Vec::new, |s| s.makes.clone())
+            .map_or_else(Vec::new, |s| s.may_make_true.clone())
     };
     let gives: Vec<Vec<Literal>> = processes.iter().map(gives).collect();
-    let is_safe = without_circles(&waits, &gives, &|_| false);
+    let is_safe = acyclic_nodes(&waits, &gives, &|_| false);
     for ((process, waits), is_safe) in processes.iter_mut().zip(&waits).zip(is_safe) {
         if !is_safe {
             process.over_all.retain(|own| !waits.contains(own));
@@ -287,7 +290,7 @@ fn leave_out_circles(processes: &mut [Process]) {
     // An end comes before the ends that make an over-all literal of the action false.
     let needs: Vec<Vec<Literal>> = processes.iter().map(|own| own.over_all.clone()).collect();
     let breaks = |process: &Process| -> Vec<Literal> {
-        let makes = process.end.as_ref().map(|end| &end.makes);
+        let makes = process.end.as_ref().map(|end| &end.may_make_true);
         makes
             .into_iter()
             .flatten()
@@ -295,10 +298,10 @@ fn leave_out_circles(processes: &mut [Process]) {
             .collect()
     };
     let breaks: Vec<Vec<Literal>> = processes.iter().map(breaks).collect();
-    let once: Vec<bool> = processes.iter().map(Process::counts_once).collect();
+    let once: Vec<bool> = processes.iter().map(Process::is_idempotent).collect();
     // There is only one instance of an action that is running initially.
-    let is_alone = |number: usize| once[number] || processes[number].begun.is_some();
-    let is_safe = without_circles(&needs, &breaks, &is_alone);
+    let is_alone = |number: usize| once[number] || processes[number].initial_start.is_some();
+    let is_safe = acyclic_nodes(&needs, &breaks, &is_alone);
     let broken: BTreeSet<Literal> = breaks.iter().flatten().copied().collect();
     for (process, is_safe) in processes.iter_mut().zip(is_safe) {
         if !is_safe {
@@ -310,7 +313,7 @@ fn leave_out_circles(processes: &mut [Process]) {
 /// Returns the nodes that are on no cycle and lead to none. Each node waits for all others that
 /// give one of the literals that it waits for, and for itself unless `never_for_itself` is true
 /// (Kahn 1962).
-fn without_circles(
+fn acyclic_nodes(
     waits: &[Vec<Literal>],
     gives: &[Vec<Literal>],
     never_for_itself: &dyn Fn(usize) -> bool,

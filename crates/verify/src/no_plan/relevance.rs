@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::{Action, Body, Condition, FactId, FluentId, SnapAction};
 
-use super::{Instances, Reached};
+use super::{Instances, ReachedFacts};
 
 impl Instances {
     /// Returns the names of the fluents without a value that can be the reason why no plan exists. These
@@ -14,23 +14,27 @@ impl Instances {
     /// If the goal reads such fluents, they are the result. Otherwise the result is empty if values would
     /// not bring the goal within reach. A fluent counts if an instance reads it that contributes to a part
     /// of the goal that is out of reach, or to any part if the whole goal is within reach of `stated`.
-    pub fn fluents_without_value(&self, reached: &Reached, stated: &Reached) -> Vec<String> {
+    pub fn fluents_without_value(
+        &self,
+        reached: &ReachedFacts,
+        stated: &ReachedFacts,
+    ) -> Vec<String> {
         let goal = self.task.goal();
         let mut found = BTreeSet::new();
-        self.lasting
+        self.static_facts
             .mentioned_by_condition(&self.task, goal, &mut found);
         if found.is_empty() && self.is_goal_in_reach(reached) {
             let is_open = !self.is_goal_in_reach(stated);
             let mut relevance = Relevance {
                 instances: self,
-                stated: is_open.then_some(stated),
+                listed: is_open.then_some(stated),
                 facts: BTreeSet::new(),
                 absences: BTreeSet::new(),
                 fluents: BTreeSet::new(),
             };
-            relevance.need(goal);
+            relevance.add_condition(goal);
             for action in relevance.contributors() {
-                self.lasting
+                self.static_facts
                     .mentioned_by_action(&self.task, action, &mut found);
             }
         }
@@ -43,7 +47,7 @@ impl Instances {
 struct Relevance<'a> {
     instances: &'a Instances,
     /// If present, only facts that are not listed here are needed: the others are within reach anyway.
-    stated: Option<&'a Reached>,
+    listed: Option<&'a ReachedFacts>,
     /// Facts that conditions mention.
     facts: BTreeSet<FactId>,
     /// Facts that negative conditions mention.
@@ -71,8 +75,8 @@ impl<'a> Relevance<'a> {
                 return contributors;
             }
             for (action, footprint) in found {
-                self.need_of(action);
-                if self.stated.is_none() {
+                self.add_action(action);
+                if self.listed.is_none() {
                     self.fluents.extend(footprint.reads_fluents);
                 }
                 contributors.push(action);
@@ -90,13 +94,13 @@ impl<'a> Relevance<'a> {
     }
 
     /// Adds the conditions of an action and of its effects.
-    fn need_of(&mut self, action: &Action) {
+    fn add_action(&mut self, action: &Action) {
         let mut need_snap = |snap: &SnapAction| {
-            self.need(&snap.condition);
+            self.add_condition(&snap.condition);
             for effect in &snap.effects {
                 let guard = &effect.guard;
                 for condition in [&guard.at_start, &guard.over_all, &guard.now] {
-                    self.need(condition);
+                    self.add_condition(condition);
                 }
             }
         };
@@ -105,24 +109,24 @@ impl<'a> Relevance<'a> {
             Body::Durative(body) => {
                 need_snap(&body.start);
                 need_snap(&body.end);
-                self.need(&body.over_all);
+                self.add_condition(&body.over_all);
             }
         }
     }
 
     /// Adds the facts and fluents that a condition mentions.
-    fn need(&mut self, condition: &Condition) {
+    fn add_condition(&mut self, condition: &Condition) {
         let task = &self.instances.task;
         let is_open = |fact: FactId| {
             let fact = task.atom(fact);
-            let is_fixed = self.instances.lasting.spans(&fact).is_some();
-            let is_stated = |stated: &Reached| stated.contains_key(&fact);
-            !is_fixed && !self.stated.is_some_and(is_stated)
+            let is_fixed = self.instances.static_facts.spans(&fact).is_some();
+            let is_stated = |stated: &ReachedFacts| stated.contains_key(&fact);
+            !is_fixed && !self.listed.is_some_and(is_stated)
         };
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
                 for part in parts {
-                    self.need(part);
+                    self.add_condition(part);
                 }
             }
             Condition::Fact(fact) if !task.is_derived(*fact) => {
@@ -136,7 +140,7 @@ impl<'a> Relevance<'a> {
                 task.visit_facts_of(condition, &mut |fact| mentioned.push(fact));
                 mentioned.retain(|fact| is_open(*fact));
                 self.facts.extend(&mentioned);
-                if self.stated.is_none() {
+                if self.listed.is_none() {
                     self.absences.extend(mentioned);
                     let fluents = &mut self.fluents;
                     task.visit_fluents_of(condition, &mut |fluent| {

@@ -8,9 +8,9 @@ use elbowroom_model::ground::{
 };
 use elbowroom_model::problem::UpdateOperator;
 
-use super::lasting::{Lasting, Value};
+use super::static_facts::{StaticFacts, Value};
 
-impl Lasting {
+impl StaticFacts {
     /// Returns `true` if the fluent has no value at any time: it has none initially, and nothing assigns one.
     pub(super) fn is_valueless(&self, task: &Task, fluent: FluentId) -> bool {
         !task.initial().values.contains_key(&fluent) && !self.is_assigned(task.function_of(fluent))

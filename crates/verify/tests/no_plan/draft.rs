@@ -91,7 +91,7 @@ impl Draft {
 
     /// Returns the smaller variants: without one action, initial fact or addition, or with timed
     /// initials one earlier.
-    pub(crate) fn with_less(&self) -> Vec<Self> {
+    pub(crate) fn smaller_variants(&self) -> Vec<Self> {
         let mut all = Vec::new();
         for number in 0..self.actions.len() {
             let mut other = self.clone();

@@ -5,21 +5,21 @@ use std::sync::Arc;
 
 use elbowroom::answers::region::{
     BoxAnswer, Measure, Others, PictureError, PieceAnswer, Plane, RegionFinding, RegionOutcome,
-    RegionSettings, picture, region, so_far,
+    RegionSettings, partial_result, picture, region,
 };
-use elbowroom::answers::{EnvelopeRequest, Watcher};
+use elbowroom::answers::{EnvelopeRequest, Observer};
 
 use super::{failure, specifications};
 use crate::args::{self, EnvelopeArgs};
+use crate::deadline::run_with_deadline;
 use crate::exit::{Answer, Exit, Failure};
-use crate::in_time::in_time;
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::limits::push_wrapped;
-use crate::look::{BAD, FAINT, GOOD, HINT, Look, styled};
 use crate::output::{self, Output};
-use crate::stopwatch::{Stopwatch, duration};
-use elbowroom_executive::messages::counted;
+use crate::terminal::{ERROR, HINT, SECONDARY, SUCCESS, TextLayout, styled};
+use crate::time_limit::{Stopwatch, duration};
+use elbowroom_executive::messages::count_with_noun;
 
 /// Maximum number of reasons printed for an inequality; `--json` has all.
 const REASONS_SHOWN: usize = 2;
@@ -29,7 +29,7 @@ const MOST_DIGITS: usize = 24;
 /// Prints the region.
 pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     let limit = arguments.time_limit.as_ref().map(duration);
-    let stopwatch = Stopwatch::start(&Interrupt::listen()).until(limit);
+    let stopwatch = Stopwatch::start(&Interrupt::listen()).with_limit(limit);
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let mut vary = specifications(&arguments.vary)?;
     vary.extend(specifications(&args::controllable(
@@ -42,8 +42,8 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         enforce: arguments.enforce,
         ..EnvelopeRequest::new(&Arc::new(task), plan)
     };
-    request.search.best.most = arguments.most();
-    let plane = plane(arguments);
+    request.search.best.max_deviation = arguments.cap_or_default();
+    let plane = requested_plane(arguments);
     let settings = RegionSettings {
         with_boxes: arguments.volume || plane.is_some(),
         with_volume: arguments.volume,
@@ -52,10 +52,10 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     let mut watch = stopwatch.clone();
     let request = Arc::new(request);
     let (theirs, mut listener) = (Arc::clone(&request), watch.clone());
-    let outcome = in_time(
+    let outcome = run_with_deadline(
         stopwatch,
         move || region(&theirs, &settings, &mut listener),
-        |_| Ok(so_far(&request)),
+        |_| Ok(partial_result(&request)),
     )
     .map_err(failure)?;
     let drawn = draw(arguments, plane.as_ref(), &outcome, &mut watch);
@@ -63,9 +63,9 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
-        output::print(&text(&outcome, Look::of_stdout()))?;
+        output::print(&text(&outcome, TextLayout::of_stdout()))?;
         if matches!(outcome.answer.finding, RegionFinding::Invalid { .. }) {
-            input::tell_about_repairs();
+            input::advise_repair();
         }
     }
     drawn?;
@@ -76,7 +76,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     })
 }
 
-fn plane(arguments: &EnvelopeArgs) -> Option<Plane> {
+fn requested_plane(arguments: &EnvelopeArgs) -> Option<Plane> {
     let both = [
         (&arguments.slice, Others::Nominal),
         (&arguments.projection, Others::Any),
@@ -115,20 +115,20 @@ fn draw(
     }
 }
 
-fn text(outcome: &RegionOutcome, look: Look) -> String {
+fn text(outcome: &RegionOutcome, look: TextLayout) -> String {
     let file = &outcome.answer.plan;
     let mut text = String::new();
     let mut say = |words: &str, indent: usize| push_wrapped(&mut text, words, indent, look.width);
     match &outcome.answer.finding {
         RegionFinding::Invalid { violation } => {
             say(
-                &format!("{}: {file} does not work", styled(BAD, "invalid")),
+                &format!("{}: {file} does not work", styled(ERROR, "invalid")),
                 0,
             );
             say(&violation.message, 2);
         }
         RegionFinding::Unscheduled => {
-            say(&format!("{}: {file}", styled(BAD, "no region")), 0);
+            say(&format!("{}: {file}", styled(ERROR, "no region")), 0);
             say(
                 "The plan has no schedule at its nominal values, and the region goes by the order \
                  that happenings have there.",
@@ -154,21 +154,21 @@ fn text(outcome: &RegionOutcome, look: Look) -> String {
             }
             match &pieces[..] {
                 [] => say(
-                    &format!("{}: {file} works with no values.", styled(BAD, "empty")),
+                    &format!("{}: {file} works with no values.", styled(ERROR, "empty")),
                     0,
                 ),
                 [_] => say(
                     &format!(
                         "{}: {file} works with all values that satisfy",
-                        styled(GOOD, "exact")
+                        styled(SUCCESS, "exact")
                     ),
                     0,
                 ),
                 several => say(
                     &format!(
                         "{}: {file} works with all values that satisfy one of {}",
-                        styled(GOOD, "exact"),
-                        counted(several.len(), "list")
+                        styled(SUCCESS, "exact"),
+                        count_with_noun(several.len(), "list")
                     ),
                     0,
                 ),
@@ -201,7 +201,7 @@ fn text(outcome: &RegionOutcome, look: Look) -> String {
 }
 
 /// Appends the volume, and the shares of the boxes.
-fn volume(measure: &Measure, boxes: &[BoxAnswer], look: Look, text: &mut String) {
+fn volume(measure: &Measure, boxes: &[BoxAnswer], look: TextLayout, text: &mut String) {
     let mut say = |words: &str| push_wrapped(text, words, 0, look.width);
     match (&measure.volume, measure.log10_interval) {
         (Some(volume), _) => {
@@ -263,13 +263,13 @@ fn percent(share: f64) -> String {
     }
 }
 
-fn rows(piece: &PieceAnswer, look: Look, text: &mut String) {
+fn rows(piece: &PieceAnswer, look: TextLayout, text: &mut String) {
     for row in &piece.rows {
         push_wrapped(text, &row.text, 2, look.width);
         for reason in row.because.iter().take(REASONS_SHOWN) {
             let mut line = String::new();
             push_wrapped(&mut line, reason, 4, look.width);
-            text.push_str(&styled(FAINT, line.trim_end()));
+            text.push_str(&styled(SECONDARY, line.trim_end()));
             text.push('\n');
         }
     }

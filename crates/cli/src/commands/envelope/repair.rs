@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use elbowroom::answers::RequestError;
 use elbowroom::answers::repair::{
-    Change, Orders, RepairFinding, RepairOutcome, RepairRequest, repair, so_far,
+    Change, Orders, RepairFinding, RepairOutcome, RepairRequest, partial_result, repair,
 };
 use elbowroom::model::TimeTriggeredPlan;
 use elbowroom::num::Rational;
@@ -13,14 +13,14 @@ use elbowroom::{AnyPlan, plan_text};
 
 use super::failure;
 use crate::args::EnvelopeArgs;
+use crate::deadline::run_with_deadline;
 use crate::exit::{Answer, Exit, Failure};
-use crate::in_time::in_time;
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::limits::push_wrapped;
-use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
-use crate::stopwatch::{Stopwatch, duration};
+use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, TextLayout, styled};
+use crate::time_limit::{Stopwatch, duration};
 
 /// Number of digits printed; `--json` has exact numbers.
 const DIGITS: u32 = 6;
@@ -34,11 +34,11 @@ const OTHER_ORDERS: &str =
 pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     arguments.check_repair()?;
     let limit = arguments.time_limit.as_ref().map(duration);
-    let stopwatch = Stopwatch::start(&Interrupt::listen()).until(limit);
+    let stopwatch = Stopwatch::start(&Interrupt::listen()).with_limit(limit);
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let read = |option: &str, texts: &[String]| {
         let specs = super::specifications(texts);
-        specs.map_err(|_| named(option, texts))
+        specs.map_err(|_| invalid_specification(option, texts))
     };
     let request = RepairRequest {
         name: arguments.plan.display().to_string(),
@@ -54,16 +54,16 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     };
     let (request, mut watch) = (Arc::new(request), stopwatch.clone());
     let theirs = Arc::clone(&request);
-    let outcome = in_time(
+    let outcome = run_with_deadline(
         stopwatch,
         move || repair(&theirs, &mut watch),
-        |halt| Ok(so_far(&request, halt)),
+        |halt| Ok(partial_result(&request, halt)),
     )
     .map_err(refused)?;
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
-        output::print(&text(&outcome, &request.plan, Look::of_stdout()))?;
+        output::print(&text(&outcome, &request.plan, TextLayout::of_stdout()))?;
     }
     Ok(match &outcome.answer.finding {
         RepairFinding::Repaired { .. } => Exit::Yes,
@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
 }
 
 /// Returns the failure to parse one of the specifications of an option.
-fn named(option: &str, texts: &[String]) -> Failure {
+fn invalid_specification(option: &str, texts: &[String]) -> Failure {
     let mut failures = texts.iter().filter_map(|text| {
         let error = text
             .parse::<elbowroom::plan::parametrize::VarySpec>()
@@ -95,7 +95,7 @@ fn named(option: &str, texts: &[String]) -> Failure {
 /// instead.
 fn refused(error: RequestError) -> Failure {
     match error {
-        RequestError::Flow(error) => {
+        RequestError::Pipeline(error) => {
             let message = error.to_string();
             Failure::new(message.replace("`--vary ", "`--change/--keep "), "")
         }
@@ -103,13 +103,13 @@ fn refused(error: RequestError) -> Failure {
     }
 }
 
-fn text(outcome: &RepairOutcome, given: &AnyPlan, look: Look) -> String {
+fn text(outcome: &RepairOutcome, given: &AnyPlan, look: TextLayout) -> String {
     let file = &outcome.answer.plan;
     let mut text = String::new();
     let mut say = |words: &str, indent: usize| push_wrapped(&mut text, words, indent, look.width);
     match &outcome.answer.finding {
         RepairFinding::Impossible { because, orders } => {
-            let no = styled(BAD, "no repair");
+            let no = styled(ERROR, "no repair");
             let order = match orders {
                 Orders::All => "",
                 Orders::Kept => " in the order of its interfering actions",
@@ -142,7 +142,7 @@ fn text(outcome: &RepairOutcome, given: &AnyPlan, look: Look) -> String {
             reordered,
             ..
         } => {
-            let works = styled(GOOD, "repaired");
+            let works = styled(SUCCESS, "repaired");
             match (&changes[..], &keeps[..]) {
                 ([], []) if has_other_times(outcome, given) => say(
                     &format!(
@@ -163,10 +163,10 @@ fn text(outcome: &RepairOutcome, given: &AnyPlan, look: Look) -> String {
                 _ => say(&format!("{works}: {file} works with"), 0),
             }
             for change in changes {
-                say(&changed(change), 2);
+                say(&describe_change(change), 2);
             }
             if !changes.is_empty() {
-                say(&nothing_cheaper(cost, bound, *orders), 0);
+                say(&optimality_text(cost, bound, *orders), 0);
                 if *orders == Orders::Kept {
                     say(OTHER_ORDERS, 0);
                 }
@@ -195,7 +195,7 @@ fn text(outcome: &RepairOutcome, given: &AnyPlan, look: Look) -> String {
                 let _ = writeln!(
                     text,
                     "\n{}",
-                    styled(STRONG, "The plan, as the judge accepted it")
+                    styled(EMPHASIS, "The plan, as the judge accepted it")
                 );
                 for line in plan_text(task, plan).lines() {
                     let _ = writeln!(text, "  {line}");
@@ -228,7 +228,7 @@ fn has_other_times(outcome: &RepairOutcome, given: &AnyPlan) -> bool {
 }
 
 /// `deadline of (open shop): 120 instead of 100`.
-fn changed(change: &Change) -> String {
+fn describe_change(change: &Change) -> String {
     format!(
         "{}: {} instead of {}",
         change.quantity,
@@ -237,7 +237,7 @@ fn changed(change: &Change) -> String {
     )
 }
 
-fn nothing_cheaper(cost: &Rational, bound: &Rational, orders: Orders) -> String {
+fn optimality_text(cost: &Rational, bound: &Rational, orders: Orders) -> String {
     let costs = bound.to_decimal(DIGITS);
     let order = match orders {
         Orders::All => "",
@@ -253,12 +253,12 @@ fn nothing_cheaper(cost: &Rational, bound: &Rational, orders: Orders) -> String 
 }
 
 /// Appends a list with a headline, unless `items` or `about` is empty.
-fn section<T>(text: &mut String, headline: &str, items: &[String], about: &[T], look: Look) {
+fn section<T>(text: &mut String, headline: &str, items: &[String], about: &[T], look: TextLayout) {
     if items.is_empty() || about.is_empty() {
         return;
     }
     // Writing to a string cannot fail.
-    let _ = writeln!(text, "\n{}", styled(STRONG, headline));
+    let _ = writeln!(text, "\n{}", styled(EMPHASIS, headline));
     for item in items.iter().take(REASONS_SHOWN) {
         push_wrapped(text, item, 2, look.width);
     }

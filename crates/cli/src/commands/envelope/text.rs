@@ -7,45 +7,48 @@ mod timeouts;
 use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
-    Balance, Best, Chosen, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome,
-    EnvelopeRequest, Failing, Foresight, Makespans, QuantityKind, Range, Room, Stop,
+    Best, ChosenDuration, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest,
+    LimitedRange, Makespans, NominalFailure, QuantityKind, Range, Stop, UniformSlack,
+    ValueOfInformation,
 };
 
 use elbowroom::num::Rational;
 
 use crate::args::Order;
 use crate::limits::{self, push_paragraph, push_wrapped};
-use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
 use crate::number::{self, Rounding};
 use crate::table::{self, Row};
-use best::{gained, goodness};
-use elbowroom_executive::messages::counted;
-use example::{example, what};
+use crate::terminal::{EMPHASIS, ERROR, SECONDARY, SUCCESS, TextLayout, styled};
+use best::{best_relaxations, objective_text};
+use elbowroom_executive::messages::count_with_noun;
+use example::{example, reason_text};
 
 /// Renders the answer.
 pub(super) fn text(
     request: &EnvelopeRequest,
     outcome: &EnvelopeOutcome,
     order: Order,
-    look: Look,
+    look: TextLayout,
 ) -> String {
     let file = &request.name;
     match &outcome.answer.finding {
         EnvelopeFinding::Envelope { .. } => envelope(request, outcome, order, look),
-        EnvelopeFinding::Fails(Failing::Invalid { violation }) => {
-            let mut text = no_room(file, FAILS);
+        EnvelopeFinding::Fails(NominalFailure::Invalid { violation }) => {
+            let mut text = no_slack(file, FAILS);
             push_wrapped(&mut text, &violation.message, 2, look.width);
             text
         }
-        EnvelopeFinding::Fails(Failing::AsPlanned { .. }) => fails(request, outcome, look),
+        EnvelopeFinding::Fails(NominalFailure::AsPlanned { .. }) => {
+            failure_text(request, outcome, look)
+        }
         EnvelopeFinding::Inside { .. } => format!(
             "{}: {file} works everywhere in this box\n",
-            styled(GOOD, "inside"),
+            styled(SUCCESS, "inside"),
         ),
         EnvelopeFinding::Outside { .. } => {
             let mut text = format!(
                 "{}: {file} does not work everywhere in this box\n",
-                styled(BAD, "outside"),
+                styled(ERROR, "outside"),
             );
             push_reason(&mut text, request, outcome, look);
             push_timeout(&mut text, outcome, look);
@@ -60,21 +63,21 @@ pub(super) fn text(
 const FAILS: &str = "fails even if everything goes as planned";
 const CAN_FAIL: &str = "can fail even if everything goes as planned";
 
-fn no_room(file: &str, fails: &str) -> String {
-    format!("{}: {file} {fails}\n", styled(BAD, "no elbow room"))
+fn no_slack(file: &str, fails: &str) -> String {
+    format!("{}: {file} {fails}\n", styled(ERROR, "no elbow room"))
 }
 
 /// Renders the answer for a plan that fails, or may fail, with nominal values.
-fn fails(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> String {
+fn failure_text(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: TextLayout) -> String {
     let has_schedule = outcome
-        .why_not
+        .explanation
         .as_ref()
         .is_some_and(|why| why.schedule.is_some());
     let fails = if has_schedule { CAN_FAIL } else { FAILS };
-    let mut text = no_room(&request.name, fails);
-    match &outcome.why_not {
+    let mut text = no_slack(&request.name, fails);
+    match &outcome.explanation {
         Some(why_not) if !has_schedule => {
-            push_wrapped(&mut text, &what(why_not), 2, look.width);
+            push_wrapped(&mut text, &reason_text(why_not), 2, look.width);
         }
         _ => push_reason(&mut text, request, outcome, look),
     }
@@ -83,13 +86,14 @@ fn fails(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> St
 }
 
 /// Appends the time-out that an action reaches, if there is no other reason.
-fn push_timeout(text: &mut String, outcome: &EnvelopeOutcome, look: Look) {
+fn push_timeout(text: &mut String, outcome: &EnvelopeOutcome, look: TextLayout) {
     let (EnvelopeFinding::Outside { counterexample, .. }
-    | EnvelopeFinding::Fails(Failing::AsPlanned { counterexample, .. })) = &outcome.answer.finding
+    | EnvelopeFinding::Fails(NominalFailure::AsPlanned { counterexample, .. })) =
+        &outcome.answer.finding
     else {
         return;
     };
-    if outcome.why_not.is_none() {
+    if outcome.explanation.is_none() {
         push_wrapped(text, &counterexample.message, 2, look.width);
     }
 }
@@ -99,17 +103,17 @@ fn push_reason(
     text: &mut String,
     request: &EnvelopeRequest,
     outcome: &EnvelopeOutcome,
-    look: Look,
+    look: TextLayout,
 ) {
-    if let (Some(why_not), Some(plan)) = (&outcome.why_not, &outcome.plan) {
-        push_wrapped(text, &what(why_not), 2, look.width);
-        if why_not.plays.is_empty() {
+    if let (Some(why_not), Some(plan)) = (&outcome.explanation, &outcome.plan) {
+        push_wrapped(text, &reason_text(why_not), 2, look.width);
+        if why_not.strategies.is_empty() {
             text.push_str(&example(&request.task, plan, why_not, look));
             return;
         }
         let title = "Whatever an executor does, the world can spoil it";
-        let _ = write!(text, "\n{}\n", styled(STRONG, title));
-        for play in &why_not.plays {
+        let _ = write!(text, "\n{}\n", styled(EMPHASIS, title));
+        for play in &why_not.strategies {
             push_wrapped(text, play, 2, look.width);
         }
     }
@@ -120,7 +124,7 @@ fn envelope(
     request: &EnvelopeRequest,
     outcome: &EnvelopeOutcome,
     order: Order,
-    look: Look,
+    look: TextLayout,
 ) -> String {
     let EnvelopeFinding::Envelope {
         parameters,
@@ -142,13 +146,13 @@ fn envelope(
     };
     let mut rows: Vec<Row> = parameters.iter().map(row).collect();
     if order == Order::Tightness {
-        rows.sort_by_key(Row::room);
+        rows.sort_by_key(Row::smaller_deviation);
     }
     let title = format!("Elbow room of {}", request.name);
-    let mut text = format!("{}\n\n", styled(STRONG, &title));
+    let mut text = format!("{}\n\n", styled(EMPHASIS, &title));
     if rows.is_empty() {
         text.push_str(" Nothing in this plan is left open. It works as it is.\n");
-        if let Some(chosen) = executor_chooses(chosen) {
+        if let Some(chosen) = chosen_durations_text(chosen) {
             push_paragraph(&mut text, &chosen, look.width);
         }
         return text;
@@ -159,11 +163,15 @@ fn envelope(
     }
     text.push_str(&table::render(&rows, look));
     text.push('\n');
-    push_paragraph(&mut text, &timeouts::meaning(parameters, &rows), look.width);
-    if let Some(timeouts) = timeouts::line(&request.timeout, parameters, chosen) {
+    push_paragraph(
+        &mut text,
+        &timeouts::guarantee_text(parameters, &rows),
+        look.width,
+    );
+    if let Some(timeouts) = timeouts::timeout_line(&request.timeout, parameters, chosen) {
         push_paragraph(&mut text, &timeouts, look.width);
     }
-    if let Some(chosen) = executor_chooses(chosen) {
+    if let Some(chosen) = chosen_durations_text(chosen) {
         push_paragraph(&mut text, &chosen, look.width);
     }
     text.push('\n');
@@ -173,34 +181,34 @@ fn envelope(
         text.push('\n');
     }
     if let Some(foresight) = foresight {
-        push_paragraph(&mut text, &worth(foresight), look.width);
+        push_paragraph(&mut text, &foresight_text(foresight), look.width);
     }
     if let Some(makespans) = makespans {
         push_paragraph(&mut text, &makespan(makespans), look.width);
     }
-    if let Some(met) = met(conditions) {
+    if let Some(met) = condition_text(conditions) {
         push_paragraph(&mut text, &met, look.width);
     }
-    if let Some(worth) = best.as_ref().and_then(gained) {
+    if let Some(worth) = best.as_ref().and_then(best_relaxations) {
         push_paragraph(&mut text, &worth, look.width);
     }
     let course = format!(
         "{} {}, {}, {}.",
-        sentence(&ended(request, *stop, parameters, best.as_ref())),
-        counted(*checks, "check"),
-        counted(widenings.len(), "widening"),
+        sentence(&search_end_text(request, *stop, parameters, best.as_ref())),
+        count_with_noun(*checks, "check"),
+        count_with_noun(widenings.len(), "widening"),
         duration(*seconds)
     );
     let mut how = String::new();
     push_paragraph(&mut how, &course, look.width);
-    text.push_str(&styled(FAINT, how.trim_end()));
+    text.push_str(&styled(SECONDARY, how.trim_end()));
     text.push('\n');
     text
 }
 
 /// States the uniform deviation of all quantities that the plan tolerates.
-fn headline(balance: &Balance, parameters: &[Room]) -> String {
-    let is_duration = |room: &Room| room.range.quantity.kind == QuantityKind::Duration;
+fn headline(balance: &UniformSlack, parameters: &[LimitedRange]) -> String {
+    let is_duration = |room: &LimitedRange| room.range.quantity.kind == QuantityKind::Duration;
     let (subject, more, less) = if parameters.iter().all(is_duration) {
         ("take", "longer", "less time")
     } else {
@@ -243,7 +251,7 @@ fn headline(balance: &Balance, parameters: &[Room]) -> String {
 
 /// Describes how conditions that are not bounds on a single time difference are met, and which
 /// bounds the dispatcher enforces in addition to the network.
-fn met(conditions: &Conditions) -> Option<String> {
+fn condition_text(conditions: &Conditions) -> Option<String> {
     let mut met = Vec::new();
     if conditions.all_schedules > 0 {
         let count = conditions.all_schedules;
@@ -261,7 +269,7 @@ fn met(conditions: &Conditions) -> Option<String> {
 }
 
 /// States the benefit of knowing the values in advance, in one sentence.
-fn worth(foresight: &Foresight) -> String {
+fn foresight_text(foresight: &ValueOfInformation) -> String {
     /// Maximum number of entries of a list.
     const MOST_NAMED: usize = 4;
     let more = &foresight.weak_width.0 - &foresight.width.0;
@@ -288,7 +296,7 @@ fn worth(foresight: &Foresight) -> String {
     )
 }
 
-fn row(room: &Room) -> Row {
+fn row(room: &LimitedRange) -> Row {
     Row {
         name: room.range.quantity.name.clone(),
         quantity: quantity(&room.range).to_owned(),
@@ -307,7 +315,7 @@ fn quantity(range: &Range) -> &str {
 }
 
 /// Lists the durations that do not vary because the executor chooses them.
-fn executor_chooses(chosen: &[Chosen]) -> Option<String> {
+fn chosen_durations_text(chosen: &[ChosenDuration]) -> Option<String> {
     /// Maximum number of entries of a list.
     const MOST_NAMED: usize = 4;
     let mut named: Vec<String> = chosen
@@ -345,15 +353,15 @@ fn sentence(text: &str) -> String {
 }
 
 /// Describes how the search ended.
-fn ended(
+fn search_end_text(
     request: &EnvelopeRequest,
     stop: Stop,
-    parameters: &[Room],
+    parameters: &[LimitedRange],
     best: Option<&Best>,
 ) -> String {
     match stop {
         Stop::Converged if best.is_some() => {
-            best.map_or_else(String::new, |best| goodness(best, parameters))
+            best.map_or_else(String::new, |best| objective_text(best, parameters))
         }
         Stop::Converged if request.search.sharpen => {
             let mut limits = parameters
@@ -362,7 +370,7 @@ fn ended(
             let is_any = limits.any(|limit| limit.as_deref() == Some(elbowroom::ANY_FINITE));
             let any = if is_any { " or has none" } else { "" };
             // Ends without a reason are at the farthest value that the search tries.
-            let (which, untold) = if parameters.iter().any(is_untold) {
+            let (which, untold) = if parameters.iter().any(has_unknown_limit) {
                 (
                     "Each end with a reason",
                     ". Where no reason is given, an end could still move",
@@ -380,7 +388,7 @@ fn ended(
                 }
                 None => number::nearest(&request.search.precision),
             };
-            let untold = if parameters.iter().any(is_untold) {
+            let untold = if parameters.iter().any(has_unknown_limit) {
                 " Where no reason is given, an end could still move."
             } else {
                 ""
@@ -405,7 +413,7 @@ fn ended(
 }
 
 /// Returns `true` if a finite end of the interval has no known limiting reason.
-fn is_untold(room: &Room) -> bool {
+fn has_unknown_limit(room: &LimitedRange) -> bool {
     let ends = [
         (&room.range.lower, &room.lower_limit),
         (&room.range.upper, &room.upper_limit),

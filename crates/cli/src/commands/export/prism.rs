@@ -17,14 +17,14 @@ const CELLS: usize = 32;
 
 /// Returns the text of the requested process.
 pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String, Failure> {
-    refuse_what_is_about_plans(
+    reject_plan_options(
         arguments,
         "is about plans, and a process is about all that can be done",
     )?;
     let process = &arguments.process;
     match (&process.likelihoods, &process.world) {
         (Some(_), _) => {
-            refuse(
+            reject_first_given(
                 &[
                     ("--cells", process.cells.is_some()),
                     ("--bound", process.bound.is_some()),
@@ -33,7 +33,7 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
             )?;
         }
         (None, Some(_)) => {
-            refuse(
+            reject_first_given(
                 &[
                     ("--dead-ends", process.dead_ends.is_some()),
                     ("--most-running", process.most_running.is_some()),
@@ -54,7 +54,8 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
     let written = if let Some(path) = &process.likelihoods {
         let text = input::source(path, "likelihoods")?;
         let likelihoods = likelihoods::read(text, &task).map_err(|wrong| {
-            Failure::from(wrong).advised("docs/formats/likelihoods.md describes likelihood files")
+            Failure::from(wrong)
+                .with_default_advice("docs/formats/likelihoods.md describes likelihood files")
         })?;
         let lost = optimum::Settings::default();
         let settings = optimum::Settings {
@@ -87,9 +88,9 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
 }
 
 /// Rejects the first option that only applies to output about a plan.
-pub(super) fn refuse_what_is_about_plans(arguments: &ExportArgs, why: &str) -> Result<(), Failure> {
+pub(super) fn reject_plan_options(arguments: &ExportArgs, why: &str) -> Result<(), Failure> {
     let is_default = arguments.epsilon == elbowroom::num::Rational::new(1, 1000);
-    refuse(
+    reject_first_given(
         &[
             ("PLAN", arguments.plan.is_some()),
             ("--contains", arguments.contains.is_some()),
@@ -105,7 +106,7 @@ pub(super) fn refuse_what_is_about_plans(arguments: &ExportArgs, why: &str) -> R
 }
 
 /// Rejects the first of these options that is given.
-pub(super) fn refuse(given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
+pub(super) fn reject_first_given(given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
     match given.iter().find(|(_, is_given)| *is_given) {
         Some((name, _)) => Err(Failure::new(format!("{name} {why}"), "leave it out")),
         None => Ok(()),

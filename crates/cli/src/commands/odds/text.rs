@@ -9,8 +9,8 @@ use elbowroom::answers::odds::{
 use elbowroom::report::table::Table;
 
 use crate::limits::push_paragraph;
-use crate::look::{BAD, HINT, Look, STRONG, styled};
-use elbowroom_executive::messages::counted;
+use crate::terminal::{EMPHASIS, ERROR, HINT, TextLayout, styled};
+use elbowroom_executive::messages::count_with_noun;
 
 /// Maximum number of losses, or of possible gains, that are listed.
 const MOST_ROWS: usize = 12;
@@ -18,20 +18,20 @@ const MOST_ROWS: usize = 12;
 /// Minimum share that is listed.
 const NEGLIGIBLE: f64 = 0.000_05;
 
-pub(super) fn of(answer: &OddsAnswer, with_layers: bool, look: Look) -> String {
+pub(super) fn render(answer: &OddsAnswer, with_layers: bool, look: TextLayout) -> String {
     match &answer.finding {
-        OddsFinding::Odds(odds) => found(odds, with_layers, look),
+        OddsFinding::Odds(odds) => analysis_text(odds, with_layers, look),
         OddsFinding::NoOrder => {
-            let label = styled(BAD, "no order");
+            let label = styled(ERROR, "no order");
             format!("{label}: no order of the plan's actions can succeed\n")
         }
-        OddsFinding::NoPlan => format!("{}: the problem has no plan\n", styled(BAD, "no plan")),
+        OddsFinding::NoPlan => format!("{}: the problem has no plan\n", styled(ERROR, "no plan")),
         OddsFinding::None { reason } => format!("{reason}\n"),
         OddsFinding::Invalid { violation } => {
             let mut text = String::new();
             let words = format!(
                 "{}: {}; `elbowroom check` says more.",
-                styled(BAD, "not valid"),
+                styled(ERROR, "not valid"),
                 violation.message
             );
             push_paragraph(&mut text, &words, look.width);
@@ -40,7 +40,7 @@ pub(super) fn of(answer: &OddsAnswer, with_layers: bool, look: Look) -> String {
     }
 }
 
-fn found(odds: &Odds, with_layers: bool, look: Look) -> String {
+fn analysis_text(odds: &Odds, with_layers: bool, look: TextLayout) -> String {
     let order = &odds.order;
     let mut text = summary(order, look);
     steps(&mut text, order, with_layers, look);
@@ -52,10 +52,10 @@ fn found(odds: &Odds, with_layers: bool, look: Look) -> String {
     text
 }
 
-fn summary(order: &OrderAnswer, look: Look) -> String {
+fn summary(order: &OrderAnswer, look: TextLayout) -> String {
     let mut text = String::new();
     let title = format!("Succeeds with probability {}", number(order.probability));
-    let _ = writeln!(text, "{}\n", styled(STRONG, &title));
+    let _ = writeln!(text, "{}\n", styled(EMPHASIS, &title));
     let which = match (order.is_best, order.is_proven) {
         (false, _) => "The order is that of the plan's times.",
         (true, Some(true)) => "The order is the best of all of the plan's actions.",
@@ -73,7 +73,7 @@ fn summary(order: &OrderAnswer, look: Look) -> String {
         words.push_str(" Durations and timed initials leave no time for it.");
     }
     if order.assumed_conditions > 0 {
-        let count = counted(order.assumed_conditions, "condition");
+        let count = count_with_noun(order.assumed_conditions, "condition");
         let _ = write!(
             words,
             " {count} on numbers that depend on when things happen were taken for granted."
@@ -83,7 +83,7 @@ fn summary(order: &OrderAnswer, look: Look) -> String {
     text
 }
 
-fn steps(text: &mut String, order: &OrderAnswer, with_layers: bool, look: Look) {
+fn steps(text: &mut String, order: &OrderAnswer, with_layers: bool, look: TextLayout) {
     let mut headings = vec!["step", "happening", "earliest", "so far"];
     if with_layers {
         headings.push("needs");
@@ -120,7 +120,7 @@ fn steps(text: &mut String, order: &OrderAnswer, with_layers: bool, look: Look) 
     table(text, &headings, rows, look);
 }
 
-fn losses(text: &mut String, order: &OrderAnswer, look: Look) {
+fn losses(text: &mut String, order: &OrderAnswer, look: TextLayout) {
     let mut losses: Vec<&LossAnswer> = order.losses.iter().collect();
     losses.sort_by(|a, b| b.mass.total_cmp(&a.mass));
     losses.retain(|loss| loss.mass >= NEGLIGIBLE);
@@ -168,7 +168,7 @@ fn reason(reason: &LossReason) -> String {
     }
 }
 
-fn gains(text: &mut String, odds: &Odds, look: Look) {
+fn gains(text: &mut String, odds: &Odds, look: TextLayout) {
     let order = &odds.order;
     let mut ways: Vec<(f64, String)> = Vec::new();
     for action in &order.actions {
@@ -230,7 +230,7 @@ fn gains(text: &mut String, odds: &Odds, look: Look) {
     }
 }
 
-fn executed(text: &mut String, all: &[ExecutedAnswer], look: Look) {
+fn executed(text: &mut String, all: &[ExecutedAnswer], look: TextLayout) {
     let samples = all.first().map_or(0, |one| one.samples);
     heading(text, &format!("Executed in {samples} samples of the world"));
     let rows = all.iter().map(|one| {
@@ -266,10 +266,10 @@ fn executed(text: &mut String, all: &[ExecutedAnswer], look: Look) {
 }
 
 fn heading(text: &mut String, words: &str) {
-    let _ = writeln!(text, "\n{}", styled(STRONG, words));
+    let _ = writeln!(text, "\n{}", styled(EMPHASIS, words));
 }
 
-fn table(text: &mut String, headings: &[&str], rows: Vec<Vec<String>>, look: Look) {
+fn table(text: &mut String, headings: &[&str], rows: Vec<Vec<String>>, look: TextLayout) {
     let table = Table {
         caption: String::new(),
         headings: headings.iter().map(|it| (*it).to_owned()).collect(),
@@ -278,7 +278,7 @@ fn table(text: &mut String, headings: &[&str], rows: Vec<Vec<String>>, look: Loo
         notes: Vec::new(),
     };
     text.push('\n');
-    text.push_str(table.within(look.width).trim_start_matches('\n'));
+    text.push_str(table.fit_to_width(look.width).trim_start_matches('\n'));
 }
 
 /// Formats a probability with four digits.

@@ -3,16 +3,16 @@
 use std::fmt::Write as _;
 
 use elbowroom::answers::plan::{PlanAnswer, PlanFinding, PlanStop, PlannerFailure};
-use elbowroom::answers::plan::{PlanChoice, PlanObjective, PlanWorth};
+use elbowroom::answers::plan::{PlanChoice, PlanObjective, PlanValue};
 use elbowroom::external::Outcome;
 use elbowroom::verify::no_plan::Kind;
 
 use crate::args::EMBEDDED;
 use crate::exit::Failure;
-use crate::look::{FAINT, HINT, Look, styled};
 use crate::number;
-use crate::wrap::wrapped;
-use elbowroom_executive::messages::counted;
+use crate::terminal::{HINT, SECONDARY, TextLayout, styled};
+use crate::wrap::wrap;
+use elbowroom_executive::messages::count_with_noun;
 
 /// Renders the plan as text. If its metric differs from its makespan, a comment at the end states
 /// the metric.
@@ -46,10 +46,10 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
         let _ = write!(text, ", metric {}", number::nearest(metric));
     }
     if let Some(choice) = &answer.choice {
-        let _ = write!(text, "; {}", chosen(choice));
-        return Some(styled(FAINT, &text));
+        let _ = write!(text, "; {}", choice_text(choice));
+        return Some(styled(SECONDARY, &text));
     }
-    let plans = counted(answer.plans, "plan");
+    let plans = count_with_noun(answer.plans, "plan");
     let better = match answer.stop {
         PlanStop::Exhausted => "the search found no better one",
         // Another planner may have been about to prove optimality when it was ended.
@@ -58,11 +58,11 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
         _ => "not proved optimal",
     };
     let _ = write!(text, "; {plans} found, {better}");
-    Some(styled(FAINT, &text))
+    Some(styled(SECONDARY, &text))
 }
 
 /// Describes the certificate that no plan exists, or advises what to try if there is none.
-pub(super) fn certified(answer: &PlanAnswer, look: Look) -> Option<String> {
+pub(super) fn certificate_text(answer: &PlanAnswer, look: TextLayout) -> Option<String> {
     let line = match &answer.finding {
         PlanFinding::Plan { .. } => return None,
         PlanFinding::NoPlan { certificate, .. } => {
@@ -83,11 +83,11 @@ pub(super) fn certified(answer: &PlanAnswer, look: Look) -> Option<String> {
             other.to_owned()
         }
     };
-    Some(styled(FAINT, &wrapped(&line, look.width, 0)))
+    Some(styled(SECONDARY, &wrap(&line, look.width, 0)))
 }
 
 /// Describes the plan's objective value, compared with that of the shortest plan.
-fn chosen(choice: &PlanChoice) -> String {
+fn choice_text(choice: &PlanChoice) -> String {
     let PlanChoice {
         objective,
         value,
@@ -100,12 +100,12 @@ fn chosen(choice: &PlanChoice) -> String {
         PlanObjective::Slack => "slack",
         PlanObjective::Probability => "works in",
     };
-    let plans = counted(*compared, "plan");
+    let plans = count_with_noun(*compared, "plan");
     let mut text = format!("{name} {value}");
-    if let PlanWorth::Sampled { .. } = value {
+    if let PlanValue::Sampled { .. } = value {
         text.push_str(" samples of the world");
     }
-    if let PlanWorth::Unknown { why } = value {
+    if let PlanValue::Unknown { why } = value {
         let _ = write!(text, " ({why})");
     }
     if made_for.is_empty() {
@@ -122,7 +122,7 @@ fn chosen(choice: &PlanChoice) -> String {
 }
 
 /// Reports that the times are not the planner's own.
-pub(super) fn repaired(planner: &str, objection: &str) -> String {
+pub(super) fn repair_text(planner: &str, objection: &str) -> String {
     format!(
         "{}: the plan of {planner} is not valid as it stands, perhaps because its times are \
          rounded\n  {objection}\n  {}: times close to these, which are valid, are taken instead",

@@ -43,9 +43,9 @@ impl Page {
             ""
         };
         let router = api::serve(address, None, control, None)?;
-        let operator = router.begin(spec, task)?;
+        let operator = router.begin_run(spec, task)?;
         let own = router.address();
-        output::tell(&format!("the run is shown at http://{own}/{with_token}"));
+        output::print_to_stderr(&format!("the run is shown at http://{own}/{with_token}"));
         let router = Some(router);
         Ok(Self { operator, router })
     }

@@ -9,7 +9,7 @@ use elbowroom::num::Rational;
 use crate::number;
 use crate::progress::Progress;
 use elbowroom_executive::clock::Clock;
-use elbowroom_executive::messages::{counted, escape_control};
+use elbowroom_executive::messages::{count_with_noun, escape_control};
 
 /// Maximum number of running actions that are named.
 const MOST_NAMED: usize = 3;
@@ -47,7 +47,10 @@ impl ProgressLine {
                 (false, false) => names.join(", "),
             };
             let time = number::nearest(now);
-            format!("at {time}: {what}; {}", counted(replans, "new plan"))
+            format!(
+                "at {time}: {what}; {}",
+                count_with_noun(replans, "new plan")
+            )
         });
     }
 

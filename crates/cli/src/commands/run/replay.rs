@@ -6,14 +6,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom::answers::run::run as execute;
-use elbowroom::answers::{Halt, RunRequest, Watcher};
+use elbowroom::answers::{Observer, RunRequest, StopRequest};
 use elbowroom::execute::RunSpec;
 use elbowroom::report::trace::{Line, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored};
 use serde_json::{Value, json};
 
 use crate::exit::{Answer, Exit, Failure};
-use crate::look::{BAD, GOOD, styled};
 use crate::output::Output;
+use crate::terminal::{ERROR, SUCCESS, styled};
 use crate::{input, output};
 
 pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
@@ -36,7 +36,7 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
     let task = Arc::new(super::task(&spec, output)?);
     let snapshot = stored.snapshot();
     let snapshot = snapshot.map_err(|error| unreadable(error.to_string()))?;
-    let stand = snapshot.map(|it| it.stand(&task)).transpose();
+    let stand = snapshot.map(|it| it.restored(&task)).transpose();
     let stand = stand.map_err(|why| unreadable(format!("line 2: {why}")))?;
     let first = if spec.has_plan {
         let first = stored.first_plan(&task);
@@ -49,11 +49,11 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
     let analyst = analyst.map_err(|error| unreadable(format!("line 1: {error}")))?;
     let request = RunRequest::new(&spec, &task)
         .beginning_with(first)
-        .standing(stand)
-        .reopened(stored.reopened())
-        .planned_by(ReplayPlanner::new(&stored))
-        .prepared_by(ReplayPreparer(analyst));
-    let mut watch = AsStored(replay.interruption());
+        .resume_from(stand)
+        .with_restarts(stored.restart_count())
+        .with_planner(ReplayPlanner::new(&stored))
+        .with_preparer(ReplayPreparer(analyst));
+    let mut watch = StoredInterrupt(replay.interruption());
     let outcome = execute(
         request.recorded_by(&mut replay),
         &mut ReplayWorld::new(&stored, &task),
@@ -80,7 +80,7 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
         output::print(&match &difference {
             None => format!(
                 "{}: {name} comes to the same decisions ({agreed} entries{})\n",
-                styled(GOOD, "agrees"),
+                styled(SUCCESS, "agrees"),
                 if stored.is_complete() {
                     ""
                 } else {
@@ -89,7 +89,7 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
             ),
             Some(difference) => format!(
                 "{}: {name} differs at line {}\n  stored    {}\n  replayed  {}\n",
-                styled(BAD, "differs"),
+                styled(ERROR, "differs"),
                 difference.line,
                 difference.stored.text(),
                 difference.replayed.text()
@@ -110,12 +110,12 @@ fn json_of(line: &Line) -> Value {
 }
 
 /// Watcher that ends the run where the stored one was interrupted.
-struct AsStored(Arc<AtomicBool>);
+struct StoredInterrupt(Arc<AtomicBool>);
 
-impl Watcher for AsStored {
-    fn flow(&mut self) -> ControlFlow<Halt> {
+impl Observer for StoredInterrupt {
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
         if self.0.load(Ordering::SeqCst) {
-            ControlFlow::Break(Halt::Cancelled)
+            ControlFlow::Break(StopRequest::Cancelled)
         } else {
             ControlFlow::Continue(())
         }

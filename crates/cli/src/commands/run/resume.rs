@@ -19,7 +19,7 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
-use crate::stopwatch::Stopwatch;
+use crate::time_limit::Stopwatch;
 
 /// Reads the journal of a run.
 fn journaled_run(path: &Path) -> Result<JournaledRun, Failure> {
@@ -81,13 +81,13 @@ impl ResumeHost for StandaloneHost<'_> {
         task: &Arc<Task>,
         interrupt: &Interrupt,
     ) -> Result<OperatorInterface, Error> {
-        if spec.is_lasting {
+        if spec.is_persistent {
             return Err(Error::new(
                 "this is the journal of an executive that takes requests",
                 "continue with `elbowroom serve --resume`",
             ));
         }
-        if spec.is_attended && self.arguments.token.is_none() {
+        if spec.is_interactive && self.arguments.token.is_none() {
             return Err(Error::new(
                 "this run can be paused from its page, and may be",
                 "give --serve and --token again",
@@ -139,7 +139,7 @@ pub(in crate::commands) fn run(
     let host = CommandHost {
         arguments,
         interrupt: &interrupt,
-        views: OnceCell::new(),
+        viewers: OnceCell::new(),
         started: &|| (),
         resume: Some(host),
     };
@@ -148,5 +148,5 @@ pub(in crate::commands) fn run(
         learning.finish();
     }
     let outcome = host.close(outcome).map_err(failure)?;
-    super::conclude((arguments, &spec), outcome, output)
+    super::print_outcome((arguments, &spec), outcome, output)
 }

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use elbowroom::answers::learn::known_sections;
 use elbowroom::execute::{
-    FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec, SpecError, Spoiler, SpoilerError,
+    AdversaryError, AdversarySettings, FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec,
+    SpecError,
 };
 use elbowroom::execution::run::{PlanningTime, RunningRule};
 use elbowroom::model::Problem;
@@ -13,7 +14,7 @@ use elbowroom::plan::parametrize::ParametrizeError;
 use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
 use elbowroom_executive::learning::MODEL;
-use elbowroom_executive::messages::counted;
+use elbowroom_executive::messages::count_with_noun;
 
 use super::super::threads;
 use crate::args::{EMBEDDED, FirstPlanChoice, RunArgs, RunningChoice};
@@ -60,7 +61,7 @@ pub(in crate::commands) fn of(
         ..RunSpec::new(empty(), empty())
     };
     // Reports a misspelt planner before any file is read.
-    spec.check_planner().map_err(contradiction)?;
+    spec.check_planner().map_err(contradiction_failure)?;
     spec.domain = (&input::source(domain, "domain")?).into();
     spec.executor = arguments
         .executor
@@ -76,20 +77,20 @@ pub(in crate::commands) fn of(
         spec.likelihoods = Some((&input::source(path, "likelihoods")?).into());
     }
     let mut worlds = Vec::new();
-    if arguments.is_spoiled() {
+    if arguments.has_adversary() {
         if spec.realtime.is_some() && spec.has_plan {
             let what = "--world spoiler has no wall clock";
             return Err(Failure::new(what, "leave out --realtime"));
         }
         let inside = arguments.spoil.clone();
-        spec.spoiler = Some(Spoiler { inside });
+        spec.spoiler = Some(AdversarySettings { inside });
     } else if let Some(path) = &arguments.world {
         let source = input::source(path, "world")?;
         spec.world = Some(source.text().to_owned());
         worlds.push(source);
     }
     if let Some(path) = &arguments.believed {
-        let source = believed(path, arguments.learn.as_deref())?;
+        let source = read_believed_world(path, arguments.learn.as_deref())?;
         spec.believed = Some(source.text().to_owned());
         if !path.is_dir() {
             worlds.push(source);
@@ -101,14 +102,14 @@ pub(in crate::commands) fn of(
         Some(FirstPlanChoice::Likeliest) => FirstPlan::Likeliest,
         None => spec.usual_first_plan(),
     };
-    spec.plans_aside = spec.can_plan_aside();
+    spec.plans_aside = spec.can_plan_in_background();
     spec.readies_aside = spec.plans_aside;
     Ok((spec, worlds))
 }
 
 /// Reads the world file of `--believed`. In a folder of `--learn` it is the model. If there is no
 /// model yet, all actions are expected to go as planned.
-fn believed(path: &Path, learn: Option<&Path>) -> Result<Source, Failure> {
+fn read_believed_world(path: &Path, learn: Option<&Path>) -> Result<Source, Failure> {
     let is_new = learn == Some(path) && !path.exists();
     if !path.is_dir() && !is_new {
         return input::source(path, "world");
@@ -141,14 +142,14 @@ pub(super) fn fit_model(
     let model = spec.believed.as_deref().unwrap_or_default();
     let (model, left_out) = known_sections(model, problem);
     if left_out > 0 {
-        let sections = counted(left_out, "section");
+        let sections = count_with_noun(left_out, "section");
         output::warn(&format!(
             "{path}: {sections} left out, as this problem has none of it"
         ));
     }
     let source = Source::new(path, model.as_str());
     let read = WorldModel::read(&source, problem);
-    read.map_err(|wrong| contradiction(SpecError::World(wrong)))?;
+    read.map_err(|wrong| contradiction_failure(SpecError::World(wrong)))?;
     spec.believed = Some(model);
     Ok(())
 }
@@ -157,7 +158,7 @@ pub(super) fn fit_model(
 /// needs the other processors during a run.
 pub(super) fn threads_of(arguments: &RunArgs, planner: &str) -> Result<usize, Failure> {
     let is_embedded = planner.eq_ignore_ascii_case(EMBEDDED);
-    threads::of(arguments.jobs, 1, is_embedded)
+    threads::thread_count(arguments.jobs, 1, is_embedded)
 }
 
 /// Returns the rule for planning time. By default, planning takes time on a wall clock and in a
@@ -177,21 +178,21 @@ fn planning_time(arguments: &RunArgs) -> Result<PlanningTime, Failure> {
 }
 
 /// Returns a failure with advice on contradictory arguments or files.
-pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
+pub(in crate::commands) fn contradiction_failure(error: SpecError) -> Failure {
     let hint = match &error {
         SpecError::World(wrong) => {
             return Failure::from(wrong.clone())
-                .advised("docs/formats/world.md describes world files");
+                .with_default_advice("docs/formats/world.md describes world files");
         }
         SpecError::Likelihoods(wrong) => {
             return Failure::from(wrong.clone())
-                .advised("docs/formats/likelihoods.md describes likelihood files");
+                .with_default_advice("docs/formats/likelihoods.md describes likelihood files");
         }
         SpecError::Planner(_) => {
             "`elbowroom plan --help` says more; `embedded` is always there, and `none` plans \
              nothing"
         }
-        SpecError::Unheeded(_) => "`elbowroom check` judges plans of such a domain",
+        SpecError::UnsupportedFeature(_) => "`elbowroom check` judges plans of such a domain",
         SpecError::NeedsWorld(_) => {
             "give it a world file with --world or --believed, or name another executor"
         }
@@ -199,7 +200,7 @@ pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
         SpecError::SelfOverlap(_) => "leave out --self-overlap, or --planner",
         SpecError::FirstPlan(why) => match why {
             FirstPlanError::Given => "leave out the plan, or --first-plan",
-            FirstPlanError::AnotherPlanner => "leave out --planner, or --first-plan",
+            FirstPlanError::ExternalPlanner => "leave out --planner, or --first-plan",
             _ => {
                 "give it a world file with --world or --believed, or --likelihoods, or leave out --first-plan"
             }
@@ -211,21 +212,21 @@ pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
                  --planning-budget",
             );
         }
-        SpecError::Spoiler(error) => return nothing_to_spoil(error),
+        SpecError::Adversary(error) => return adversary_failure(error),
         _ => "",
     };
     Failure::new(error, hint)
 }
 
-fn nothing_to_spoil(error: &SpoilerError) -> Failure {
+fn adversary_failure(error: &AdversaryError) -> Failure {
     match error {
-        SpoilerError::NoPlan => Failure::new(
+        AdversaryError::NoPlan => Failure::new(
             "there is no plan for --world spoiler to spoil",
             "give one with --plan",
         ),
-        SpoilerError::Box(message) => Failure::new(format!("--spoil: {message}"), ""),
-        SpoilerError::NoEnvelope => Failure::new(error, "give a box with --spoil"),
-        SpoilerError::Empty => Failure::new(error, "give a smaller box with --spoil"),
+        AdversaryError::Box(message) => Failure::new(format!("--spoil: {message}"), ""),
+        AdversaryError::NoEnvelope => Failure::new(error, "give a box with --spoil"),
+        AdversaryError::Empty => Failure::new(error, "give a smaller box with --spoil"),
         _ => Failure::new(error, ""),
     }
 }

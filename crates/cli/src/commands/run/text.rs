@@ -6,50 +6,50 @@ use elbowroom::answers::run::RunAnswer;
 use elbowroom::execution::Ending;
 use elbowroom::execution::run::{Report, Verdict};
 
-use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::number::nearest;
-use crate::wrap::wrapped;
-use elbowroom_executive::messages::{counted, escape_control};
+use crate::terminal::{EMPHASIS, ERROR, HINT, SUCCESS, TextLayout, styled};
+use crate::wrap::wrap;
+use elbowroom_executive::messages::{count_with_noun, escape_control};
 
 /// Circumstances of the end of a run.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ends {
+pub(super) struct RunEnd {
     /// `true` if the run ended because its journal cannot be written.
-    pub(super) has_lost: bool,
+    pub(super) has_lost_journal: bool,
     /// `true` if the run continues after its goals are reached. New plans are then counted from
     /// that time.
-    pub(super) is_lasting: bool,
+    pub(super) is_persistent: bool,
 }
 
-pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
-    let mut replans = counted(report.replans, "new plan");
-    if ends.is_lasting {
+pub(super) fn render(answer: &RunAnswer, report: &Report, ends: RunEnd) -> String {
+    let mut replans = count_with_noun(report.replans, "new plan");
+    if ends.is_persistent {
         replans.push_str(" since it last rested");
     }
     let time = nearest(&report.time);
-    let width = Look::of_stdout().width;
+    let width = TextLayout::of_stdout().width;
     let mut text = match &report.verdict {
         Verdict::GoalReached => {
             format!(
                 "{}: goal reached at {time}, with {replans}\n",
-                styled(GOOD, "done")
+                styled(SUCCESS, "done")
             )
         }
         Verdict::Unsolvable => format!(
             "{}: unsolvable from here, at {time}, after {replans}\n",
-            styled(BAD, "failed")
+            styled(ERROR, "failed")
         ),
         Verdict::NoPlan { why, missing } => {
-            let why = wrapped(&escape_control(why), width, 2);
+            let why = wrap(&escape_control(why), width, 2);
             match missing.advice() {
                 Some(advice) => format!(
                     "{}: no plan found from here, at {time}, after {replans}:\n{why}\n{}\n",
                     styled(HINT, "limit"),
-                    wrapped(advice, width, 2)
+                    wrap(advice, width, 2)
                 ),
                 None => format!(
                     "{}: no plan to continue with at {time}:\n{why}\n",
-                    styled(BAD, "failed")
+                    styled(ERROR, "failed")
                 ),
             }
         }
@@ -63,10 +63,10 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
                 styled(HINT, "limit")
             )
         }
-        Verdict::Interrupted if ends.has_lost => {
+        Verdict::Interrupted if ends.has_lost_journal => {
             format!(
                 "{}: the journal cannot be written, so the run was ended at {time}, after {replans}\n",
-                styled(BAD, "failed")
+                styled(ERROR, "failed")
             )
         }
         Verdict::Interrupted => {
@@ -77,25 +77,25 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
         }
         Verdict::PlannerFailed { .. } => format!(
             "{}: the planner failed at {time}, after {replans}\n",
-            styled(BAD, "failed")
+            styled(ERROR, "failed")
         ),
         // The command's final message states the reason, so it is not repeated here.
         Verdict::WorldFailed { .. } => format!(
             "{}: the world failed at {time}, after {replans}\n",
-            styled(BAD, "failed")
+            styled(ERROR, "failed")
         ),
     };
     if let Some(choice) = &answer.first_plan {
-        let words = wrapped(&escape_control(choice), width, 2);
-        let _ = writeln!(text, "\n{}\n{words}", styled(STRONG, "The first plan"));
+        let words = wrap(&escape_control(choice), width, 2);
+        let _ = writeln!(text, "\n{}\n{words}", styled(EMPHASIS, "The first plan"));
     }
     if let Some(why) = &answer.no_table {
         let what = format!(
             "{}; moves are tried out in samples of the world instead",
             escape_control(why)
         );
-        let words = wrapped(&what, width, 2);
-        let _ = writeln!(text, "\n{}\n{words}", styled(STRONG, "No table of moves"));
+        let words = wrap(&what, width, 2);
+        let _ = writeln!(text, "\n{}\n{words}", styled(EMPHASIS, "No table of moves"));
     }
     for (heading, reasons) in [
         ("Why no plan reaches the goal", &report.dead_end),
@@ -106,11 +106,11 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
             .iter()
             .map(|reason| escape_control(&reason.to_string()));
         let reasons: Vec<String> = reasons
-            .map(|reason| wrapped(&reason, width, 2))
+            .map(|reason| wrap(&reason, width, 2))
             .filter(|reason| !text.contains(reason))
             .collect();
         if !reasons.is_empty() {
-            let heading = styled(STRONG, heading);
+            let heading = styled(EMPHASIS, heading);
             let _ = writeln!(text, "\n{heading}\n{}", reasons.join("\n"));
         }
     }
@@ -121,7 +121,7 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
 /// Appends the executed actions.
 fn push_executed(text: &mut String, report: &Report) {
     if !report.executed.is_empty() {
-        let _ = writeln!(text, "\n{}", styled(STRONG, "What was done"));
+        let _ = writeln!(text, "\n{}", styled(EMPHASIS, "What was done"));
     }
     for executed in &report.executed {
         let step = &executed.step;

@@ -5,10 +5,10 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::exit::Failure;
-use elbowroom_executive::messages::plain;
+use elbowroom_executive::messages::io_error_message;
 
 /// Limit on the size of a trace that is kept in memory, in bytes.
-const MOST_KEPT: usize = 32 << 20;
+const MOST_BUFFERED: usize = 32 << 20;
 
 /// A trace file. Each line is passed to the operating system immediately, so that a killed run
 /// leaves its trace.
@@ -16,7 +16,7 @@ const MOST_KEPT: usize = 32 << 20;
 /// Without a file, the trace is kept in memory until the run is known to be valid.
 pub(super) struct TraceFile {
     file: Option<(File, String)>,
-    kept: String,
+    buffered: String,
     error: Option<std::io::Error>,
 }
 
@@ -26,7 +26,10 @@ impl TraceFile {
             let name = path.display().to_string();
             let file = File::create(path).map_err(|error| {
                 Failure::new(
-                    format!("cannot write the trace {name}: {}", plain(&error)),
+                    format!(
+                        "cannot write the trace {name}: {}",
+                        io_error_message(&error)
+                    ),
                     "choose a file in a folder that exists and that you may write to",
                 )
             })?;
@@ -34,7 +37,7 @@ impl TraceFile {
         };
         Ok(Self {
             file: path.map(open).transpose()?,
-            kept: String::new(),
+            buffered: String::new(),
             error: None,
         })
     }
@@ -43,7 +46,7 @@ impl TraceFile {
     pub(super) fn write(&mut self, line: &str) {
         match (&mut self.file, &self.error) {
             (Some((file, _)), None) => self.error = file.write_all(line.as_bytes()).err(),
-            (None, _) if self.kept.len() < MOST_KEPT => self.kept.push_str(line),
+            (None, _) if self.buffered.len() < MOST_BUFFERED => self.buffered.push_str(line),
             _ => {}
         }
     }
@@ -55,14 +58,14 @@ impl TraceFile {
         }
         let name = format!("elbowroom-invalid-run-{}.jsonl", std::process::id());
         let path = std::env::temp_dir().join(name);
-        std::fs::write(&path, &self.kept).ok()?;
+        std::fs::write(&path, &self.buffered).ok()?;
         Some(path.display().to_string())
     }
 
     /// Closes the file. Returns a message if some lines could not be written.
     pub(super) fn close(self) -> Option<String> {
         let ((_, name), error) = (self.file?, self.error?);
-        let why = plain(&error);
+        let why = io_error_message(&error);
         Some(format!(
             "the trace {name} is incomplete: {why}; is the disk full?"
         ))

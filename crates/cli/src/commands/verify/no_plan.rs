@@ -11,13 +11,13 @@ use crate::args::{ProblemArgs, VerifyArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::limits::push_wrapped;
-use crate::look::{BAD, GOOD, Look, styled};
 use crate::number::nearest;
 use crate::output::{self, Output};
-use elbowroom_executive::messages::counted;
+use crate::terminal::{ERROR, SUCCESS, TextLayout, styled};
+use elbowroom_executive::messages::count_with_noun;
 
 /// Returns `true` if the text is an answer of `elbowroom plan`.
-pub(super) fn is_meant(text: &str) -> bool {
+pub(super) fn is_plan_answer(text: &str) -> bool {
     let document: Result<Value, _> = serde_json::from_str(text);
     document.is_ok_and(|document| document["format"] == "elbowroom-plan")
 }
@@ -71,8 +71,8 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
         output.json(&document)?;
     } else {
         let (style, word) = match verdict {
-            Ok(()) => (GOOD, "proved"),
-            Err(_) => (BAD, "not proved"),
+            Ok(()) => (SUCCESS, "proved"),
+            Err(_) => (ERROR, "not proved"),
         };
         let mut text = format!("{}: {}\n", styled(style, word), source.name());
         let sentence = match &verdict {
@@ -83,18 +83,21 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
                     let apart = nearest(&epsilon);
                     format!(" with interfering happenings at least {apart} apart")
                 };
-                format!("{problem} has no plan{apart}: {}", why(&certificate))
+                format!(
+                    "{problem} has no plan{apart}: {}",
+                    reason_text(&certificate)
+                )
             }
             Err(flaw) => format!("{flaw}."),
         };
-        push_wrapped(&mut text, &sentence, 2, Look::of_stdout().width);
+        push_wrapped(&mut text, &sentence, 2, TextLayout::of_stdout().width);
         output::print(&text)?;
     }
     Ok(if verdict.is_ok() { Exit::Yes } else { Exit::No })
 }
 
 /// Describes why there is no plan, based on an accepted certificate.
-fn why(certificate: &NoPlan) -> String {
+fn reason_text(certificate: &NoPlan) -> String {
     match certificate.kind() {
         Kind::Apart => {
             let groups = certificate.apart.iter();
@@ -103,7 +106,7 @@ fn why(certificate: &NoPlan) -> String {
                 .sum::<usize>();
             format!(
                 "what its goal needs is never true together, as follows from {}.",
-                counted(pairs, "bound")
+                count_with_noun(pairs, "bound")
             )
         }
         Kind::Closed => {
@@ -111,7 +114,7 @@ fn why(certificate: &NoPlan) -> String {
             let states = closed.map_or(0, |closed| closed.states.len());
             format!(
                 "whatever happens leads into one of {}, and its goal holds in none.",
-                counted(states, "state")
+                count_with_noun(states, "state")
             )
         }
         Kind::Reached => {

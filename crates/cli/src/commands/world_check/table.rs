@@ -5,8 +5,8 @@ use serde::Serialize;
 /// A requirement on a world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Check {
-    Lives,
-    Speaks,
+    KeepsRunning,
+    SpeaksProtocol,
     Answers,
     KeepsTime,
     Starts,
@@ -14,11 +14,11 @@ pub(super) enum Check {
     Ends,
     EndsOnce,
     ReportsInTime,
-    KnowsItsTickets,
-    DoesTwoAtOnce,
+    KnowsTickets,
+    RunsConcurrently,
     Cancels,
-    IgnoresTheUnknown,
-    HearsBeliefs,
+    IgnoresUnknownMessages,
+    AcceptsBeliefs,
     Resumes,
     Stops,
 }
@@ -26,9 +26,13 @@ pub(super) enum Check {
 impl Check {
     /// All checks in the order of display, each with a keyword and a description.
     pub(super) const ALL: [(Self, &str, &str); 16] = [
-        (Self::Lives, "lives", "it runs until it receives `stop`"),
         (
-            Self::Speaks,
+            Self::KeepsRunning,
+            "lives",
+            "it runs until it receives `stop`",
+        ),
+        (
+            Self::SpeaksProtocol,
             "speaks",
             "each line that it says is a message of the protocol",
         ),
@@ -60,12 +64,12 @@ impl Check {
             "reports come in the answer in whose time they happened",
         ),
         (
-            Self::KnowsItsTickets,
+            Self::KnowsTickets,
             "knows-its-tickets",
             "reports are about tickets that were given",
         ),
         (
-            Self::DoesTwoAtOnce,
+            Self::RunsConcurrently,
             "does-two-at-once",
             "two actions run at the same time",
         ),
@@ -75,12 +79,12 @@ impl Check {
             "a cancelled action ends within five seconds",
         ),
         (
-            Self::IgnoresTheUnknown,
+            Self::IgnoresUnknownMessages,
             "ignores-the-unknown",
             "unknown messages and late cancels do not disturb it",
         ),
         (
-            Self::HearsBeliefs,
+            Self::AcceptsBeliefs,
             "hears-beliefs",
             "it accepts `believed` and continues",
         ),
@@ -115,8 +119,8 @@ pub(super) struct Row {
 /// Results of the checks so far.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
-    wrong: Vec<(Check, String)>,
-    done: Vec<Check>,
+    violations: Vec<(Check, String)>,
+    completed: Vec<Check>,
     unclaimed: Vec<Check>,
 }
 
@@ -125,38 +129,38 @@ const MOST_EXAMPLES: usize = 3;
 
 impl Findings {
     /// Marks the check as done.
-    pub(super) fn look_at(&mut self, check: Check) {
-        self.done.push(check);
+    pub(super) fn mark_done(&mut self, check: Check) {
+        self.completed.push(check);
     }
 
     /// Marks the check as skipped because the world does not claim the capability.
-    pub(super) fn leave_out(&mut self, check: Check) {
+    pub(super) fn mark_unclaimed(&mut self, check: Check) {
         self.unclaimed.push(check);
     }
 
     /// Returns the number of violations so far.
-    pub(super) fn faults(&self) -> usize {
-        self.wrong.len()
+    pub(super) fn violation_count(&self) -> usize {
+        self.violations.len()
     }
 
     /// Records a violation.
-    pub(super) fn wrong(&mut self, check: Check, why: impl Into<String>) {
+    pub(super) fn record_violation(&mut self, check: Check, why: impl Into<String>) {
         let why = why.into();
-        let known = self.wrong.iter().filter(|(other, _)| *other == check);
+        let known = self.violations.iter().filter(|(other, _)| *other == check);
         let known: Vec<_> = known.map(|(_, known)| known).collect();
         if known.len() < MOST_EXAMPLES && !known.contains(&&why) {
-            self.wrong.push((check, why));
+            self.violations.push((check, why));
         }
     }
 
     /// Returns the rows. `end` is the reason why the checks ended early, if they did.
     pub(super) fn rows(self, end: Option<&str>) -> Vec<Row> {
         let row = |(check, name, what)| {
-            let wrong = self.wrong.iter().filter(|(other, _)| *other == check);
+            let wrong = self.violations.iter().filter(|(other, _)| *other == check);
             let wrong: Vec<String> = wrong.map(|(_, why)| why.clone()).collect();
             let (outcome, why) = if !wrong.is_empty() {
                 (Outcome::Wrong, wrong)
-            } else if self.done.contains(&check) {
+            } else if self.completed.contains(&check) {
                 (Outcome::Passed, Vec::new())
             } else {
                 let why = if self.unclaimed.contains(&check) {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::{Progression, Ticket};
+use elbowroom_execution::{ActionHandle, BeliefState};
 use elbowroom_model::ground::Condition;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -30,7 +30,7 @@ struct Group {
 
 /// Returns the parts of the goal, by the time at which a valid plan reaches them. Parts that do not
 /// hold right after any happening are omitted: their truth depends on time alone.
-pub(super) fn reached(task: &Task, plan: &TimeTriggeredPlan) -> Vec<GoalReached> {
+pub(super) fn goal_times(task: &Task, plan: &TimeTriggeredPlan) -> Vec<GoalReached> {
     let mut groups: BTreeMap<Rational, Group> = BTreeMap::new();
     for (index, step) in plan.steps.iter().enumerate() {
         let group = groups.entry(step.start.clone()).or_default();
@@ -44,11 +44,11 @@ pub(super) fn reached(task: &Task, plan: &TimeTriggeredPlan) -> Vec<GoalReached>
     }
     let mut open = task.goal().conjuncts();
     let mut reached = Vec::new();
-    let mut state = Progression::new(Arc::new(task.clone()));
-    note(task, &state, &Rational::ZERO, &mut open, &mut reached);
+    let mut state = BeliefState::new(Arc::new(task.clone()));
+    record_goal_part(task, &state, &Rational::ZERO, &mut open, &mut reached);
     for (time, group) in &groups {
         // The validator has accepted the plan, so errors here do not matter.
-        let _ = state.arrive(time);
+        let _ = state.advance_for_happening(time);
         for index in &group.ends {
             let _ = state.end(ticket(*index), &[]);
         }
@@ -57,18 +57,18 @@ pub(super) fn reached(task: &Task, plan: &TimeTriggeredPlan) -> Vec<GoalReached>
             let duration = step.duration.clone().unwrap_or_default();
             let _ = state.start(ticket(*index), &step.action, &duration, &[]);
         }
-        note(task, &state, time, &mut open, &mut reached);
+        record_goal_part(task, &state, time, &mut open, &mut reached);
     }
     reached
 }
 
-fn ticket(index: usize) -> Ticket {
-    Ticket(index as u64)
+fn ticket(index: usize) -> ActionHandle {
+    ActionHandle(index as u64)
 }
 
-fn note(
+fn record_goal_part(
     task: &Task,
-    state: &Progression,
+    state: &BeliefState,
     time: &Rational,
     open: &mut Vec<&Condition>,
     reached: &mut Vec<GoalReached>,

@@ -7,7 +7,9 @@ use elbowroom_plan::Side;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{Balance, Best, Conditions, EnvelopeRequest, Foresight, Inequalities, Timeline};
+use super::{
+    Best, Conditions, EnvelopeRequest, Inequalities, Timeline, UniformSlack, ValueOfInformation,
+};
 use crate::answers::{Exact, Version, ViolationAnswer, exact};
 use crate::execute::as_text;
 
@@ -81,10 +83,10 @@ pub enum EnvelopeFinding {
     /// There is an envelope.
     Envelope {
         /// The parameters, with their intervals and limits.
-        parameters: Vec<Room>,
+        parameters: Vec<LimitedRange>,
         /// Durations that the domain leaves to the executor, and that do not vary.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
-        chosen: Vec<Chosen>,
+        chosen: Vec<ChosenDuration>,
         /// Reason for the end of the search.
         stop: Stop,
         /// The number of boxes checked.
@@ -92,10 +94,10 @@ pub enum EnvelopeFinding {
         /// The time that the search took.
         seconds: f64,
         /// Each box found to be inside, in order.
-        widenings: Vec<Widened>,
+        widenings: Vec<WideningStep>,
         /// Deviations of all quantities at once, if they are known.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        balance: Option<Balance>,
+        balance: Option<UniformSlack>,
         /// The objective of the box, if the largest one was requested.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         best: Option<Best>,
@@ -104,7 +106,7 @@ pub enum EnvelopeFinding {
         conditions: Conditions,
         /// The gain of knowing values in advance, if there is any.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        foresight: Option<Foresight>,
+        foresight: Option<ValueOfInformation>,
         /// The times of each action, as planned and anywhere in the envelope.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         timeline: Option<Timeline>,
@@ -116,7 +118,7 @@ pub enum EnvelopeFinding {
         makespans: Option<Makespans>,
     },
     /// The plan fails even if everything goes as planned.
-    Fails(Failing),
+    Fails(NominalFailure),
     /// The given box lies inside the envelope.
     Inside {
         /// The parameters and their intervals.
@@ -139,7 +141,7 @@ pub enum EnvelopeFinding {
 /// The reason why a plan fails even if nothing deviates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Failing {
+pub enum NominalFailure {
     /// The validator rejects the plan as it is.
     Invalid {
         /// The reason.
@@ -199,7 +201,7 @@ pub struct Range {
 
 /// A quantity that is left open, with its interval and the limits of the interval's ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Room {
+pub struct LimitedRange {
     /// The quantity and its interval.
     #[serde(flatten)]
     pub range: Range,
@@ -212,7 +214,7 @@ pub struct Room {
 
 /// A duration that the executor chooses when the action starts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Chosen {
+pub struct ChosenDuration {
     /// The label of the action's instance.
     pub instance: String,
     /// The action.
@@ -264,7 +266,7 @@ pub enum Stop {
 
 /// A widening of the box.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Widened {
+pub struct WideningStep {
     /// Time since the start of the search, in seconds.
     pub seconds: f64,
     /// Number of box checks before it.
@@ -301,7 +303,7 @@ pub struct Counterexample {
     /// The parameters' values, by name.
     pub values: IndexMap<String, Exact>,
     /// The time of each event; empty if there is no schedule for these values.
-    pub schedule: Vec<Happening>,
+    pub schedule: Vec<ActionTimes>,
     /// Strategies of the world against two executors that learn some values too late: one that
     /// starts everything as early as possible, and one that starts everything as late as possible.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -310,7 +312,7 @@ pub struct Counterexample {
 
 /// The start and end times of an action in a schedule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Happening {
+pub struct ActionTimes {
     /// The label of the action's instance.
     pub instance: String,
     /// The action.

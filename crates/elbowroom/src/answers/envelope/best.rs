@@ -1,13 +1,13 @@
 //! The largest box, and its objective.
 
-use elbowroom_envelope::{BestRun, BestSettings, NEVER, Objective, Oracle, Reasons};
-use elbowroom_num::{End, Rational, enclosed};
+use elbowroom_envelope::{BestRun, BestSettings, LOG_OF_ZERO, Objective, OptimalityProof, Oracle};
+use elbowroom_num::{End, Rational, enclosures};
 use elbowroom_verify::{Certificate, Chance};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
 use super::certificate::certificate;
-use super::worth::{Worth, worths};
+use super::shadow_prices::{ShadowPrices, shadow_prices};
 use crate::answers::exact;
 
 /// The objective of a box, and a bound on that of all other boxes.
@@ -48,7 +48,7 @@ pub struct Best {
     pub chances: Vec<Option<Chance>>,
     /// Gains from relaxing bounds of the plan, largest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub worth: Vec<Worth>,
+    pub worth: Vec<ShadowPrices>,
 }
 
 /// Probability that all durations, rounded as in a simulation, stay inside a box.
@@ -65,30 +65,30 @@ pub struct Probability {
 impl Probability {
     fn new(subject: &Subject<'_>, settings: &BestSettings, run: &BestRun) -> Self {
         /// Replacement for infinite ends, beyond any duration.
-        const EVER: i64 = 1_000_000_000_000;
+        const INFINITY_SUBSTITUTE: i64 = 1_000_000_000_000;
         let resolution = subject.request.world.as_ref();
         let resolution = resolution.map_or(Rational::ONE, |world| world.resolution.clone());
         let mut least = Rational::ONE;
         if let Ok(envelope) = &run.envelope {
-            for (interval, chance) in envelope.intervals().iter().zip(&settings.chances) {
+            for (interval, chance) in envelope.intervals().iter().zip(&settings.distributions) {
                 let Some(chance) = chance else { continue };
                 let end = |end: &End, sign| {
                     end.value()
                         .cloned()
-                        .unwrap_or_else(|| Rational::from(sign * EVER))
+                        .unwrap_or_else(|| Rational::from(sign * INFINITY_SUBSTITUTE))
                 };
                 let ends = [end(&interval.lower, -1), end(&interval.upper, 1)];
-                least *= &chance.inside([&ends[0], &ends[1]], &resolution);
-                least = enclosed::billionths_below(&least);
+                least *= &chance.probability_inside([&ends[0], &ends[1]], &resolution);
+                least = enclosures::floor_to_billionth(&least);
             }
         } else {
             least = Rational::ZERO;
         }
-        let most = if run.bound <= Rational::from(NEVER) {
+        let most = if run.bound <= Rational::from(LOG_OF_ZERO) {
             Rational::ZERO
         } else {
-            let [_, most] = enclosed::exp_of_minus(&(-&run.bound).max(Rational::ZERO));
-            enclosed::billionths_above(&most).min(Rational::ONE)
+            let [_, most] = enclosures::exp_of_minus(&(-&run.bound).max(Rational::ZERO));
+            enclosures::ceil_to_billionth(&most).min(Rational::ONE)
         };
         Self { least, most }
     }
@@ -103,10 +103,10 @@ pub(super) fn best(
 ) -> Best {
     // If no box has a positive probability, there are no logarithms to prove anything about.
     let is_possible =
-        settings.objective != Objective::Probability || run.bound > Rational::from(NEVER);
+        settings.objective != Objective::Probability || run.bound > Rational::from(LOG_OF_ZERO);
     let has_certificate = is_possible
         && !run.is_cancelled
-        && (run.is_proved || matches!(run.proof.reasons, Reasons::Tree(_)));
+        && (run.is_proved || matches!(run.proof.reasons, OptimalityProof::Tree(_)));
     let certificate = match &run.envelope {
         Ok(envelope) if has_certificate => {
             certificate(subject, settings, &run.proof, (oracle, envelope))
@@ -115,7 +115,7 @@ pub(super) fn best(
     };
     Best {
         worth: if run.is_proved {
-            worths(subject, &run.proof)
+            shadow_prices(subject, &run.proof)
         } else {
             Vec::new()
         },
@@ -123,13 +123,13 @@ pub(super) fn best(
         probability: (settings.objective == Objective::Probability)
             .then(|| Probability::new(subject, settings, &run)),
         chances: settings
-            .chances
+            .distributions
             .iter()
             .map(|own| own.as_ref().map(Into::into))
             .collect(),
         objective: settings.objective,
         symmetric: settings.symmetric,
-        most: settings.most.clone(),
+        most: settings.max_deviation.clone(),
         value: run.value,
         bound: run.bound,
         is_proved: run.is_proved,

@@ -1,21 +1,23 @@
 //! The proof that a box is inside the envelope and no other box there is larger, in the form that
 //! `elbowroom-verify` checks.
 
-mod inside;
+mod containment;
 mod network;
 
 use std::collections::BTreeMap;
 
 use elbowroom_envelope::{
-    BestProof, BestSettings, Cut, Ground, Guarantee, Moved, Objective, Oracle,
+    BestProof, BestSettings, BoxVariable, Cut, Ground, Guarantee, Objective, Oracle,
 };
-use elbowroom_envelope::{Case as KnownCase, Reasons as KnownReasons, Source as KnownSource};
-use elbowroom_envelope::{ProofPart, ProofWay, volume_foot};
+use elbowroom_envelope::{
+    BoundSource as KnownSource, OptimalityProof as KnownReasons, ProofCase as KnownCase,
+};
+use elbowroom_envelope::{ProofPart, ProofPath, volume_foot};
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Origin, ParametrizedPlan, Side};
 use elbowroom_verify::{
-    Case, Certificate, Constraint, End, Exact, Multiplier, Parameter, Part, Proof, Reasons, Source,
-    Stopped, Sum, Term, Total, Way, added_up,
+    Case, Certificate, Constraint, End, Exact, Multiplier, Parameter, Part, Path, Proof, Reasons,
+    Source, Stopped, Sum, Term, Total, with_sums,
 };
 
 use super::Subject;
@@ -40,9 +42,9 @@ pub(super) fn certificate(
         .collect();
     let constraints = constraints(plan, guarantee);
     for proof in &mut proofs {
-        begin(proof, &constraints);
+        fill_start_points(proof, &constraints);
     }
-    let sound = inside::sound(subject, oracle, envelope);
+    let sound = containment::containment_proof(subject, oracle, envelope);
     let constraints = match sound {
         Some(_) => constraints,
         None => used_constraints(constraints, &mut proofs),
@@ -55,8 +57,9 @@ pub(super) fn certificate(
             .iter()
             .position(|own| own.ends.iter().any(moves))?;
         let own = &proof.variables[variable];
-        let is_limit = greatest_gain(plan, settings, own).is_none_or(|gains| own.most < gains);
-        (is_used[variable] && is_limit).then(|| Exact(own.most.clone()))
+        let is_limit =
+            greatest_gain(plan, settings, own).is_none_or(|gains| own.max_distance < gains);
+        (is_used[variable] && is_limit).then(|| Exact(own.max_distance.clone()))
     };
     let scale = |parameter: usize| {
         let moves = |end: &BoxEnd| end.parameter.index() == parameter;
@@ -75,7 +78,7 @@ pub(super) fn certificate(
             most_below: limit(Side::Lower, index),
             most_above: limit(Side::Upper, index),
             chance: settings
-                .chances
+                .distributions
                 .get(index)
                 .and_then(|own| own.as_ref().map(Into::into)),
         })
@@ -99,7 +102,7 @@ pub(super) fn certificate(
             .collect(),
         constraints,
         symmetric: settings.symmetric,
-        counted: settings.most.clone(),
+        counted: settings.max_deviation.clone(),
         slacks: proof
             .variables
             .iter()
@@ -109,7 +112,7 @@ pub(super) fn certificate(
         reasons,
         sound,
     };
-    added_up(certificate).ok()
+    with_sums(certificate).ok()
 }
 
 /// Returns the derivation, from the cuts, that no box is better.
@@ -120,7 +123,7 @@ fn reasons(settings: &BestSettings, proof: &BestProof, cuts: &mut Cuts) -> Reaso
             let stopped = levels.iter().filter_map(|level| {
                 Some(Stopped {
                     variable: variable(&level.ends)?,
-                    proof: level.cut.map(|cut| cuts.place(cut)),
+                    proof: level.cut.map(|cut| cuts.index_of(cut)),
                     over: Vec::new(),
                 })
             });
@@ -145,12 +148,12 @@ fn reasons(settings: &BestSettings, proof: &BestProof, cuts: &mut Cuts) -> Reaso
 fn greatest_gain(
     plan: &ParametrizedPlan,
     settings: &BestSettings,
-    variable: &Moved,
+    variable: &BoxVariable,
 ) -> Option<Rational> {
     let gains = variable.ends.iter().map(|end| {
         let place = end.parameter.index();
         let nominal = &plan.parameters[place].nominal;
-        let chance = settings.chances.get(place)?.as_ref();
+        let chance = settings.distributions.get(place)?.as_ref();
         let [below, above] = chance.map_or_else(
             || [const { (Rational::ZERO, Some(Rational::ZERO)) }; 2],
             |chance| chance.limits(nominal),
@@ -185,13 +188,13 @@ fn used_limits(reasons: &Reasons, variables: usize) -> Vec<bool> {
 }
 
 /// Fills in the points that are at time 0 or later: each is the end point of the part before it.
-fn begin(proof: &mut Proof, constraints: &[Constraint]) {
+fn fill_start_points(proof: &mut Proof, constraints: &[Constraint]) {
     match proof {
         Proof::Cycle(parts) => {
             let last = parts
                 .last()
                 .map_or(0, |part| end_of(part, &[], constraints));
-            begin_parts(parts, last, &[], constraints);
+            fill_start_points_of_parts(parts, last, &[], constraints);
         }
         Proof::Fixed(parts) => {
             // The executor chooses this point; the time of `point` is measured from it.
@@ -227,7 +230,12 @@ fn begin(proof: &mut Proof, constraints: &[Constraint]) {
             }
             for place in (0..ways.len()).rev() {
                 let (earlier, own) = ways.split_at_mut(place);
-                let mentioned = begin_parts(&mut own[0].parts, begins[place], earlier, constraints);
+                let mentioned = fill_start_points_of_parts(
+                    &mut own[0].parts,
+                    begins[place],
+                    earlier,
+                    constraints,
+                );
                 for (way, at) in mentioned {
                     begins[way] = at;
                 }
@@ -239,10 +247,10 @@ fn begin(proof: &mut Proof, constraints: &[Constraint]) {
 
 /// Does the same for parts that begin at point `at`. Returns the ways that they mention, with their
 /// start points.
-fn begin_parts(
+fn fill_start_points_of_parts(
     parts: &mut [Part],
     mut at: usize,
-    ways: &[Way],
+    ways: &[Path],
     constraints: &[Constraint],
 ) -> Vec<(usize, usize)> {
     let mut mentioned = Vec::new();
@@ -258,7 +266,7 @@ fn begin_parts(
 }
 
 /// Returns the end point of a part of a proof.
-fn end_of(part: &Part, ways: &[Way], constraints: &[Constraint]) -> usize {
+fn end_of(part: &Part, ways: &[Path], constraints: &[Constraint]) -> usize {
     match part {
         Part::Beginning(_) => 0,
         Part::Least(index) | Part::Late(index) => constraints[*index].from,
@@ -274,14 +282,14 @@ fn end_of(part: &Part, ways: &[Way], constraints: &[Constraint]) -> usize {
 #[derive(Default)]
 struct Cuts {
     used: Vec<usize>,
-    places: BTreeMap<usize, usize>,
+    positions: BTreeMap<usize, usize>,
 }
 
 impl Cuts {
     /// Returns the position of a cut among those that are used, and appends it if it is new.
-    fn place(&mut self, cut: usize) -> usize {
+    fn index_of(&mut self, cut: usize) -> usize {
         let used = &mut self.used;
-        *self.places.entry(cut).or_insert_with(|| {
+        *self.positions.entry(cut).or_insert_with(|| {
             used.push(cut);
             used.len() - 1
         })
@@ -289,8 +297,8 @@ impl Cuts {
 
     fn case(&mut self, case: &KnownCase) -> Case {
         match case {
-            KnownCase::Either { cut, cases } => Case::Either {
-                proof: self.place(*cut),
+            KnownCase::AnyRow { cut, cases } => Case::Either {
+                proof: self.index_of(*cut),
                 cases: cases.clone(),
             },
             KnownCase::Split {
@@ -311,7 +319,7 @@ impl Cuts {
                 let used = multipliers.iter().filter(|(_, factor)| !factor.is_zero());
                 let multipliers = used.map(|(source, factor)| Multiplier {
                     source: match *source {
-                        KnownSource::Row(cut, row) => Source::Row(self.place(cut), row),
+                        KnownSource::Row(cut, row) => Source::Row(self.index_of(cut), row),
                         KnownSource::Most(variable) => Source::Most(variable),
                         KnownSource::Least(variable) => Source::Least(variable),
                     },
@@ -350,7 +358,7 @@ fn proof_of(subject: &Subject<'_>, cut: &Cut) -> Proof {
         ),
         Ground::Semireducible(cycle) => {
             let mut ways = Vec::new();
-            let cycle = cycle.iter().map(|way| told(way, &mut ways)).collect();
+            let cycle = cycle.iter().map(|way| append_way(way, &mut ways)).collect();
             Proof::Semireducible { ways, cycle }
         }
         Ground::Condition(broken) => Proof::Assumed {
@@ -374,19 +382,19 @@ fn bound(origin: &Origin) -> Part {
 }
 
 /// Converts a part of a way, after the ways that it mentions.
-fn part(part: &ProofPart, ways: &mut Vec<Way>) -> Part {
+fn part(part: &ProofPart, ways: &mut Vec<Path>) -> Part {
     match part {
         ProofPart::Bound(origin) => bound(origin),
         ProofPart::Early(index) => Part::Early(*index),
         ProofPart::Late(index) => Part::Late(*index),
-        ProofPart::Way(inner) => Part::Way(told(inner, ways)),
+        ProofPart::Path(inner) => Part::Way(append_way(inner, ways)),
     }
 }
 
 /// Appends a way after the ways that it mentions, and returns its position.
-fn told(way: &ProofWay, ways: &mut Vec<Way>) -> usize {
+fn append_way(way: &ProofPath, ways: &mut Vec<Path>) -> usize {
     let parts = way.parts.iter().map(|inner| part(inner, ways)).collect();
-    ways.push(Way {
+    ways.push(Path {
         parts,
         unlabelled: way.unlabelled,
     });

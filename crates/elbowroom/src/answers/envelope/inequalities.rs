@@ -18,7 +18,7 @@ const MOST_TIMES: usize = 400;
 /// Largest number of inequalities that are written.
 const MOST_ROWS: usize = 5_000;
 /// Largest number of positions that are distinguished for a moment inside an action.
-const MOST_PLACES: usize = 64;
+const MOST_POSITIONS: usize = 64;
 
 /// The times and parameters of a plan, and the inequalities that they satisfy.
 ///
@@ -69,7 +69,7 @@ impl Inequalities {
             return None;
         }
         let ranges = DecoupledEnvelope::ranges(plan);
-        let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MOST_PLACES).ok()?;
+        let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MOST_POSITIONS).ok()?;
         let requirements: Vec<RequirementRow> = form
             .obligations
             .iter()
@@ -116,7 +116,7 @@ fn network_row(explainer: &Explainer<'_>, bound: &NetworkBound) -> NetworkRow {
         is_need: matches!(bound.source, Some((_, Side::Lower))),
         words: bound
             .source
-            .and_then(|(index, side)| explainer.bound_words(constraint(index), side)),
+            .and_then(|(index, side)| explainer.describe_bound(constraint(index), side)),
     }
 }
 

@@ -6,23 +6,23 @@ use std::time::Duration;
 use elbowroom_envelope::{Oracle, StopReason, Widening, sharpen};
 use elbowroom_plan::DecoupledEnvelope;
 
-use super::answer::{EnvelopeFinding, Makespans, Stop, Widened};
-use super::balance::balance;
+use super::answer::{EnvelopeFinding, Makespans, Stop, WideningStep};
 use super::best::best;
+use super::binding_constraints::limits_of_ends;
+use super::box_search::{Step, grow};
 use super::conditions::Conditions;
-use super::foresight::foresight;
-use super::grow::{Step, grow};
-use super::limits::what_limits;
 use super::timeline::Timeline;
+use super::uniform_slack::uniform_slack;
+use super::value_of_information::value_of_information;
 use super::{EnvelopeOutcome, Inequalities, Subject};
-use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher};
-use crate::flow::FlowError;
+use crate::answers::{EnvelopeProgress, Event, Observer, RequestError, StopRequest};
+use crate::pipeline::PipelineError;
 
 /// Searches for a box, moves its ends onto their limits if requested, and computes these limits.
 pub(super) fn search(
     subject: &Subject<'_>,
     mut oracle: Oracle,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<EnvelopeOutcome, RequestError> {
     let how = &subject.request.search;
     let begun = watcher.elapsed();
@@ -30,13 +30,13 @@ pub(super) fn search(
     let mut history = History {
         subject,
         watcher,
-        begun,
+        started: begun,
         envelope: DecoupledEnvelope::point(&subject.plan.nominal()),
         widenings: &mut widenings,
         steps: 0,
         best_steps: 0,
         checks: 0,
-        halt: None,
+        stop_request: None,
     };
     let world = subject.request.world.as_ref();
     let grown = grow(
@@ -45,7 +45,7 @@ pub(super) fn search(
         world,
         &mut |step| history.step(step),
     )?;
-    let mut stop = match (grown.stop, history.halt) {
+    let mut stop = match (grown.stop, history.stop_request) {
         (_, Some(halt)) => Stop::from(halt),
         (StopReason::CheckLimit, None) => Stop::CheckLimit,
         (StopReason::Undecided, None) => Stop::Undecided,
@@ -59,13 +59,13 @@ pub(super) fn search(
         Err(objection) => {
             let point = DecoupledEnvelope::point(&subject.plan.nominal());
             let why_not = subject.explainer.objection(&oracle, &point, &objection);
-            subject.refuse_harmless("the plan as it is", &why_not)?;
-            return Ok(subject.fails(why_not));
+            subject.reject_unproved_objection("the plan as it is", &why_not)?;
+            return Ok(subject.failure_outcome(why_not));
         }
     };
     if how.sharpen && best.is_none() && stop == Stop::Converged {
-        let sharp = sharpen(&mut oracle, &envelope, &mut || flow(watcher));
-        if let Some(sharp) = sharp.map_err(FlowError::Refused)? {
+        let sharp = sharpen(&mut oracle, &envelope, &mut || continue_or_stop(watcher));
+        if let Some(sharp) = sharp.map_err(PipelineError::Refused)? {
             envelope = sharp;
         }
         if let ControlFlow::Break(halt) = watcher.flow() {
@@ -74,15 +74,15 @@ pub(super) fn search(
     }
     let seconds = watcher.elapsed().saturating_sub(begun).as_secs_f64();
     let checks = oracle.checks();
-    let balance = balance(oracle.clone(), watcher);
+    let balance = uniform_slack(oracle.clone(), watcher);
     let conditions = Conditions::new(oracle.conditions(), subject.enforced);
-    let limits = what_limits(subject, &mut oracle, &envelope, watcher);
+    let limits = limits_of_ends(subject, &mut oracle, &envelope, watcher);
     let foresight = match stop {
-        Stop::Converged => foresight(subject, &mut oracle, &envelope, watcher)?,
+        Stop::Converged => value_of_information(subject, &mut oracle, &envelope, watcher)?,
         _ => None,
     };
     let mut outcome = subject.outcome(EnvelopeFinding::Envelope {
-        parameters: subject.rooms(&envelope, limits),
+        parameters: subject.limited_ranges(&envelope, limits),
         chosen: subject.chosen(),
         stop,
         checks,
@@ -101,7 +101,7 @@ pub(super) fn search(
 }
 
 /// Returns the watcher's decision to continue or stop, without the reason.
-pub(super) fn flow(watcher: &mut dyn Watcher) -> ControlFlow<()> {
+pub(super) fn continue_or_stop(watcher: &mut dyn Observer) -> ControlFlow<()> {
     match watcher.flow() {
         ControlFlow::Continue(()) => ControlFlow::Continue(()),
         ControlFlow::Break(_) => ControlFlow::Break(()),
@@ -111,11 +111,11 @@ pub(super) fn flow(watcher: &mut dyn Watcher) -> ControlFlow<()> {
 /// Records the widenings, and notifies the watcher.
 struct History<'a> {
     subject: &'a Subject<'a>,
-    watcher: &'a mut dyn Watcher,
-    begun: Duration,
+    watcher: &'a mut dyn Observer,
+    started: Duration,
     /// The box so far.
     envelope: DecoupledEnvelope,
-    widenings: &'a mut Vec<Widened>,
+    widenings: &'a mut Vec<WideningStep>,
     /// The number of steps that IRR has tried.
     steps: usize,
     /// The number of steps of the search for the best box.
@@ -123,13 +123,13 @@ struct History<'a> {
     /// The number of boxes checked when the box grew last.
     checks: usize,
     /// The watcher's reason to stop.
-    halt: Option<Halt>,
+    stop_request: Option<StopRequest>,
 }
 
 impl History<'_> {
     fn step(&mut self, step: &Step<'_>) -> ControlFlow<()> {
         match step {
-            Step::Irr(widening) => self.widened(*widening),
+            Step::Irr(widening) => self.record_widening(*widening),
             Step::Best(step) => {
                 self.best_steps += 1;
                 self.watcher.notice(&Event::Envelope(EnvelopeProgress {
@@ -144,19 +144,19 @@ impl History<'_> {
         match self.watcher.flow() {
             ControlFlow::Continue(()) => ControlFlow::Continue(()),
             ControlFlow::Break(halt) => {
-                self.halt = Some(halt);
+                self.stop_request = Some(halt);
                 ControlFlow::Break(())
             }
         }
     }
 
-    fn widened(&mut self, widening: Option<&Widening<'_>>) {
+    fn record_widening(&mut self, widening: Option<&Widening<'_>>) {
         self.steps += 1;
         if let Some(widening) = widening {
-            let seconds = self.watcher.elapsed().saturating_sub(self.begun);
+            let seconds = self.watcher.elapsed().saturating_sub(self.started);
             let plan = self.subject.plan;
             self.widenings
-                .push(Widened::of(plan, widening, seconds.as_secs_f64()));
+                .push(WideningStep::of(plan, widening, seconds.as_secs_f64()));
             self.envelope.clone_from(widening.envelope);
             self.checks = widening.checks;
         }

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::answers::Exact;
 use crate::linear_form::relaxed;
-use crate::makespan::as_told;
+use crate::makespan::with_fixed_choices;
 
 /// The times of a plan, for a chart.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -78,9 +78,9 @@ impl Timeline {
     /// schedule there.
     pub fn of(task: &Task, plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Self> {
         let zero = network_node(NodeId::ZERO);
-        let nominal = as_told(plan, plan.plan.network(&plan.nominal()))?;
+        let nominal = with_fixed_choices(plan, plan.plan.network(&plan.nominal()))?;
         let nominal = nominal.earliest_schedule(zero);
-        let windows = as_told(plan, relaxed(plan, envelope))?;
+        let windows = with_fixed_choices(plan, relaxed(plan, envelope))?;
         let times = Times {
             nominal: nominal.times(),
             windows: &windows.windows(zero),

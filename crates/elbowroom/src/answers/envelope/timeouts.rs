@@ -50,13 +50,13 @@ pub(crate) fn unknown_action(rule: &TimeoutRule, problem: &Problem) -> Option<St
 }
 
 /// An action that is planned to take longer than its time-out.
-pub(crate) struct PlannedBeyond {
+pub(crate) struct PlannedTimeout {
     action: String,
     planned: Rational,
     timeout: Rational,
 }
 
-impl PlannedBeyond {
+impl PlannedTimeout {
     /// Returns the first action of the plan that times out before its planned end.
     pub(crate) fn find(plan: &ParametrizedPlan, rule: &TimeoutRule) -> Option<Self> {
         let constraints = plan.plan.constraints.iter();
@@ -69,7 +69,10 @@ impl PlannedBeyond {
                 Bound::Infinite => None,
             }
         });
-        let told = plan.told.iter().map(|(id, planned)| (*id, planned));
+        let told = plan
+            .commanded_durations
+            .iter()
+            .map(|(id, planned)| (*id, planned));
         set.chain(told).find_map(|(id, planned)| {
             let action = &plan.plan.instance(id).action.name;
             let timeout = rule.of(action, planned);
@@ -100,15 +103,15 @@ impl PlannedBeyond {
 
 impl Subject<'_> {
     /// Returns a counterexample if an action of the plan times out even as planned.
-    pub(super) fn planned_beyond(&self) -> Option<Counterexample> {
-        let found = PlannedBeyond::find(self.plan, &self.request.timeout)?;
+    pub(super) fn planned_timeout(&self) -> Option<Counterexample> {
+        let found = PlannedTimeout::find(self.plan, &self.request.timeout)?;
         let shortfall = Some(&found.planned - &found.timeout);
         let values = self.plan.nominal().iter().cloned().collect();
-        Some(self.at_timeout(found.message(), shortfall, values))
+        Some(self.timeout_counterexample(found.message(), shortfall, values))
     }
 
     /// Returns a counterexample if an action can time out inside the box.
-    pub(super) fn beyond_timeout(&self, envelope: &DecoupledEnvelope) -> Option<Counterexample> {
+    pub(super) fn possible_timeout(&self, envelope: &DecoupledEnvelope) -> Option<Counterexample> {
         let rule = &self.request.timeout;
         let plan = self.plan;
         let all = timeouts(plan, rule).into_iter().enumerate();
@@ -138,10 +141,10 @@ impl Subject<'_> {
         let mut values: Vec<Rational> = plan.nominal().iter().cloned().collect();
         values[id.index()] = beyond.max(lower);
         let shortfall = upper.map(|upper| upper - &timeout);
-        Some(self.at_timeout(message, shortfall, values))
+        Some(self.timeout_counterexample(message, shortfall, values))
     }
 
-    fn at_timeout(
+    fn timeout_counterexample(
         &self,
         message: String,
         shortfall: Option<Rational>,

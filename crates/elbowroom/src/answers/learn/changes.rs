@@ -7,24 +7,24 @@ use elbowroom_text::Source;
 use serde::{Deserialize, Serialize};
 
 use super::super::RequestError;
-use super::{Course, Log};
+use super::{FactHistory, Log};
 
 /// Rates at which the facts of a predicate become true, or false, by themselves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ChangesLearnt {
+pub struct LearntChanges {
     /// The predicate: `open`.
     pub predicate: String,
     /// The new value of the facts.
     pub becomes: bool,
     /// The rate of all facts together.
-    pub all: RateLearnt,
+    pub all: LearntRate,
     /// The rate of each fact, `(open office)`, if they differ significantly; otherwise empty.
-    pub apart: Vec<(String, RateLearnt)>,
+    pub apart: Vec<(String, LearntRate)>,
 }
 
 /// A rate and the observations that it is based on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RateLearnt {
+pub struct LearntRate {
     /// Number of observed changes.
     pub changes: u64,
     /// Total time for which the facts had the opposite value, in seconds.
@@ -40,7 +40,7 @@ pub struct RateLearnt {
 
 /// Expected numbers of changes by themselves in the logs.
 #[derive(Debug)]
-pub(super) struct Expected {
+pub(super) struct ExpectedChanges {
     /// The predicates whose facts have rates.
     predicates: BTreeSet<String>,
     /// By fact and new value: the expected number of changes, and the seconds for which the fact
@@ -48,14 +48,14 @@ pub(super) struct Expected {
     changes: BTreeMap<(String, bool), (f64, f64)>,
 }
 
-impl Expected {
+impl ExpectedChanges {
     /// Computes them from the rates of a world file, `[[hazard]]`.
     pub(super) fn new(logs: &[Log], world: &Source) -> Result<Self, RequestError> {
         let mut expected = Self {
             predicates: BTreeSet::new(),
             changes: BTreeMap::new(),
         };
-        let courses = logs.iter().filter_map(|log| log.course.as_ref());
+        let courses = logs.iter().filter_map(|log| log.fact_history.as_ref());
         let mut is_compared = false;
         for course in courses {
             is_compared = true;
@@ -84,7 +84,7 @@ impl Expected {
     }
 
     /// Returns the predicates with expected changes, but without observed ones.
-    pub(super) fn unseen(&self, seen: &[Changes]) -> Vec<ChangesLearnt> {
+    pub(super) fn unobserved(&self, seen: &[Changes]) -> Vec<LearntChanges> {
         let is_seen = |predicate: &str| seen.iter().any(|it| it.predicate == predicate);
         let unseen = self.predicates.iter().filter(|it| !is_seen(it));
         let both = unseen.flat_map(|predicate| [false, true].map(|becomes| (predicate, becomes)));
@@ -100,14 +100,14 @@ impl Expected {
                 changes: 0,
                 seconds,
             };
-            ChangesLearnt {
+            LearntChanges {
                 predicate: predicate.clone(),
                 becomes,
-                all: RateLearnt::of(rate, Some(changes)),
+                all: LearntRate::of(rate, Some(changes)),
                 apart: Vec::new(),
             }
         });
-        let is_expected = |answer: &ChangesLearnt| answer.all.expected > Some(0.0);
+        let is_expected = |answer: &LearntChanges| answer.all.expected > Some(0.0);
         answers.filter(is_expected).collect()
     }
 }
@@ -121,8 +121,10 @@ fn predicate_of(fact: &str) -> &str {
 /// Learns rates from all logs that have a course, for predicates with a fact that has changed by
 /// itself.
 pub(super) fn of(logs: &[Log]) -> Vec<Changes> {
-    let courses = || logs.iter().filter_map(|log| log.course.as_ref());
-    let predicates: BTreeSet<String> = courses().flat_map(Course::changing).collect();
+    let courses = || logs.iter().filter_map(|log| log.fact_history.as_ref());
+    let predicates: BTreeSet<String> = courses()
+        .flat_map(FactHistory::changing_predicates)
+        .collect();
     let exposures: Vec<Exposure> = predicates
         .iter()
         .flat_map(|predicate| courses().flat_map(|course| course.exposures(predicate)))
@@ -130,26 +132,26 @@ pub(super) fn of(logs: &[Log]) -> Vec<Changes> {
     learn(&exposures)
 }
 
-impl ChangesLearnt {
-    pub(super) fn of(changes: &Changes, expected: Option<&Expected>) -> Self {
+impl LearntChanges {
+    pub(super) fn of(changes: &Changes, expected: Option<&ExpectedChanges>) -> Self {
         let of_fact = |fact: &str| expected.map(|expected| expected.of(fact, changes.becomes));
         let facts = || changes.facts.iter();
         Self {
             predicate: changes.predicate.clone(),
             becomes: changes.becomes,
-            all: RateLearnt::of(
+            all: LearntRate::of(
                 changes.all,
                 expected.map(|_| facts().filter_map(|(fact, _)| of_fact(fact)).sum()),
             ),
             apart: facts()
-                .filter(|_| changes.is_apart)
-                .map(|(fact, rate)| (fact.clone(), RateLearnt::of(*rate, of_fact(fact))))
+                .filter(|_| changes.has_rate_per_fact)
+                .map(|(fact, rate)| (fact.clone(), LearntRate::of(*rate, of_fact(fact))))
                 .collect(),
         }
     }
 }
 
-impl RateLearnt {
+impl LearntRate {
     fn of(rate: Rate, expected: Option<f64>) -> Self {
         Self {
             expected,

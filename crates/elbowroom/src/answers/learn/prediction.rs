@@ -67,7 +67,7 @@ impl Predictions {
         if is_failure || record.outcome == Outcome::Succeeded {
             sums.ended += 1;
             sums.failures += u64::from(is_failure);
-            let failing = world.failing(&action);
+            let failing = world.failure_rule(&action);
             sums.predicted_failures += failing.map_or(0.0, |it| it.probability);
         }
         let (Some(observed), Some(planned)) = (observed, record.planned) else {
@@ -79,8 +79,8 @@ impl Predictions {
         // Times of reports are rounded in binary.
         let resolution = world.resolution.to_f64();
         let observed = (observed / resolution).round() * resolution;
-        let share = |side| world.duration_share(&action, &exact, observed, side);
-        let is_low = share(Side::UpTo).is_some_and(|share| share < TAILS.0);
+        let share = |side| world.duration_probability(&action, &exact, observed, side);
+        let is_low = share(Side::AtMost).is_some_and(|share| share < TAILS.0);
         let is_high = share(Side::Below).is_some_and(|share| share > TAILS.1);
         let key = (action.clone(), planned.to_bits());
         let mean = *self

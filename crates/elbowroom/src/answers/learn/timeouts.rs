@@ -12,10 +12,10 @@ use rand_chacha::rand_core::SeedableRng;
 const DRAWS: usize = 10_000;
 
 /// Multiple of the longest duration that is drawn or in the logs.
-const MARGIN: f64 = 2.0;
+const SAFETY_FACTOR: f64 = 2.0;
 
 /// Shortest time-out, in seconds.
-const AT_LEAST: i64 = 1;
+const SHORTEST_TIMEOUT: i64 = 1;
 
 /// Returns the time-outs that follow from the learnt durations: twice the longest of 10,000 draws and of all that
 /// ended in the logs.
@@ -25,17 +25,17 @@ pub(super) fn of(learnt: &[Learnt]) -> Option<TimeoutRule> {
     for action in learnt {
         match &action.durations {
             Durations::Unknown => {}
-            Durations::Together(group) => {
+            Durations::Pooled(group) => {
                 actions.extend(absolute(group).map(|rule| (action.name.clone(), rule)));
             }
             Durations::Relative(group) => {
                 let rule = limit(group).map(|factor| TimeoutRule::After {
                     factor,
-                    at_least: Rational::from(AT_LEAST),
+                    at_least: Rational::from(SHORTEST_TIMEOUT),
                 });
                 actions.extend(rule.map(|rule| (action.name.clone(), rule)));
             }
-            Durations::Apart(groups) => {
+            Durations::PerAction(groups) => {
                 let rules = groups.iter();
                 actions.extend(
                     rules.filter_map(|(name, group)| Some((name.clone(), absolute(group)?))),
@@ -48,7 +48,7 @@ pub(super) fn of(learnt: &[Learnt]) -> Option<TimeoutRule> {
 }
 
 fn absolute(group: &Group) -> Option<TimeoutRule> {
-    let at_least = limit(group)?.max(Rational::from(AT_LEAST));
+    let at_least = limit(group)?.max(Rational::from(SHORTEST_TIMEOUT));
     let factor = Rational::ZERO;
     Some(TimeoutRule::After { factor, at_least })
 }
@@ -62,7 +62,7 @@ fn limit(group: &Group) -> Option<Rational> {
     let seen = group.samples.iter().filter(|sample| !sample.is_censored);
     let seen = seen.map(|sample| sample.value);
     let longest = drawn.chain(seen).fold(0.0, f64::max);
-    rounded_up(MARGIN * longest)
+    rounded_up(SAFETY_FACTOR * longest)
 }
 
 fn rounded_up(value: f64) -> Option<Rational> {

@@ -11,12 +11,12 @@ use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
 use super::{Subject, planner};
-use crate::answers::Watcher;
-use crate::execute::{Analyst, Execution, RememberingPlanner, RememberingPreparer};
-use crate::flow;
+use crate::answers::Observer;
+use crate::execute::{CachingPlanner, CachingPreparer, Execution, PlanPreparer};
+use crate::pipeline;
 
 /// Maximum number of cached plans.
-const MEMORY: usize = 2000;
+const CACHE_SIZE: usize = 2000;
 
 /// The results of executing the plan with one executor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,34 +49,34 @@ pub struct EndAnswer {
 }
 
 /// Executes the plan with all executors, without and with new plans, in the same samples.
-pub(super) fn all(
+pub(super) fn execute_with_all(
     subject: &Subject<'_>,
     world: &WorldModel,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Vec<ExecutedAnswer> {
     let executors = subject.request.settings.executors.iter();
     executors
         .flat_map(|executor| {
-            [false, true].map(|replans| one(subject, world, executor, replans, watcher))
+            [false, true].map(|replans| execute_with(subject, world, executor, replans, watcher))
         })
         .collect()
 }
 
-fn one(
+fn execute_with(
     subject: &Subject<'_>,
     world: &WorldModel,
     executor: &ExecutorSpec,
     replans: bool,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> ExecutedAnswer {
     let request = subject.request;
     let mut planner: Box<dyn Planner> = if replans {
-        Box::new(RememberingPlanner::new(planner(&request.settings), MEMORY))
+        Box::new(CachingPlanner::new(planner(&request.settings), CACHE_SIZE))
     } else {
         Box::new(NoPlanner)
     };
-    let analyst = Analyst::new(flow::Settings::default());
-    let mut preparer = RememberingPreparer::new(analyst, MEMORY);
+    let analyst = PlanPreparer::new(pipeline::Settings::default());
+    let mut preparer = CachingPreparer::new(analyst, CACHE_SIZE);
     let mut reached = Proportion::default();
     let mut ends: BTreeMap<(String, Option<String>, Option<String>), u64> = BTreeMap::new();
     for sample in 0..request.settings.samples {
@@ -90,13 +90,13 @@ fn one(
             .by(executor.clone())
             .beginning_with(subject.plan.clone())
             .with_likelihoods(Arc::clone(request.likelihoods))
-            .planned_by(&mut *planner)
-            .prepared_by(&mut preparer)
+            .with_planner(&mut *planner)
+            .with_preparer(&mut preparer)
             .run_in(&mut *world.world(&task, seed));
         let is_reached = report.verdict == Verdict::GoalReached;
         reached.add(is_reached);
         if !is_reached {
-            *ends.entry(end(&report)).or_default() += 1;
+            *ends.entry(describe_end(&report)).or_default() += 1;
         }
     }
     let mut ends: Vec<EndAnswer> = ends
@@ -120,7 +120,7 @@ fn one(
     }
 }
 
-fn end(report: &Report) -> (String, Option<String>, Option<String>) {
+fn describe_end(report: &Report) -> (String, Option<String>, Option<String>) {
     let last = report.reasons.last();
     (
         report.verdict.name().to_owned(),

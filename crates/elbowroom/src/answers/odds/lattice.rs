@@ -70,7 +70,7 @@ impl LatticeFinding {
 impl LatticeAnswer {
     fn of(subject: &Subject<'_>, lattice: &Lattice, order: &OrderAnswer) -> Self {
         let model = subject.search.model();
-        let words = |node: NodeId| model.node_words(node);
+        let words = |node: NodeId| model.describe_node(node);
         let mut path = Vec::new();
         for length in 0..=order.sequence.len() {
             let mut done = order.sequence[..length].to_vec();

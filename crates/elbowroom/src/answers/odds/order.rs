@@ -3,12 +3,12 @@
 use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
-use elbowroom_probability::account::Account;
+use elbowroom_probability::loss_analysis::LossAnalysis;
 use elbowroom_probability::{Layer, Loss, LossCause, Model, Reading, SearchStop, TotalOrderPlan};
 use elbowroom_report::exact;
 use serde::{Deserialize, Serialize};
 
-use super::{Subject, coupled};
+use super::{Subject, coupling_error};
 use crate::answers::RequestError;
 
 /// An order and its probability.
@@ -165,8 +165,8 @@ impl OrderAnswer {
         best: Option<SearchStop>,
     ) -> Result<Self, RequestError> {
         let model = &**subject.search.model();
-        let account =
-            Account::of(model, &subject.initial, order).map_err(|error| coupled(&error))?;
+        let account = LossAnalysis::of(model, &subject.initial, order)
+            .map_err(|error| coupling_error(&error))?;
         let starts = order.sequence.iter().enumerate().filter(|(_, node)| {
             matches!(
                 model.plan().nodes[node.index()],
@@ -174,7 +174,7 @@ impl OrderAnswer {
             )
         });
         let action = |id: InstanceId| model.plan().instance(id).action.name.clone();
-        let mut left = 1.0 - lost(&account.losses, None);
+        let mut left = 1.0 - loss_at(&account.losses, None);
         let happenings = order.sequence.iter().enumerate().map(|(at, &node)| {
             let slot = order.slots.get(at);
             let (kind, action) = match model.plan().nodes[node.index()] {
@@ -183,11 +183,11 @@ impl OrderAnswer {
                 Node::Instant(id) => ("instant", Some(action(id))),
                 Node::Timed(_) | Node::Zero => ("timed", None),
             };
-            left -= lost(&account.losses, Some(at));
+            left -= loss_at(&account.losses, Some(at));
             HappeningAnswer {
                 kind: kind.to_owned(),
                 action,
-                what: model.node_words(node),
+                what: model.describe_node(node),
                 together: order.joined[at],
                 earliest: slot.map(|slot| slot.earliest.clone()),
                 latest: slot.and_then(|slot| slot.latest.clone()),
@@ -206,7 +206,7 @@ impl OrderAnswer {
             goal: order
                 .layers
                 .last()
-                .map_or_else(LayerAnswer::nothing, |layer| LayerAnswer::of(model, layer)),
+                .map_or_else(LayerAnswer::empty, |layer| LayerAnswer::of(model, layer)),
             losses: account
                 .losses
                 .iter()
@@ -219,7 +219,7 @@ impl OrderAnswer {
                     happening,
                     if_certain: share.if_certain,
                     if_retried: share.if_retried,
-                    if_done_again: share.if_done_again,
+                    if_done_again: share.if_restarted,
                 })
                 .collect(),
             facts: account
@@ -236,7 +236,7 @@ impl OrderAnswer {
 }
 
 /// Returns the probability lost at a happening, without losses at the goal.
-fn lost(losses: &[Loss], position: Option<usize>) -> f64 {
+fn loss_at(losses: &[Loss], position: Option<usize>) -> f64 {
     let here = losses
         .iter()
         .filter(|loss| loss.position == position && loss.reading != Reading::Goal);
@@ -244,7 +244,7 @@ fn lost(losses: &[Loss], position: Option<usize>) -> f64 {
 }
 
 impl LayerAnswer {
-    fn nothing() -> Self {
+    fn empty() -> Self {
         Self {
             conditions: Vec::new(),
             running: Vec::new(),
@@ -278,7 +278,7 @@ impl LossAnswer {
         let (condition, since) = match &loss.cause {
             LossCause::Start | LossCause::End | LossCause::During => (None, None),
             LossCause::Fact { fact, truth } => {
-                let since = since(model, sequence, loss, *fact);
+                let since = last_change_before_loss(model, sequence, loss, *fact);
                 (Some(literal(model, *fact, *truth)), since)
             }
             LossCause::Condition(condition) => {
@@ -302,7 +302,7 @@ impl LossAnswer {
         Self {
             happening: loss.position,
             at: match loss.position {
-                Some(position) => model.node_words(sequence[position]),
+                Some(position) => model.describe_node(sequence[position]),
                 None => "the beginning".to_owned(),
             },
             reason,
@@ -312,7 +312,12 @@ impl LossAnswer {
 }
 
 /// Returns the last happening before a loss that has an effect on the fact.
-fn since(model: &Model, sequence: &[NodeId], loss: &Loss, fact: FactId) -> Option<String> {
+fn last_change_before_loss(
+    model: &Model,
+    sequence: &[NodeId],
+    loss: &Loss,
+    fact: FactId,
+) -> Option<String> {
     let before = match (loss.position, loss.reading) {
         (None, _) => 0,
         (Some(position), Reading::OnArrival) => position,
@@ -320,5 +325,5 @@ fn since(model: &Model, sequence: &[NodeId], loss: &Loss, fact: FactId) -> Optio
     };
     let mut before = sequence[..before].iter().rev();
     let last = before.find(|&&node| model.has_effect_on(node, fact))?;
-    Some(model.node_words(*last))
+    Some(model.describe_node(*last))
 }

@@ -10,11 +10,11 @@ use elbowroom_model::Situation;
 use elbowroom_pddl::Source;
 
 use super::{
-    Course, Halt, PlanAnswer, PlanFinding, PlanFormat, PlanOutcome, PlanRequest, PlanStatistics,
-    PlanStop, Version,
+    PlanAnswer, PlanFinding, PlanFormat, PlanOutcome, PlanRequest, PlanStatistics, PlanStop,
+    SearchMonitor, StopRequest, Version,
 };
-use crate::answers::{PlanProgress, Watcher};
-use crate::flow;
+use crate::answers::{Observer, PlanProgress};
+use crate::pipeline;
 
 /// A planner that failed: it returned neither a plan nor an answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -36,7 +36,7 @@ pub fn plan_with(
     request: &mut PlanRequest<'_>,
     [domain, problem]: [&Source; 2],
     time_limit: Option<Duration>,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<PlanOutcome, PlannerFailure> {
     let situation = Situation::initial(request.task);
     let settings = Settings {
@@ -46,12 +46,12 @@ pub fn plan_with(
         scratch: None,
     };
     let first_plan_only = request.first_plan_only;
-    let mut course = Course {
-        begun: watcher.elapsed(),
+    let mut course = SearchMonitor {
+        started: watcher.elapsed(),
         watcher,
         plans: 0,
         first: None,
-        halt: None,
+        stop_request: None,
     };
     let report = plan(
         planner,
@@ -62,15 +62,15 @@ pub fn plan_with(
             problem,
         },
         &settings,
-        &mut flow::repaired,
-        &mut |event| course.hear(event, first_plan_only),
+        &mut pipeline::reschedule,
+        &mut |event| course.on_event_of_planner(event, first_plan_only),
     );
-    let halt = course.halt;
+    let halt = course.stop_request;
     let claim = match &report.outcome {
         Outcome::Unsolvable { .. } => {
             let says = format!("{}: {}", planner.name, report.outcome);
             // The planner's time limit does not apply to the certificate.
-            Some(course.claimed(
+            Some(course.claimed_finding(
                 request.task,
                 says.clone(),
                 &format!("no plan found: {says}"),
@@ -78,28 +78,28 @@ pub fn plan_with(
         }
         _ => None,
     };
-    conclude(planner, request, report, (halt, claim))
+    build_answer(planner, request, report, (halt, claim))
 }
 
-impl Course<'_> {
-    fn hear(&mut self, event: &Event<'_>, first_plan_only: bool) -> ControlFlow<()> {
+impl SearchMonitor<'_> {
+    fn on_event_of_planner(&mut self, event: &Event<'_>, first_plan_only: bool) -> ControlFlow<()> {
         match event {
-            Event::Running { memory, .. } => self.tell(&PlanProgress {
+            Event::Running { memory, .. } => self.report(&PlanProgress {
                 plan: None,
                 makespan: None,
                 metric: None,
-                worth: None,
+                value: None,
                 plans: self.plans,
                 states: None,
                 memory: Some(*memory),
             }),
             Event::Plan { found, .. } => {
                 self.plans += 1;
-                let flow = self.tell(&PlanProgress {
+                let flow = self.report(&PlanProgress {
                     plan: Some(&found.plan),
                     makespan: Some(&found.makespan),
                     metric: found.metric.as_ref(),
-                    worth: None,
+                    value: None,
                     plans: self.plans,
                     states: None,
                     memory: None,
@@ -115,11 +115,11 @@ impl Course<'_> {
 }
 
 /// Builds the answer, or an error if the planner failed.
-fn conclude(
+fn build_answer(
     planner: &Planner,
     request: &PlanRequest<'_>,
     report: Report,
-    (halt, claim): (Option<Halt>, Option<(PlanFinding, PlanStop)>),
+    (halt, claim): (Option<StopRequest>, Option<(PlanFinding, PlanStop)>),
 ) -> Result<PlanOutcome, PlannerFailure> {
     let name = &planner.name;
     let reason = format!("{name}: {}", report.outcome);
@@ -178,7 +178,7 @@ fn conclude(
 }
 
 /// Returns the reason for the end of the planner.
-fn stop(statistics: &Statistics, halt: Option<Halt>) -> PlanStop {
+fn stop(statistics: &Statistics, halt: Option<StopRequest>) -> PlanStop {
     match statistics.ending {
         Some(Ending::TimeLimit) => PlanStop::TimeLimit,
         Some(Ending::MemoryLimit) => PlanStop::MemoryLimit,

@@ -12,11 +12,11 @@ use std::time::Duration;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 
 use super::{PlanFinding, PlanOutcome, PlanRequest, plan};
-use crate::answers::{Event, Halt, RequestError, Watcher};
+use crate::answers::{Event, Observer, RequestError, StopRequest};
 use crate::execute::renumbered;
 
 /// Stack size of the search thread: that of the main thread.
-const STACK: usize = 64 << 20;
+const STACK_SIZE: usize = 64 << 20;
 
 /// Requests an iterator over the plans that the embedded planner finds.
 #[derive(Clone, Copy, Debug)]
@@ -48,11 +48,11 @@ pub enum NextPlan {
     /// There are no more: see [`ImprovingPlans::answer`].
     Ended,
     /// No result within the given time.
-    Later,
+    Timeout,
 }
 
 /// Messages from the search thread.
-enum News {
+enum SearchMessage {
     Better(BetterPlan),
     Ended(Box<Result<PlanOutcome, RequestError>>),
 }
@@ -64,8 +64,8 @@ enum News {
 pub struct ImprovingPlans {
     /// The caller's task. The search numbers facts in its own table.
     task: Arc<Task>,
-    news: Receiver<News>,
-    is_to_stop: Arc<AtomicBool>,
+    messages: Receiver<SearchMessage>,
+    stop_requested: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     answer: Option<Box<Result<PlanOutcome, RequestError>>>,
 }
@@ -77,7 +77,7 @@ impl ImprovingPlans {
     /// When the thread cannot be started.
     pub fn search(
         request: &ImprovingPlansRequest<'_>,
-        watcher: Box<dyn Watcher + Send>,
+        watcher: Box<dyn Observer + Send>,
     ) -> io::Result<Self> {
         let own = request.task.with_own_table();
         let (sender, news) = channel();
@@ -89,11 +89,11 @@ impl ImprovingPlans {
             threads,
             ..
         } = *request;
-        let thread = Builder::new().stack_size(STACK).spawn(move || {
+        let thread = Builder::new().stack_size(STACK_SIZE).spawn(move || {
             let mut relay = Relay {
                 inner: watcher,
                 task: &own,
-                is_to_stop: flag,
+                stop_requested: flag,
                 sender: sender.clone(),
             };
             let mut request = PlanRequest {
@@ -105,12 +105,12 @@ impl ImprovingPlans {
             };
             let answer = plan(&mut request, &mut relay);
             // The receiver may be gone.
-            let _ = sender.send(News::Ended(Box::new(answer)));
+            let _ = sender.send(SearchMessage::Ended(Box::new(answer)));
         })?;
         Ok(Self {
             task: Arc::clone(request.task),
-            news,
-            is_to_stop,
+            messages: news,
+            stop_requested: is_to_stop,
             thread: Some(thread),
             answer: None,
         })
@@ -124,19 +124,21 @@ impl ImprovingPlans {
         if self.answer.is_some() {
             return NextPlan::Ended;
         }
-        match self.news.recv_timeout(patience) {
-            Ok(News::Better(BetterPlan { plan, finding })) => NextPlan::Better(BetterPlan {
-                plan: self.translated(&plan),
-                finding,
-            }),
-            Ok(News::Ended(mut answer)) => {
+        match self.messages.recv_timeout(patience) {
+            Ok(SearchMessage::Better(BetterPlan { plan, finding })) => {
+                NextPlan::Better(BetterPlan {
+                    plan: self.to_caller_facts(&plan),
+                    finding,
+                })
+            }
+            Ok(SearchMessage::Ended(mut answer)) => {
                 if let Ok(PlanOutcome { plan, .. }) = &mut *answer {
-                    *plan = plan.take().map(|plan| self.translated(&plan));
+                    *plan = plan.take().map(|plan| self.to_caller_facts(&plan));
                 }
                 self.answer = Some(answer);
                 NextPlan::Ended
             }
-            Err(RecvTimeoutError::Timeout) => NextPlan::Later,
+            Err(RecvTimeoutError::Timeout) => NextPlan::Timeout,
             // A thread that ends without an answer has panicked.
             Err(RecvTimeoutError::Disconnected) => match self.thread.take().map(JoinHandle::join) {
                 Some(Err(panic)) => resume_unwind(panic),
@@ -146,13 +148,13 @@ impl ImprovingPlans {
     }
 
     /// Returns a plan of the search with the fact numbers of the caller's task.
-    fn translated(&self, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
+    fn to_caller_facts(&self, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
         renumbered(&self.task, plan).expect("the search has the same actions")
     }
 
     /// Requests the end of the search. It ends at its next step, with the best plan so far.
     pub fn stop(&self) {
-        self.is_to_stop.store(true, Ordering::Relaxed);
+        self.stop_requested.store(true, Ordering::Relaxed);
     }
 
     /// Returns the answer, with the last plan, after the end of the search.
@@ -170,7 +172,7 @@ impl Iterator for ImprovingPlans {
             match self.next_within(Duration::MAX) {
                 NextPlan::Better(better) => return Some(better),
                 NextPlan::Ended => return None,
-                NextPlan::Later => {}
+                NextPlan::Timeout => {}
             }
         }
     }
@@ -184,20 +186,20 @@ impl Drop for ImprovingPlans {
 
 /// Forwards each plan, and stops the search on request.
 struct Relay<'a> {
-    inner: Box<dyn Watcher + Send>,
+    inner: Box<dyn Observer + Send>,
     task: &'a Task,
-    is_to_stop: Arc<AtomicBool>,
-    sender: Sender<News>,
+    stop_requested: Arc<AtomicBool>,
+    sender: Sender<SearchMessage>,
 }
 
-impl Watcher for Relay<'_> {
+impl Observer for Relay<'_> {
     fn elapsed(&mut self) -> Duration {
         self.inner.elapsed()
     }
 
-    fn flow(&mut self) -> ControlFlow<Halt> {
-        if self.is_to_stop.load(Ordering::Relaxed) {
-            return ControlFlow::Break(Halt::Cancelled);
+    fn flow(&mut self) -> ControlFlow<StopRequest> {
+        if self.stop_requested.load(Ordering::Relaxed) {
+            return ControlFlow::Break(StopRequest::Cancelled);
         }
         self.inner.flow()
     }
@@ -212,7 +214,7 @@ impl Watcher for Relay<'_> {
                 finding: PlanFinding::of(self.task, plan, makespan, metric, None),
             };
             // The receiver may be gone.
-            let _ = self.sender.send(News::Better(better));
+            let _ = self.sender.send(SearchMessage::Better(better));
         }
         self.inner.notice(event);
     }

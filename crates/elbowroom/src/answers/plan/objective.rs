@@ -1,6 +1,6 @@
 //! Plans with the greatest slack or success probability.
 
-mod worth;
+mod evaluation;
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -13,12 +13,12 @@ use elbowroom_planner::{Answer, Settings};
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
-use super::{Course, PlanFinding, PlanOutcome, PlanStop, none_found};
-use crate::answers::{Event, Exact, PlanProgress, RequestError, Watcher, exact};
+use super::{PlanFinding, PlanOutcome, PlanStop, SearchMonitor, no_plan_reason};
+use crate::answers::{Event, Exact, Observer, PlanProgress, RequestError, exact};
 use crate::execute::{Candidates, Limits};
-use crate::flow;
-use crate::makespan::end;
-use worth::{Judge, Judged};
+use crate::makespan::last_end;
+use crate::pipeline;
+use evaluation::{EvaluatedPlan, PlanEvaluator};
 
 /// Objective of a plan other than its makespan or metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,7 +86,7 @@ pub enum PlanAim<'a> {
 /// Value of a plan by an objective.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum PlanWorth {
+pub enum PlanValue {
     /// The deviation that each duration may have, as a share of its nominal value.
     Slack {
         /// The share.
@@ -115,9 +115,9 @@ pub struct PlanChoice {
     /// The objective.
     pub objective: PlanObjective,
     /// Value of the plan.
-    pub value: PlanWorth,
+    pub value: PlanValue,
     /// Value of the shortest plan that the planner found.
-    pub shortest: PlanWorth,
+    pub shortest: PlanValue,
     /// Makespan of the shortest plan.
     pub shortest_makespan: Exact,
     /// The variant of the problem that the plan was made for, in words; empty if it is the shortest
@@ -127,7 +127,7 @@ pub struct PlanChoice {
     pub compared: usize,
 }
 
-impl fmt::Display for PlanWorth {
+impl fmt::Display for PlanValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Slack { slack } => {
@@ -149,7 +149,7 @@ impl fmt::Display for PlanWorth {
 /// When the problem has features that the embedded planner does not support.
 pub fn best_plan(
     request: &BestPlanRequest<'_>,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<PlanOutcome, RequestError> {
     let task = request.task.with_own_table();
     let situation = Situation::initial(&task);
@@ -165,7 +165,7 @@ pub fn best_plan(
         most_states: u64::MAX,
         improve_states: 20_000,
         work: u64::MAX,
-        patience: 1,
+        first_plan_factor: 1,
         other_states: u64::MAX / 2,
         searches: request.most_searches.unwrap_or(usize::MAX),
     };
@@ -174,16 +174,16 @@ pub fn best_plan(
         PlanAim::Probability(world) => Some(world),
     };
     let begun = watcher.elapsed();
-    let mut course = Course {
+    let mut course = SearchMonitor {
         watcher,
-        begun,
+        started: begun,
         plans: 0,
         first: None,
-        halt: None,
+        stop_request: None,
     };
     let mut source = Candidates::new(&task, &situation, world, settings, limits);
-    let (best, shortest) = compared(request, &task, &mut source, &mut course);
-    let stop = match (course.halt, request.most_searches) {
+    let (best, shortest) = compare_candidates(request, &task, &mut source, &mut course);
+    let stop = match (course.stop_request, request.most_searches) {
         (Some(halt), _) => halt.into(),
         (None, Some(_)) => PlanStop::Ended,
         (None, None) => PlanStop::Exhausted,
@@ -192,7 +192,7 @@ pub fn best_plan(
     let mut ended = None;
     let (plan, finding, choice) = match best {
         Some(best) => {
-            let value = best.value.worth();
+            let value = best.value.to_plan_value();
             let (worth, end) = shortest.unwrap_or((value.clone(), best.makespan.clone()));
             let choice = PlanChoice {
                 objective: request.aim.objective(),
@@ -212,7 +212,7 @@ pub fn best_plan(
                 return Err(RequestError::Unsupported(unsupported.to_string()));
             }
             Some(Answer::Unsolvable { proof, .. }) => {
-                let (finding, stop) = course.refuted(&task, proof, counts);
+                let (finding, stop) = course.refuted_finding(&task, proof, counts);
                 ended = Some(stop);
                 (None, finding, None)
             }
@@ -225,7 +225,7 @@ pub fn best_plan(
                     })
                 );
                 let counts = (counts, without_self_overlap);
-                let reason = none_found(stop, counts, max_memory);
+                let reason = no_plan_reason(stop, counts, max_memory);
                 (None, PlanFinding::none(&task, reason), None)
             }
         },
@@ -237,38 +237,41 @@ pub fn best_plan(
 }
 
 /// Returns the best plan, and the value and makespan of the shortest plan.
-fn compared(
+fn compare_candidates(
     request: &BestPlanRequest<'_>,
     task: &Task,
     source: &mut Candidates<'_>,
-    course: &mut Course<'_>,
-) -> (Option<Judged>, Option<(PlanWorth, Rational)>) {
-    let mut best: Option<Judged> = None;
-    let mut shortest: Option<(PlanWorth, Rational)> = None;
-    let mut judge: Option<Judge<'_>> = None;
-    while let Some(candidate) = source.next(&mut |states| course.goes_on(states, None)) {
+    course: &mut SearchMonitor<'_>,
+) -> (Option<EvaluatedPlan>, Option<(PlanValue, Rational)>) {
+    let mut best: Option<EvaluatedPlan> = None;
+    let mut shortest: Option<(PlanValue, Rational)> = None;
+    let mut judge: Option<PlanEvaluator<'_>> = None;
+    while let Some(candidate) = source.next(&mut |states| course.report_progress(states, None)) {
         course.plans += 1;
         let elapsed = course.elapsed();
         course.first.get_or_insert(elapsed);
         let known = best.as_ref().map(|best| &best.value);
         // After planning, the task's table contains the facts of plans.
-        let judge = judge.get_or_insert_with(|| Judge::of(request, task));
+        let judge = judge.get_or_insert_with(|| PlanEvaluator::of(request, task));
         let value = judge.value(&candidate.plan, known, course);
         let Some(value) = value else {
             // Interrupted: the first plan is returned with an unknown value, a later one is
             // dropped.
-            best.get_or_insert(Judged::unknown(candidate, "the search was ended before"));
+            best.get_or_insert(EvaluatedPlan::unknown(
+                candidate,
+                "the search was ended before",
+            ));
             break;
         };
-        let judged = Judged {
-            makespan: end(&candidate.plan),
+        let judged = EvaluatedPlan {
+            makespan: last_end(&candidate.plan),
             candidate,
             value,
         };
-        shortest.get_or_insert_with(|| (judged.value.worth(), judged.makespan.clone()));
+        shortest.get_or_insert_with(|| (judged.value.to_plan_value(), judged.makespan.clone()));
         if best.as_ref().is_none_or(|best| judged.is_better_than(best)) {
-            let worth = judged.value.worth().to_string();
-            course.goes_on(0, Some((&judged, &worth)));
+            let worth = judged.value.to_plan_value().to_string();
+            course.report_progress(0, Some((&judged, &worth)));
             best = Some(judged);
         }
     }
@@ -286,21 +289,21 @@ impl PlanAim<'_> {
 
 /// Returns the value of the problem's metric, if it has one.
 fn metric(task: &Task, plan: &TimeTriggeredPlan) -> Option<Rational> {
-    match flow::judge(task, plan) {
+    match pipeline::validate_plan(task, plan) {
         elbowroom_model::validate::Verdict::Valid(report) => report.metric(task),
         _ => None,
     }
 }
 
-impl Course<'_> {
+impl SearchMonitor<'_> {
     /// Notifies the watcher of the progress, with a new best plan and its value. Returns `true` if
     /// the search continues.
-    fn goes_on(&mut self, states: u64, new: Option<(&Judged, &str)>) -> bool {
+    fn report_progress(&mut self, states: u64, new: Option<(&EvaluatedPlan, &str)>) -> bool {
         let progress = PlanProgress {
             plan: new.map(|(judged, _)| &judged.candidate.plan),
             makespan: new.map(|(judged, _)| &judged.makespan),
             metric: None,
-            worth: new.map(|(_, worth)| worth),
+            value: new.map(|(_, worth)| worth),
             plans: self.plans,
             states: Some(states),
             memory: None,
@@ -309,7 +312,7 @@ impl Course<'_> {
         match self.watcher.flow() {
             ControlFlow::Continue(()) => true,
             ControlFlow::Break(halt) => {
-                self.halt = Some(halt);
+                self.stop_request = Some(halt);
                 false
             }
         }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Share;
 use crate::answers::envelope::{EnvelopeRequest, Search, envelope};
-use crate::answers::{RequestError, Watcher, exact};
+use crate::answers::{Observer, RequestError, exact};
 
 /// A box inside the region.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,7 +41,7 @@ pub struct IntervalAnswer {
 /// that are not found before the watcher stops the search are left out.
 pub(super) fn boxes(
     request: &EnvelopeRequest,
-    watcher: &mut dyn Watcher,
+    watcher: &mut dyn Observer,
 ) -> Result<Vec<BoxAnswer>, RequestError> {
     let irr = Search::irr();
     let best = |objective| Search {

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use elbowroom_envelope::{Body, Component, Region};
+use elbowroom_envelope::{BoundedRegion, Component, Region};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::ParametrizedPlan;
 use indexmap::IndexMap;
@@ -16,7 +16,7 @@ const MOST_EXACT: usize = 6;
 /// Work limit of the exact measurement, in faces of faces. Beyond it, the volume is sampled.
 const MOST_SIDES: usize = 300_000;
 /// The quantile of the standard normal distribution for intervals of 95 %.
-const DEVIATIONS: f64 = 1.96;
+const NORMAL_QUANTILE: f64 = 1.96;
 
 /// The volume of a region.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -86,7 +86,7 @@ pub(super) fn measure(
     for own in boxes {
         own.share = Share::of(&own.own, &frame, &size);
     }
-    let spread = size.spread();
+    let spread = size.half_width();
     let log10 = size.logarithm() / std::f64::consts::LN_10;
     let names = plan
         .parameters
@@ -111,7 +111,11 @@ pub(super) fn measure(
 }
 
 /// Returns the volume; `None` if there is none, or `flow` breaks.
-fn size_of(body: &Body, seed: u64, flow: &mut dyn FnMut() -> ControlFlow<()>) -> Option<Size> {
+fn size_of(
+    body: &BoundedRegion,
+    seed: u64,
+    flow: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Size> {
     let mut pieces = Vec::new();
     for (index, components) in body.pieces.iter().enumerate() {
         let mut product = Size::Exact(Rational::ONE);
@@ -167,10 +171,10 @@ impl Size {
     }
 
     /// Returns the half-width of the 95 % interval of the logarithm; `None` if it is exact.
-    fn spread(&self) -> Option<f64> {
+    fn half_width(&self) -> Option<f64> {
         match self {
             Self::Exact(_) => None,
-            Self::Estimate { variance, .. } => Some(DEVIATIONS * variance.sqrt()),
+            Self::Estimate { variance, .. } => Some(NORMAL_QUANTILE * variance.sqrt()),
         }
     }
 
@@ -252,7 +256,7 @@ impl Share {
             });
         }
         let middle = logarithm(&volume) - whole.logarithm();
-        let spread = whole.spread().unwrap_or_default();
+        let spread = whole.half_width().unwrap_or_default();
         Some(Self {
             exact: None,
             decimal: middle.exp(),

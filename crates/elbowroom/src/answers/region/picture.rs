@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use elbowroom_envelope::{ExactError, Flat};
+use elbowroom_envelope::{ExactError, Polygon};
 use elbowroom_num::Rational;
 use elbowroom_plan::{ParameterId, ParametrizedPlan};
 use elbowroom_report::plane::PlanePicture;
@@ -141,7 +141,7 @@ fn window(
     id: ParameterId,
     plan: &ParametrizedPlan,
     axes: [ParameterId; 2],
-    flats: &[Flat],
+    flats: &[Polygon],
     rectangles: &[(&str, Vec<[Option<&Rational>; 2]>)],
 ) -> [Rational; 2] {
     let own = usize::from(axes[1] == id);

@@ -61,7 +61,7 @@ pub(super) fn estimate(
     let mut variance = 0.0;
     let mut walks: Vec<Walk> = (0..WALKS)
         .map(|walk| Walk {
-            place: vec![0.0; count],
+            position: vec![0.0; count],
             rows: Rows::around(component, &middle),
             random: ChaCha8Rng::seed_from_u64(seed.wrapping_add(u64::from(walk))),
         })
@@ -113,7 +113,7 @@ impl Rows {
 
 /// A random walk around the middle.
 struct Walk {
-    place: Vec<f64>,
+    position: Vec<f64>,
     rows: Rows,
     random: ChaCha8Rng,
 }
@@ -124,14 +124,15 @@ impl Walk {
     fn share(&mut self, half: &[f64], inner: f64, outer: f64) -> f64 {
         let count = half.len();
         let mut beyond = (0..count)
-            .filter(|&at| self.place[at].abs() > inner * half[at])
+            .filter(|&at| self.position[at].abs() > inner * half[at])
             .count();
         let (mut steps, mut inside) = (0.0, 0.0);
         for _ in 0..STEPS {
             for _ in 0..count {
-                let at = self.below(count);
+                let at = self.random_below(count);
                 let limit = outer * half[at];
-                let (mut lower, mut upper) = (-limit - self.place[at], limit - self.place[at]);
+                let (mut lower, mut upper) =
+                    (-limit - self.position[at], limit - self.position[at]);
                 for (row, factor) in &self.rows.of[at] {
                     let reach = self.rows.slack[*row] / factor;
                     if *factor > 0.0 {
@@ -141,14 +142,14 @@ impl Walk {
                     }
                 }
                 if lower < upper {
-                    let was = self.place[at].abs() > inner * half[at];
+                    let was = self.position[at].abs() > inner * half[at];
                     let step = lower + (upper - lower) * self.unit();
-                    self.place[at] += step;
+                    self.position[at] += step;
                     for (row, factor) in &self.rows.of[at] {
                         let slack = &mut self.rows.slack[*row];
                         *slack = (*slack - factor * step).max(0.0);
                     }
-                    let is = self.place[at].abs() > inner * half[at];
+                    let is = self.position[at].abs() > inner * half[at];
                     beyond = beyond + usize::from(is) - usize::from(was);
                 }
                 steps += 1.0;
@@ -172,7 +173,7 @@ impl Walk {
         clippy::cast_precision_loss,
         reason = "an index below a small count"
     )]
-    fn below(&mut self, count: usize) -> usize {
+    fn random_below(&mut self, count: usize) -> usize {
         ((self.unit() * count as f64) as usize).min(count - 1)
     }
 }
@@ -204,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_has_the_true_volume_about_as_often_as_it_says() {
+    fn confidence_interval_has_its_nominal_coverage() {
         let flow = &mut || ControlFlow::Continue(());
         let mut inside = 0;
         for seed in 0..20 {
@@ -222,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn the_volume_of_a_simplex_of_twenty_coordinates_is_that_of_the_formula() {
+    fn volume_of_20_dimensional_simplex_matches_formula() {
         let flow = &mut || ControlFlow::Continue(());
         let exact: f64 = -(1..=20).map(|n| f64::from(n).ln()).sum::<f64>();
         let found = estimate(&body(20, Rational::ONE), 7, flow).expect("an inside");
@@ -238,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_inside_has_no_estimate() {
+    fn empty_interior_has_no_estimate() {
         let flow = &mut || ControlFlow::Continue(());
         assert_eq!(estimate(&body(3, Rational::ZERO), 0, flow), None);
     }

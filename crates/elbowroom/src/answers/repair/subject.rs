@@ -16,7 +16,7 @@ use elbowroom_plan::{
 
 use super::RepairRequest;
 use crate::AnyPlan;
-use crate::flow::FlowError;
+use crate::pipeline::PipelineError;
 
 /// Default cost per unit of a duration, which the world decides.
 const DURATION_WEIGHT: i64 = 2;
@@ -29,7 +29,7 @@ pub(super) struct Subject {
     pub(super) task: Task,
     pub(super) plan: ParametrizedPlan,
     /// Number of the plan's own parameters; the others were opened for the repair.
-    pub(super) given: usize,
+    pub(super) own_parameters: usize,
     /// The times of a plan with fixed times, which order its interfering actions.
     pub(super) times: Option<Schedule>,
     pub(super) changeable: Vec<Changeable>,
@@ -41,22 +41,22 @@ pub(super) struct Subject {
 }
 
 impl Subject {
-    pub(super) fn new(request: &RepairRequest) -> Result<Self, FlowError> {
-        if let Some(feature) = request.task.left_to_the_judge() {
+    pub(super) fn new(request: &RepairRequest) -> Result<Self, PipelineError> {
+        if let Some(feature) = request.task.unsupported_by_analysis() {
             return Err(DeorderError::Unsupported { feature }.into());
         }
-        let task = request.task.with_timed_apart();
+        let task = request.task.with_separate_timed_initials();
         let (closed, times) = match &request.plan {
             AnyPlan::TimeTriggered(plan) => {
                 let unordered = unordered(&task, plan);
                 let closed = ParametrizedPlan::closed(&task, unordered.plan);
                 (closed, Some(unordered.times))
             }
-            AnyPlan::Stn(plan) => (with_timed_apart(&task, plan), None),
+            AnyPlan::Stn(plan) => (with_separate_timed_initials(&task, plan), None),
         };
         let nominal = times.clone().unwrap_or_else(|| durations_of(&closed));
         let specs = if request.change.is_empty() {
-            every_quantity(&task, &closed)
+            default_quantities(&task, &closed)
         } else {
             request.change.clone()
         };
@@ -66,7 +66,7 @@ impl Subject {
         let mut subject = Self {
             original: closed.plan.clone(),
             plan: vary(&task, closed.clone(), &nominal, &specs)?,
-            given: closed.parameters.len(),
+            own_parameters: closed.parameters.len(),
             task,
             times,
             changeable: Vec::new(),
@@ -76,10 +76,10 @@ impl Subject {
             let id = ParameterId::from(index);
             let kind = subject.plan.parameter(id).kind;
             if let ParameterKind::Duration(instance) = kind {
-                subject.allow(&closed, id, instance, &specs)?;
+                subject.check_openable(&closed, id, instance, &specs)?;
             }
             if is_kept(kind) {
-                subject.fix(&closed, id);
+                subject.restore_range(&closed, id);
             } else {
                 let free = subject.free(&closed, id);
                 subject.add(id, free, None);
@@ -106,13 +106,13 @@ impl Subject {
         let given = || self.plan.parameter(parameter).weight.clone();
         self.changeable.push(Changeable {
             parameter,
-            free,
+            free_range: free,
             weight: weight.unwrap_or_else(given),
         });
     }
 
     /// Rejects opening a duration whose constraint in the domain depends on the plan's course.
-    fn allow(
+    fn check_openable(
         &self,
         closed: &ParametrizedPlan,
         id: ParameterId,
@@ -158,7 +158,7 @@ impl Subject {
     }
 
     /// Restores the original range of an opened parameter, which keeps its name.
-    fn fix(&mut self, closed: &ParametrizedPlan, id: ParameterId) {
+    fn restore_range(&mut self, closed: &ParametrizedPlan, id: ParameterId) {
         let free = self.free(closed, id);
         let parameter = &mut self.plan.parameters[id.index()];
         parameter.range = free.clone();
@@ -172,7 +172,7 @@ impl Subject {
         // It can still vary within the range that the domain allows.
         self.changeable.push(Changeable {
             parameter: id,
-            free,
+            free_range: free,
             weight: Rational::ONE,
         });
     }
@@ -218,7 +218,7 @@ impl Subject {
         let Bound::Finite(value) = bound.clone() else {
             return;
         };
-        let words = self.bound_words(constraint.from, constraint.to, side);
+        let words = self.describe_bound_between(constraint.from, constraint.to, side);
         // The order of the two time points is kept.
         let range = if value.is_negative() {
             Interval::EVERYTHING
@@ -277,7 +277,7 @@ impl Subject {
             let allowed = self.original.instance(instance).action.durative();
             let duration = match allowed {
                 // A duration that the domain allows keeps its constraint.
-                Some(body) if own.free.contains(value) => body.duration.clone(),
+                Some(body) if own.free_range.contains(value) => body.duration.clone(),
                 _ => vec![DurationConstraint {
                     comparison: Comparison::Equal,
                     bound: Expression::Constant(value.clone()),
@@ -294,7 +294,7 @@ impl Subject {
 }
 
 /// Returns all quantities that may change by default.
-fn every_quantity(task: &Task, plan: &ParametrizedPlan) -> Vec<VarySpec> {
+fn default_quantities(task: &Task, plan: &ParametrizedPlan) -> Vec<VarySpec> {
     let spec = |target, weight: i64| VarySpec {
         text: String::new(),
         target,
@@ -339,7 +339,7 @@ fn every_quantity(task: &Task, plan: &ParametrizedPlan) -> Vec<VarySpec> {
 }
 
 /// Returns an STN plan whose timed initials are those of the task.
-fn with_timed_apart(task: &Task, plan: &ParametrizedPlan) -> ParametrizedPlan {
+fn with_separate_timed_initials(task: &Task, plan: &ParametrizedPlan) -> ParametrizedPlan {
     let mut apart = plan.clone();
     let is_action = |node: &Node| !matches!(node, Node::Timed(_));
     let count = plan

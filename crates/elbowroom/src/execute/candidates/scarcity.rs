@@ -9,7 +9,7 @@ use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{Purpose, Rule, WorldModel};
 
 use super::super::rewrite::add_function_of;
-use super::variant::{SAMPLES, SEED, place_of};
+use super::variant::{SAMPLES, SEED, quantile_index};
 
 /// Scarcity of amounts in a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -41,7 +41,7 @@ pub(super) fn scarcities(world: &WorldModel) -> Vec<Scarcity> {
 
 impl Scarcity {
     /// Describes the variant for users.
-    pub(super) fn words(self, world: Option<&WorldModel>) -> String {
+    pub(super) fn describe(self, world: Option<&WorldModel>) -> String {
         let rule = self.of.and_then(|place| world?.amounts.get(place));
         let what = rule.map_or("amounts".to_owned(), |rule| rule.fluent.to_string());
         let quantile = self.quantile;
@@ -126,11 +126,12 @@ impl Scarcity {
         let mut draws: Vec<Rational> = (0..SAMPLES).map(draw).collect();
         draws.sort();
         match operator {
-            UpdateOperator::Decrease | UpdateOperator::ScaleDown => {
-                draws[place_of(self.quantile)].clone().max(planned.clone())
-            }
+            UpdateOperator::Decrease | UpdateOperator::ScaleDown => draws
+                [quantile_index(self.quantile)]
+            .clone()
+            .max(planned.clone()),
             UpdateOperator::Increase | UpdateOperator::ScaleUp | UpdateOperator::Assign => {
-                let few = &draws[place_of(100 - self.quantile.min(100))];
+                let few = &draws[quantile_index(100 - self.quantile.min(100))];
                 few.clone().min(planned.clone())
             }
         }

@@ -81,7 +81,7 @@ impl Variant {
     }
 
     /// Returns `true` if its plans are plans of the problem without conversion.
-    pub(super) fn is_as_written(&self) -> bool {
+    pub(super) fn needs_no_conversion(&self) -> bool {
         self.pace == Pace::Planned && self.scarcity.is_none() && !self.is_reliable
     }
 
@@ -94,7 +94,7 @@ impl Variant {
     }
 
     /// Describes the variant for users; empty for the problem itself.
-    pub(super) fn words(&self, world: Option<&WorldModel>) -> String {
+    pub(super) fn describe(&self, world: Option<&WorldModel>) -> String {
         let mut words = Vec::new();
         match self.pace {
             Pace::Planned => {}
@@ -108,7 +108,7 @@ impl Variant {
             }
         }
         if let Some(scarcity) = self.scarcity {
-            words.push(scarcity.words(world));
+            words.push(scarcity.describe(world));
         }
         if self.is_reliable {
             words.push("of actions that seldom fail".to_owned());
@@ -127,7 +127,7 @@ impl Variant {
         situation: &Situation,
         world: Option<&WorldModel>,
     ) -> Option<Problem> {
-        let mut problem = task.beginning_at(situation).problem().clone();
+        let mut problem = task.starting_from(situation).problem().clone();
         match (self.pace, world) {
             (Pace::Planned, _) => {}
             (Pace::Quantile(quantile), Some(world)) => {
@@ -185,10 +185,10 @@ fn quantile_of(
         draws.sort();
         draws
     });
-    draws[place_of(quantile)].clone()
+    draws[quantile_index(quantile)].clone()
 }
 
-pub(super) fn place_of(quantile: u64) -> usize {
+pub(super) fn quantile_index(quantile: u64) -> usize {
     usize::try_from(quantile.min(100) * (SAMPLES - 1) / 100).unwrap_or(0)
 }
 
@@ -210,7 +210,7 @@ fn add_events(problem: &mut Problem, world: &WorldModel, quantile: u64, now: &Ra
         };
         let mut draws: Vec<Rational> = (0..SAMPLES).map(draw).collect();
         draws.sort();
-        let time = draws[place_of(100 - quantile.min(100))].clone();
+        let time = draws[quantile_index(100 - quantile.min(100))].clone();
         let Some(change) = change(problem, &event.change) else {
             continue;
         };
@@ -255,10 +255,12 @@ fn count_failures(task: &Task, problem: &mut Problem, world: &WorldModel) {
     };
     for schema in (0..problem.schemas.len()).map(SchemaId::from) {
         let value = add_function_of(task, schema, "odds", problem, &|name, _| {
-            let fails = world.failing(name).map_or(0.0, |rule| rule.probability);
+            let fails = world
+                .failure_rule(name)
+                .map_or(0.0, |rule| rule.probability);
             // An action that always fails gets a large finite cost.
             let against = -(1.0 - fails.min(0.999_999)).ln();
-            Some(Rational::new(written(against), 1_000_000))
+            Some(Rational::new(to_millionths(against), 1_000_000))
         });
         let effect = Effect {
             variables: Vec::new(),
@@ -281,7 +283,7 @@ fn count_failures(task: &Task, problem: &mut Problem, world: &WorldModel) {
 }
 
 /// Returns the number in millionths.
-pub(super) fn written(number: f64) -> i64 {
+pub(super) fn to_millionths(number: f64) -> i64 {
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a probability, or its logarithm"

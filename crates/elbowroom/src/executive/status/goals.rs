@@ -29,7 +29,7 @@ pub(super) struct GoalList {
 
 impl GoalList {
     /// Adds an open goal with this name and text.
-    pub(super) fn give(&mut self, (name, goal): (&str, &str), terms: &GoalTerms, now: &Rational) {
+    pub(super) fn add(&mut self, (name, goal): (&str, &str), terms: &GoalTerms, now: &Rational) {
         self.open.push(GoalNow {
             name: name.to_owned(),
             goal: goal.to_owned(),
@@ -102,7 +102,7 @@ impl GoalList {
     /// Marks the open goals after a failed search for a plan. Pursued goals become impossible if it
     /// `is_certain` that no plan exists, otherwise unplanned. Goals that are still set aside are
     /// impossible.
-    pub(super) fn give_up(&mut self, is_certain: bool, why: &str, now: &Rational) {
+    pub(super) fn mark_unplanned(&mut self, is_certain: bool, why: &str, now: &Rational) {
         for goal in &mut self.open {
             let is_pursued = goal.state == PURSUED;
             let is_unplanned = is_pursued && !is_certain;
@@ -116,7 +116,7 @@ impl GoalList {
     }
 
     /// Marks the open goals as pursued, because another plan was requested.
-    pub(super) fn try_again(&mut self) {
+    pub(super) fn mark_pursued(&mut self) {
         for goal in &mut self.open {
             if [IMPOSSIBLE, UNPLANNED].contains(&goal.state.as_str()) {
                 PURSUED.clone_into(&mut goal.state);

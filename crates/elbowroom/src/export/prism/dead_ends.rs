@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_formula_says_what_its_table_says() {
+    fn formula_matches_its_table() {
         let names: Vec<String> = ["a", "b", "c"].map(str::to_owned).into();
         for table in 0..256_u32 {
             let table: Vec<bool> = (0..8).map(|state| table & (1 << state) != 0).collect();
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_under_way_makes_a_difference() {
+    fn formula_depends_on_running_actions() {
         let facts: Vec<String> = ["a", "b"].map(str::to_owned).into();
         let running: Vec<String> = ["x", "y"].map(str::to_owned).into();
         let names: Vec<String> = facts.iter().chain(&running).cloned().collect();

@@ -140,7 +140,7 @@ mod tests {
     use super::{Formula, choice, decimal, exact};
 
     #[test]
-    fn formulas_keep_to_the_precedence_of_the_language() {
+    fn formulas_respect_operator_precedence() {
         let [a, b, c] = ["a", "b", "t=1"].map(Formula::atom);
         let either = Formula::any([a.clone(), b.clone()]);
         let all = Formula::all([either.clone(), c.clone().negated(), Formula::TRUE]);
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn probabilities_are_those_of_the_file() {
+    fn probabilities_keep_their_decimals() {
         assert_eq!(decimal(&exact(0.1)), "0.1");
         assert_eq!(decimal(&(&exact(0.35) * &exact(0.07))), "0.0245");
         let ways = [(exact(0.0), "x"), (exact(1.0), "y")];

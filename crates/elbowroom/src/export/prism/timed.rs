@@ -10,7 +10,10 @@ use elbowroom_sim::WorldModel;
 use super::formula::Formula;
 use super::{PrismError, bare, checked};
 use crate::export::names::distinct;
-use crate::timed::{Act, Chances, Event, Facts, Needs, Settings, Side, TimedWorld, chances};
+use crate::timed::{
+    ActionModel, CellProbabilities, Event, Facts, Needs, Settings, Side, TimedWorld,
+    cell_probabilities_of,
+};
 
 /// Direction of the bound on the best value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,8 +53,9 @@ pub fn timed(
     if !world.numbers.is_empty() {
         return Err(PrismError::Numbers);
     }
-    let has_outcomes =
-        |act: &Act| act.failures.len() > 1 || act.failures.iter().any(|way| way.delay > 0.0);
+    let has_outcomes = |act: &ActionModel| {
+        act.failures.len() > 1 || act.failures.iter().any(|way| way.delay > 0.0)
+    };
     if world.acts.iter().any(has_outcomes) {
         return Err(PrismError::Outcomes);
     }
@@ -59,7 +63,7 @@ pub fn timed(
         Bound::Lower => Side::Below,
         Bound::Upper => Side::Above,
     };
-    let chances = chances(&world, cells, side)?;
+    let chances = cell_probabilities_of(&world, cells, side)?;
     let names = world.facts.iter().map(|fact| {
         let name = task.fact_name(*fact);
         format!("f_{}", bare(&name))
@@ -79,7 +83,7 @@ pub fn timed(
 /// A world on a grid, with names for its parts.
 struct Process<'p> {
     world: &'p TimedWorld,
-    chances: &'p Chances,
+    chances: &'p CellProbabilities,
     bound: Bound,
     facts: Vec<String>,
     acts: Vec<String>,
@@ -87,7 +91,7 @@ struct Process<'p> {
 
 /// Returns the facts that a failure of the action makes true and false, if all its failures have
 /// the same outcome.
-fn fails(act: &Act) -> (Facts, Facts) {
+fn failure_effects(act: &ActionModel) -> (Facts, Facts) {
     let way = act.failures.first();
     way.map_or((0, 0), |way| (way.adds, way.deletes))
 }
@@ -157,7 +161,7 @@ impl Process<'_> {
                     all.join(", ")
                 };
                 // PRISM rejects a label without a command.
-                let worlds: &[&str] = if self.has_a_beginning() {
+                let worlds: &[&str] = if self.has_initial_events() {
                     &["tick", "begin", "begun"]
                 } else {
                     &["tick"]
@@ -221,8 +225,8 @@ impl Process<'_> {
             if lacks != Formula::FALSE {
                 all.push(ended("miss", lacks, (0, 0), Some(true), agents));
             }
-            if act.midway > 0.0 || act.at_end > 0.0 {
-                let effects = fails(act);
+            if act.midway_failure > 0.0 || act.end_failure > 0.0 {
+                let effects = failure_effects(act);
                 all.push(ended("fail", Formula::TRUE, effects, Some(false), agents));
             }
             all.push(ended("cancel", Formula::TRUE, (0, 0), None, true));
@@ -246,7 +250,7 @@ impl Process<'_> {
         let _ = writeln!(text, "  cell : [0..{cells}] init 0;");
         match self.bound {
             Bound::Lower => {
-                let begins = self.has_a_beginning();
+                let begins = self.has_initial_events();
                 let _ = writeln!(
                     text,
                     "  // 0: at the boundary before the cell; 1: in it; 2 and 3: what happens before all else.\n  \
@@ -313,14 +317,14 @@ impl Process<'_> {
             );
         }
         if self.bound == Bound::Upper {
-            self.hopes(text);
+            self.write_final_commands(text);
         }
         text.push_str("endmodule\n\n");
     }
 
     /// Writes the commands after the last cell: the facts that could still become true if no fact
     /// ever became false.
-    fn hopes(&self, text: &mut String) {
+    fn write_final_commands(&self, text: &mut String) {
         text.push_str(
             "  // Facts that could still become true if no fact became false any more.\n",
         );
@@ -339,7 +343,7 @@ impl Process<'_> {
             if let Some((over_all, end)) = &act.rest {
                 let goes = Formula::atom(format!("a_{name}>0"));
                 let either = [can_start.clone(), goes.clone()];
-                hope(Formula::any(either), fails(act).0);
+                hope(Formula::any(either), failure_effects(act).0);
                 let begun = Formula::any([can_start, goes]);
                 let needs = [self.may_hold(over_all), self.may_hold(&end.needs)];
                 hope(Formula::all([begun].into_iter().chain(needs)), end.adds);
@@ -348,8 +352,8 @@ impl Process<'_> {
     }
 
     /// Returns `true` if an event may happen before the first decision.
-    fn has_a_beginning(&self) -> bool {
-        self.chances.before.iter().any(|p| *p > 0.0)
+    fn has_initial_events(&self) -> bool {
+        self.chances.initial.iter().any(|p| *p > 0.0)
     }
 
     /// Returns the update that makes facts true and false; additions win.

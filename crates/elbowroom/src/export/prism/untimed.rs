@@ -8,7 +8,7 @@ use elbowroom_model::ground::{Action, Body, Change, Condition, FactId, SnapActio
 use elbowroom_model::{State, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
-use elbowroom_probability::optimum::{DeadEnds, Horizon, NotSmall, Perturbed, Settings};
+use elbowroom_probability::optimum::{DeadEnds, Horizon, Perturbed, Settings, TabulationError};
 use elbowroom_probability::{Likelihoods, Model, Semantics, all_actions_under};
 
 use super::formula::{Formula, choice, exact};
@@ -146,7 +146,7 @@ impl<'p> Process<'p> {
     fn dead_ends(&self) -> Result<Formula, PrismError> {
         let durative: Vec<usize> = self.durative().collect();
         let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
-        let too_many = || NotSmall::TooManyStates {
+        let too_many = || TabulationError::TooManyStates {
             facts: self.facts.len(),
             actions: self.actions.len(),
         };
@@ -332,7 +332,7 @@ impl<'p> Process<'p> {
         for step in 1..=phases.nothing {
             let _ = writeln!(text, "  [step_{step}] phase={step} -> (phase'={after});");
         }
-        self.afterwards(&phases, text);
+        self.write_change_commands(&phases, text);
         text.push_str("  // Whoever stops, stops.\n");
         text.push_str("  [stop] phase=0 -> true;\nendmodule\n\n");
         Ok(())
@@ -392,7 +392,7 @@ impl<'p> Process<'p> {
             if happening.kind != Kind::End || self.likelihoods.end(action) >= 1.0 {
                 continue;
             }
-            let aftermaths = self.likelihoods.aftermaths(self.task(), action);
+            let aftermaths = self.likelihoods.failure_outcomes(self.task(), action);
             let last = aftermaths.len().saturating_sub(1);
             let mut left = Rational::ONE;
             for (place, aftermath) in aftermaths.into_iter().enumerate() {
@@ -414,7 +414,7 @@ impl<'p> Process<'p> {
     }
 
     /// Writes the commands after a step has changed facts.
-    fn afterwards(&self, phases: &Phases, text: &mut String) {
+    fn write_change_commands(&self, phases: &Phases, text: &mut String) {
         if let Some(settle) = phases.settle {
             text.push_str("  // Actions whose conditions over all are violated fail.\n");
             let kept = self.durative().map(|action| {
@@ -451,7 +451,7 @@ impl<'p> Process<'p> {
         let (fact, name) = (self.facts[place], &self.fact_names[place]);
         let task = self.task();
         let initial = self.likelihoods.initial_belief(task).probability(fact);
-        let flip = self.likelihoods.flip(task, fact)?;
+        let flip = self.likelihoods.spontaneous_change(task, fact)?;
         let (rises, falls) = (exact(flip.becomes_true), exact(flip.becomes_false));
         let label = task.fact_name(fact);
         let _ = writeln!(text, "module m{name} // {}", bare(&label));

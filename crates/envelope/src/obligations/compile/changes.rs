@@ -172,7 +172,7 @@ fn forbid_conflicts(
             continue;
         }
         obligations.direct.push(Obligation {
-            requirement: Requirement::OneUpdate { node, fluent },
+            requirement: Requirement::SingleUpdate { node, fluent },
             bad_cases: vec![BadCase {
                 differences: Vec::new(),
                 inequalities: run.timeline.assumptions.clone(),
@@ -203,7 +203,7 @@ pub(super) fn updated(
     }
     let Some(old) = old else { return Ok(None) };
     let not_linear = || Refusal::NotLinear {
-        place: reading.place.to_owned(),
+        place: reading.location.to_owned(),
         expression: format!("a {} effect", operator.name()),
     };
     Ok(Some(match operator {

@@ -2,9 +2,9 @@
 
 use elbowroom_model::ground::{Body, Change, Condition, Effect};
 
-use super::super::dnf::{Alternatives, Wanted};
+use super::super::dnf::{Alternatives, WantedTruth};
 use super::super::{Obligations, Refusal, Requirement};
-use super::{Compiler, Run, oblige};
+use super::{Compiler, Run, add_obligation};
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 /// Identifier of a part of an effect's guard: effects of the start come before those of the end,
@@ -36,10 +36,10 @@ impl Compiler<'_> {
                 continue;
             }
             let reading = self.reading(&run.timeline, node);
-            let held = reading.alternatives(guard, Wanted::True)?;
-            let broken = reading.alternatives(guard, Wanted::False)?;
-            let silent = reading.silent(guard)?;
-            oblige(
+            let held = reading.alternatives(guard, WantedTruth::True)?;
+            let broken = reading.alternatives(guard, WantedTruth::False)?;
+            let silent = reading.undefined_cases(guard)?;
+            add_obligation(
                 obligations,
                 Requirement::Defined { node },
                 &run.timeline,

@@ -26,7 +26,7 @@ fn footprints() -> impl Strategy<Value = Vec<Footprint>> {
 }
 
 /// Examines all pairs, and keeps those without a third footprint between them.
-fn plainly(footprints: &[Footprint]) -> Vec<(usize, usize)> {
+fn nearest_pairs_by_brute_force(footprints: &[Footprint]) -> Vec<(usize, usize)> {
     let count = footprints.len();
     let mut is_before = vec![vec![false; count]; count];
     let mut pairs = Vec::new();
@@ -46,8 +46,8 @@ fn plainly(footprints: &[Footprint]) -> Vec<(usize, usize)> {
 
 proptest! {
     #[test]
-    fn the_nearest_pairs_are_those_of_a_look_at_all(footprints in footprints()) {
+    fn nearest_pairs_equal_brute_force(footprints in footprints()) {
         let found = nearest_pairs(footprints.iter().cloned());
-        prop_assert_eq!(found, plainly(&footprints));
+        prop_assert_eq!(found, nearest_pairs_by_brute_force(&footprints));
     }
 }

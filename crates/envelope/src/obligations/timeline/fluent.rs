@@ -23,7 +23,7 @@ pub(crate) enum FluentChange {
 
 /// State of a fluent after some changes.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Standing {
+pub(super) struct FluentState {
     pub(super) base: Option<Linear>,
     drifts: Vec<Drift>,
 }
@@ -31,20 +31,20 @@ pub(super) struct Standing {
 /// Active continuous change.
 #[derive(Clone, Debug)]
 struct Drift {
-    began: NodeId,
+    start: NodeId,
     /// The base includes the change up to this node.
-    counted: NodeId,
+    counted_until: NodeId,
     rate: Linear,
 }
 
-impl Standing {
+impl FluentState {
     /// Applies the next change.
     pub(super) fn apply(&mut self, node: NodeId, change: &FluentChange) {
         match change {
             FluentChange::Assign(value) => {
                 self.base.clone_from(value);
                 for drift in &mut self.drifts {
-                    drift.counted = node;
+                    drift.counted_until = node;
                 }
             }
             FluentChange::Shift(amount) => {
@@ -58,14 +58,14 @@ impl Standing {
                     self.drifts.reserve_exact(1);
                 }
                 self.drifts.push(Drift {
-                    began: node,
-                    counted: node,
+                    start: node,
+                    counted_until: node,
                     rate: rate.clone(),
                 });
             }
             FluentChange::DriftEnd(since) => {
                 let mut drifts = self.drifts.iter();
-                if let Some(index) = drifts.position(|drift| drift.began == *since) {
+                if let Some(index) = drifts.position(|drift| drift.start == *since) {
                     let drift = self.drifts.remove(index);
                     self.base = drift.added_to(self.base.take(), node);
                 }
@@ -92,7 +92,7 @@ impl Drift {
     /// be represented.
     fn added_to(&self, base: Option<Linear>, until: NodeId) -> Option<Linear> {
         let mut base = base?;
-        let difference = Linear::difference(self.counted, until);
+        let difference = Linear::difference(self.counted_until, until);
         base.add_scaled(&self.rate.times(&difference)?, &Rational::ONE);
         Some(base)
     }
@@ -101,17 +101,17 @@ impl Drift {
 /// Changes of a fluent along a plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FluentHistory {
-    first: Standing,
+    first: FluentState,
     pub(super) events: Vec<(NodeId, FluentChange)>,
     /// State after all events.
-    last: Standing,
+    last: FluentState,
     /// For each assignment: its position, and the state after it.
-    assigned: Vec<(usize, Standing)>,
+    assigned: Vec<(usize, FluentState)>,
 }
 
 impl FluentHistory {
     /// Sets the initial value.
-    pub(super) fn put(&mut self, value: Option<Linear>) {
+    pub(super) fn set_initial(&mut self, value: Option<Linear>) {
         self.first.base.clone_from(&value);
         self.last.base = value;
     }
@@ -126,12 +126,12 @@ impl FluentHistory {
     }
 
     /// Returns the state after all events.
-    pub(super) fn last(&self) -> &Standing {
+    pub(super) fn last(&self) -> &FluentState {
         &self.last
     }
 
     /// Returns the state after those events for which `cut` is true.
-    pub(super) fn standing(&self, cut: &dyn Fn(NodeId) -> bool) -> Standing {
+    pub(super) fn state_at(&self, cut: &dyn Fn(NodeId) -> bool) -> FluentState {
         let mut standing = self.first.clone();
         for (node, change) in self.events.iter().filter(|(node, _)| cut(*node)) {
             standing.apply(*node, change);
@@ -144,10 +144,14 @@ impl FluentHistory {
     ///
     /// Every change of a fluent interferes with its assignments. So all changes before a past
     /// assignment are past, and all changes after a future assignment are in the future.
-    pub(super) fn near(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
+    pub(super) fn relevant_part(
+        &self,
+        around: &mut Around<'_>,
+        open: &mut BTreeSet<NodeId>,
+    ) -> Self {
         let here = self
             .events
-            .partition_point(|(node, _)| around.is_early(*node));
+            .partition_point(|(node, _)| around.is_not_after_start(*node));
         let (mut first, mut kept) = (self.first.clone(), Vec::new());
         for index in (0..here).rev() {
             let node = self.events[index].0;

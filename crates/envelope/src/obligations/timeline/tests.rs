@@ -54,7 +54,7 @@ fn read(
         moment: NodeId::ZERO,
         action: None,
         substitution: &Substitution::default(),
-        place: "here",
+        location: "here",
         derived: OnceCell::new(),
     };
     let fact = task.find_fact(PredicateId::from(number), &[]);
@@ -70,7 +70,7 @@ fn opened(task: &Task) -> Timeline {
 }
 
 #[test]
-fn a_long_chain_follows_the_cut() {
+fn long_derivation_chain_respects_cut() {
     let length = 100_000;
     let task = task((2..=length).chain([0]).map(atom).collect());
     let timeline = opened(&task);
@@ -79,7 +79,7 @@ fn a_long_chain_follows_the_cut() {
 }
 
 #[test]
-fn facts_that_all_rest_on_each_other_are_read_once() {
+fn mutually_dependent_facts_are_evaluated_once() {
     // Forty facts have too many paths to enumerate.
     let last = 40;
     let any_other = |_| Condition::Or((1..=last).map(atom).collect());
@@ -93,7 +93,7 @@ fn facts_that_all_rest_on_each_other_are_read_once() {
 }
 
 #[test]
-fn a_number_that_varies_is_refused_only_where_it_decides() {
+fn varying_number_is_refused_only_if_decisive() {
     let x = Fluent {
         function: FunctionId(0),
         arguments: Vec::new(),

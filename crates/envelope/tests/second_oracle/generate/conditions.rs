@@ -123,7 +123,7 @@ impl Nominal<'_> {
         let condition = Condition::Compare(asked, left.clone(), constant(far.clone()));
         add(&mut probe.problem, place, condition);
         let valuation = Valuation::default();
-        let Verdict::Valid(report) = probe.judge(&valuation, &self.schedule) else {
+        let Verdict::Valid(report) = probe.validate(&valuation, &self.schedule) else {
             return (comparison, self.dice.half(0, 10));
         };
         let margins = report.margins.iter().map(|margin| &margin.margin);

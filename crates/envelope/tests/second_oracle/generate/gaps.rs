@@ -128,7 +128,7 @@ impl Nominal<'_> {
     fn bad_schedule(&mut self, mut system: System, valuation: &Valuation) -> Option<Schedule> {
         (0..8).find_map(|_| {
             let schedule = sample(&mut system, self.dice)?.1;
-            let is_valid = self.case.judge(valuation, &schedule).is_valid();
+            let is_valid = self.case.validate(valuation, &schedule).is_valid();
             (!is_valid).then_some(schedule)
         })
     }
@@ -148,6 +148,6 @@ fn over_all_reads(
     let action = &plan.plan.instance(id).action;
     instance_of(writer) != Some(id)
         && action.durative().is_some_and(|body| {
-            footprint.writes_what_is_read_by(&Footprint::of_condition(task, &body.over_all))
+            footprint.writes_reads_of(&Footprint::of_condition(task, &body.over_all))
         })
 }

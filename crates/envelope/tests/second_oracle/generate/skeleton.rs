@@ -9,10 +9,10 @@ use elbowroom_model::problem::{
 use elbowroom_num::Rational;
 
 use super::Theme;
-use crate::dice::Dice;
+use crate::random::Random;
 
 /// Generates actions with effects only, and timed initials.
-pub(super) fn skeleton(dice: &mut Dice, theme: Theme) -> Problem {
+pub(super) fn skeleton(dice: &mut Random, theme: Theme) -> Problem {
     let (facts, fluents) = (1 + dice.below(3), 1 + dice.below(2));
     let name = |prefix: &str, index: usize| format!("{prefix}{index}");
     let mut problem = Problem {
@@ -84,7 +84,7 @@ pub(super) fn skeleton(dice: &mut Dice, theme: Theme) -> Problem {
 }
 
 /// Adds a derived predicate over the others, and sometimes over a number.
-fn derive(dice: &mut Dice, problem: &mut Problem) {
+fn derive(dice: &mut Random, problem: &mut Problem) {
     let facts = problem.predicates.len();
     problem.predicates.push(Predicate {
         name: "derived".to_owned(),
@@ -94,7 +94,7 @@ fn derive(dice: &mut Dice, problem: &mut Problem) {
     let has_values = problem.initial_values.len() == problem.functions.len();
     for _ in 0..=dice.below(2) {
         let fluents = problem.functions.len();
-        let part = |dice: &mut Dice| {
+        let part = |dice: &mut Random| {
             if has_values && dice.chance(10) {
                 let left = Expression::Fluent(fluent(dice.below(fluents)));
                 Condition::Compare(Comparison::AtLeast, left, constant(dice.half(0, 10)))
@@ -116,7 +116,7 @@ fn derive(dice: &mut Dice, problem: &mut Problem) {
 }
 
 /// Generates a fact or its negation.
-pub(super) fn fact(dice: &mut Dice, facts: usize) -> Condition {
+pub(super) fn fact(dice: &mut Random, facts: usize) -> Condition {
     let atom = Condition::Atom(atom(dice.below(facts)));
     if dice.chance(50) {
         atom
@@ -125,7 +125,7 @@ pub(super) fn fact(dice: &mut Dice, facts: usize) -> Condition {
     }
 }
 
-fn timed_change(dice: &mut Dice, facts: usize, fluents: usize) -> TimedChange {
+fn timed_change(dice: &mut Random, facts: usize, fluents: usize) -> TimedChange {
     let fact = PredicateId::from(dice.below(facts));
     match dice.below(3) {
         0 => TimedChange::Add(fact, Vec::new()),
@@ -137,7 +137,7 @@ fn timed_change(dice: &mut Dice, facts: usize, fluents: usize) -> TimedChange {
     }
 }
 
-fn body(dice: &mut Dice, facts: usize, fluents: usize, theme: Theme) -> Body {
+fn body(dice: &mut Random, facts: usize, fluents: usize, theme: Theme) -> Body {
     if dice.chance(30) {
         return Body::Instantaneous {
             condition: Condition::TRUE,
@@ -184,7 +184,7 @@ fn guarded(theme: Theme) -> usize {
     if theme == Theme::Guards { 40 } else { 4 }
 }
 
-fn rate(dice: &mut Dice, fluents: usize) -> Expression {
+fn rate(dice: &mut Random, fluents: usize) -> Expression {
     let number = constant(dice.pick(&[1, 1, 2, -1, -2]).to_owned().into());
     match dice.below(12) {
         0 => Expression::Fluent(fluent(dice.below(fluents))),
@@ -198,13 +198,13 @@ fn rate(dice: &mut Dice, fluents: usize) -> Expression {
 }
 
 fn effects(
-    dice: &mut Dice,
+    dice: &mut Random,
     facts: usize,
     fluents: usize,
     (is_durative, theme): (bool, Theme),
 ) -> Vec<Effect> {
     let count = *dice.pick(&[0, 1, 1, 2]);
-    let effect = |dice: &mut Dice| {
+    let effect = |dice: &mut Random| {
         let guard = if dice.chance(guarded(theme)) {
             Guard {
                 now: literal(dice, facts, fluents),
@@ -237,7 +237,7 @@ fn effects(
     (0..count).map(|_| effect(dice)).collect()
 }
 
-fn amount(dice: &mut Dice, fluents: usize, is_durative: bool) -> Expression {
+fn amount(dice: &mut Random, fluents: usize, is_durative: bool) -> Expression {
     let number = constant(dice.half(0, 4));
     match dice.below(12) {
         0 if is_durative => Expression::Duration,
@@ -252,7 +252,7 @@ fn amount(dice: &mut Dice, fluents: usize, is_durative: bool) -> Expression {
     }
 }
 
-fn literal(dice: &mut Dice, facts: usize, fluents: usize) -> Condition {
+fn literal(dice: &mut Random, facts: usize, fluents: usize) -> Condition {
     if dice.chance(70) {
         fact(dice, facts)
     } else {

@@ -10,10 +10,10 @@ use elbowroom_plan::InstanceId;
 use crate::executor::StepId;
 
 /// Limit on the number of states that are kept. Beyond it, all are forgotten.
-const MOST_KEPT: usize = 4096;
+const MAX_STATES: usize = 4096;
 
 /// Facts, numbers and running actions at the start of an action, and the action.
-type Place = (
+type RepetitionKey = (
     BTreeSet<FactId>,
     BTreeMap<FluentId, Rational>,
     Vec<InstanceId>,
@@ -27,14 +27,14 @@ type Place = (
 /// them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Repetitions {
-    started: BTreeMap<StepId, Place>,
-    successes: BTreeMap<Place, u32>,
+    started: BTreeMap<StepId, RepetitionKey>,
+    successes: BTreeMap<RepetitionKey, u32>,
 }
 
 impl Repetitions {
     /// Returns the number of successes of an action after a start in this state.
     pub(super) fn count(&self, state: &State, running: &[InstanceId], instance: InstanceId) -> u32 {
-        let place = place(state, running, instance);
+        let place = repetition_key(state, running, instance);
         self.successes.get(&place).copied().unwrap_or(0)
     }
 
@@ -46,7 +46,8 @@ impl Repetitions {
         running: &[InstanceId],
         instance: InstanceId,
     ) {
-        self.started.insert(step, place(state, running, instance));
+        self.started
+            .insert(step, repetition_key(state, running, instance));
     }
 
     /// Records the end of an action.
@@ -54,14 +55,14 @@ impl Repetitions {
         let Some(place) = self.started.remove(&step).filter(|_| succeeded) else {
             return;
         };
-        if self.successes.len() >= MOST_KEPT {
+        if self.successes.len() >= MAX_STATES {
             self.successes.clear();
         }
         *self.successes.entry(place).or_default() += 1;
     }
 }
 
-fn place(state: &State, running: &[InstanceId], instance: InstanceId) -> Place {
+fn repetition_key(state: &State, running: &[InstanceId], instance: InstanceId) -> RepetitionKey {
     let mut running = running.to_vec();
     running.sort_unstable();
     (state.facts.clone(), state.values.clone(), running, instance)

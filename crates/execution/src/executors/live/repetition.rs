@@ -9,14 +9,14 @@ use std::collections::BTreeMap;
 use elbowroom_model::{Step, TimeTriggeredPlan};
 use elbowroom_plan::{InstanceId, Node, ParameterKind};
 
-use super::carrying_on::{CarriedOn, Hope};
-use super::{Rest, promise};
-use crate::executor::{Mission, News, StepId};
-use crate::preparation::Region;
+use super::without_guarantee::{ReductionClass, UnguaranteedPlan};
+use super::{ExecutedPlan, guarantee_status};
+use crate::executor::{PlanEvent, PreparedPlan, StepId};
+use crate::preparation::RegionOracle;
 use crate::reason::Reason;
 
 /// Number of attempts with a guarantee before the first one without.
-const GUARANTEED: usize = 2;
+const GUARANTEED_ATTEMPTS: usize = 2;
 
 /// Consecutive attempts to execute the same plan.
 #[derive(Clone, Debug, Default)]
@@ -26,7 +26,7 @@ pub(super) struct Repetition {
     /// The number of times that it was abandoned for lack of time, or after an untimely end.
     abandoned: usize,
     /// `true` if the present attempt was abandoned for one of these reasons.
-    is_over: bool,
+    has_ended: bool,
     /// `true` if an action of the present attempt has ended earlier or later than planned.
     is_untimely: bool,
 }
@@ -34,13 +34,13 @@ pub(super) struct Repetition {
 impl Repetition {
     /// Records the adoption of a plan.
     pub(super) fn note_adopted(&mut self, plan: &TimeTriggeredPlan) {
-        if !self.is_over || self.plan != *plan {
+        if !self.has_ended || self.plan != *plan {
             *self = Self {
                 plan: plan.clone(),
                 ..Self::default()
             };
         }
-        self.is_over = false;
+        self.has_ended = false;
         self.is_untimely = false;
     }
 
@@ -52,49 +52,50 @@ impl Repetition {
 
     /// Records that the present plan is abandoned.
     pub(super) fn note_abandoned(&mut self, reason: &Reason) {
-        if !self.is_over && (self.is_untimely || promise::lacks_time(reason)) {
+        if !self.has_ended && (self.is_untimely || guarantee_status::lacks_time(reason)) {
             self.abandoned += 1;
-            self.is_over = true;
+            self.has_ended = true;
         }
     }
 
     /// Returns `true` if the present plan is to be executed by its orderings alone.
     pub(super) fn is_by_orderings(&self) -> bool {
         self.abandoned
-            .checked_sub(GUARANTEED)
+            .checked_sub(GUARANTEED_ATTEMPTS)
             .is_some_and(|more| more.is_multiple_of(2))
     }
 }
 
-impl Rest {
+impl ExecutedPlan {
     /// Returns `true` if an action that has started ends earlier or later than planned.
-    pub(super) fn has_untimely_end(&self, news: &[News]) -> bool {
+    pub(super) fn has_untimely_end(&self, news: &[PlanEvent]) -> bool {
         news.iter().any(|news| {
-            let News::Ended { step, time, .. } = news else {
+            let PlanEvent::Ended { step, time, .. } = news else {
                 return false;
             };
-            let [start, _] = self.dispatch.nodes_of(step.instance());
+            let [start, _] = self.dispatch.start_and_end_nodes(step.instance());
             let planned = self.dispatch.planned(*step, true).unwrap_or_default();
             let is_early = planned.earliest.is_some_and(|earliest| *time < earliest);
             let is_late = planned.latest.is_some_and(|latest| *time > latest);
-            self.dispatch.happened(start).is_some() && (is_early || is_late)
+            self.dispatch.execution_time(start).is_some() && (is_early || is_late)
         })
     }
 
     /// Begins with a plan by its orderings, with the planned durations. Durations that the
     /// preparation has chosen instead are only useful for the guarantee.
-    pub(super) fn by_orderings(
-        mission: &Mission,
-        region: &mut dyn Region,
-    ) -> Option<(Self, CarriedOn)> {
-        let mut rest = Self::new(&as_planned(mission), region).ok()?;
-        let carried_on = rest.carry_on(Hope::Fair, &mission.now, region)?;
+    pub(super) fn begin_by_orderings(
+        mission: &PreparedPlan,
+        region: &mut dyn RegionOracle,
+    ) -> Option<(Self, UnguaranteedPlan)> {
+        let mut rest = Self::new(&with_planned_times(mission), region).ok()?;
+        let carried_on =
+            rest.continue_by_orderings(ReductionClass::AtMostHalf, &mission.now, region)?;
         Some((rest, carried_on))
     }
 }
 
 /// Returns the mission with the planner's times and durations.
-fn as_planned(mission: &Mission) -> Mission {
+fn with_planned_times(mission: &PreparedPlan) -> PreparedPlan {
     let mut planned = mission.clone();
     let steps = mission.instances.iter().zip(&mission.time_triggered.steps);
     let steps: BTreeMap<InstanceId, &Step> = steps

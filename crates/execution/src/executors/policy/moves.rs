@@ -5,38 +5,38 @@ use std::sync::Arc;
 
 use elbowroom_num::Rational;
 
-use super::{MOST_AT_ONCE, Ordered, Policy, Turn};
-use crate::executor::{Decided, Decision, Moment, Order, Planned, StepId};
-use crate::outlook::{Move, Outlook, Standing, Weighed};
-use crate::progression::Progression;
-use crate::reason::{About, Cause, Reason};
+use super::{CommandedAction, MAX_COMMANDS_PER_TIME, NextEvaluation, Policy};
+use crate::action_values::{ActionValues, DecisionState, Move, RankedMoves};
+use crate::belief_state::BeliefState;
+use crate::executor::{Decided, Decision, DecisionContext, Order, Planned, StepId};
+use crate::reason::{Cause, Reason, Subject};
 
 impl Policy {
     /// Returns the period for the next evaluation of moves: the present one, if it has just begun.
-    pub(super) fn turn(&self, now: &Rational, period: &Rational) -> Turn {
+    pub(super) fn next_evaluation(&self, now: &Rational, period: &Rational) -> NextEvaluation {
         let number = count(&(now / period).floor());
-        let is_over = now - begins(number, period) > slack(period);
+        let is_over = now - period_start(number, period) > evaluation_tolerance(period);
         if is_over || self.waited == Some(number) {
-            Turn::At(number + 1)
+            NextEvaluation::At(number + 1)
         } else {
-            Turn::Now(number)
+            NextEvaluation::Now(number)
         }
     }
 
-    pub(super) fn standing<'a>(
+    pub(super) fn decision_state<'a>(
         &'a self,
-        belief: &'a Progression,
+        belief: &'a BeliefState,
         period: usize,
-        outlook: &dyn Outlook,
+        outlook: &dyn ActionValues,
         started: Option<&'a str>,
-    ) -> Standing<'a> {
+    ) -> DecisionState<'a> {
         let length = outlook.period();
         let since = |start: &Rational| {
-            let from = (start - slack(length)).max(Rational::ZERO);
+            let from = (start - evaluation_tolerance(length)).max(Rational::ZERO);
             count(&(from / length).ceil()).min(period)
         };
         let running = belief.running().values();
-        Standing {
+        DecisionState {
             period,
             belief,
             running: running
@@ -48,46 +48,46 @@ impl Policy {
     }
 
     /// Returns the success probability of the decision of the plan's executor.
-    pub(super) fn worth(
+    pub(super) fn plan_value(
         &self,
         kept: &Decided,
-        weighed: &Weighed,
-        belief: &Progression,
+        weighed: &RankedMoves,
+        belief: &BeliefState,
         period: usize,
-        outlook: &dyn Outlook,
+        outlook: &dyn ActionValues,
     ) -> f64 {
         let after = |order: &Order| {
             let name = order.action.name.as_str();
-            let standing = self.standing(belief, period, outlook, Some(name));
-            outlook.weigh(&standing).map_or(0.0, |it| it.best())
+            let standing = self.decision_state(belief, period, outlook, Some(name));
+            outlook.evaluate(&standing).map_or(0.0, |it| it.best())
         };
         match &kept.decision {
             Decision::Start(orders) => orders.iter().map(after).fold(1.0, f64::min),
-            Decision::Wait { .. } => weighed.by_waiting(),
+            Decision::Wait { .. } => weighed.value_of_waiting(),
             _ => weighed.best(),
         }
     }
 
     /// Returns the decision of the plan's executor; a wait ends at the latest when moves are
     /// evaluated next.
-    pub(super) fn until_next(
+    pub(super) fn limit_wait_to_next_period(
         &mut self,
         kept: Decided,
         now: &Rational,
-        turn: &Turn,
+        turn: &NextEvaluation,
         length: &Rational,
     ) -> Decided {
         let Decision::Wait { until } = &kept.decision else {
             return kept;
         };
         let next = match turn {
-            Turn::Now(period) => {
+            NextEvaluation::Now(period) => {
                 self.waited = Some(*period);
                 period + 1
             }
-            Turn::At(period) => *period,
+            NextEvaluation::At(period) => *period,
         };
-        let next = begins(next, length);
+        let next = period_start(next, length);
         let until = until.clone().filter(|until| *until > *now);
         let until = until.map_or_else(|| next.clone(), |until| until.min(next.clone()));
         Decided {
@@ -97,24 +97,23 @@ impl Policy {
     }
 
     /// Returns the decision for the best move.
-    pub(super) fn best(
+    pub(super) fn best_decision(
         &mut self,
-        moment: &Moment<'_>,
+        moment: &DecisionContext<'_>,
         period: usize,
-        weighed: &Weighed,
+        weighed: &RankedMoves,
         length: &Rational,
     ) -> Decided {
         let now = moment.now;
         // An overdue action may be slightly late because it was started slightly late.
-        let late = begins(period, length) + slack(length) / Rational::from(2);
-        if weighed.is_overdue && *now < late {
-            return wait(Some(late), About::EndOfRunning);
+        let late = period_start(period, length) + evaluation_tolerance(length) / Rational::from(2);
+        if weighed.is_action_overdue && *now < late {
+            return wait(Some(late), Subject::EndOfRunningActions);
         }
         let Some((choice, value)) = weighed.moves.first() else {
-            return self.hopeless(now);
+            return self.request_new_plan(now);
         };
-        let is_often =
-            matches!(&self.ordered, Some((time, times)) if time == now && *times >= MOST_AT_ONCE);
+        let is_often = matches!(&self.last_command, Some((time, times)) if time == now && *times >= MAX_COMMANDS_PER_TIME);
         let names = |name: &str| {
             let steps = self
                 .steps
@@ -124,16 +123,16 @@ impl Policy {
         };
         match choice {
             Move::Start(action, planned) if !is_often => {
-                if let Some(until) = self.apart(moment) {
-                    return wait(Some(until), About::Start(action.name.clone()));
+                if let Some(until) = self.separation_end(moment) {
+                    return wait(Some(until), Subject::Start(action.name.clone()));
                 }
                 let step = StepId(self.next_step);
                 self.next_step = self.next_step.saturating_add(1);
-                let ordered = Ordered {
+                let ordered = CommandedAction {
                     name: action.name.clone(),
                     is_of_plan: false,
                     has_started: false,
-                    is_let_go: false,
+                    is_cancelled: false,
                 };
                 self.steps.insert(step, ordered);
                 let order = Order {
@@ -147,27 +146,27 @@ impl Policy {
                 };
                 Decided {
                     reason: Reason::new(Cause::Due)
-                        .of(&action.name)
-                        .about(About::BestOfAll(*value)),
+                        .for_action(&action.name)
+                        .about(Subject::BestChoice(*value)),
                     decision: Decision::Start(vec![order]),
                 }
             }
             Move::Cancel(name) if !is_often && !names(name).is_empty() => Decided {
                 decision: Decision::Cancel(names(name)),
                 reason: Reason::new(Cause::Likelier)
-                    .of(name)
-                    .about(About::WithoutEndOf(name.clone())),
+                    .for_action(name)
+                    .about(Subject::WithoutEndOf(name.clone())),
             },
             _ => {
                 self.waited = Some(period);
-                let until = begins(period + 1, length);
-                wait(Some(until), About::NextDecision(*value))
+                let until = period_start(period + 1, length);
+                wait(Some(until), Subject::NextEvaluation(*value))
             }
         }
     }
 
     /// Returns the time until which a start has to wait, so that it is ε after the last happening.
-    pub(super) fn apart(&self, moment: &Moment<'_>) -> Option<Rational> {
+    pub(super) fn separation_end(&self, moment: &DecisionContext<'_>) -> Option<Rational> {
         let task = moment.belief.task();
         let timed = task.timed().iter().map(|timed| &timed.time);
         let last = timed.filter(|time| *time <= moment.now).chain(&self.last);
@@ -177,12 +176,12 @@ impl Policy {
 }
 
 /// Returns the beginning of a period.
-pub(super) fn begins(period: usize, length: &Rational) -> Rational {
+pub(super) fn period_start(period: usize, length: &Rational) -> Rational {
     length * &Rational::from(i64::try_from(period).unwrap_or(i64::MAX))
 }
 
 /// Returns the time after the beginning of a period during which moves are still evaluated.
-fn slack(length: &Rational) -> Rational {
+fn evaluation_tolerance(length: &Rational) -> Rational {
     length / Rational::from(4)
 }
 
@@ -191,7 +190,7 @@ fn count(whole: &Rational) -> usize {
     usize::try_from(number).unwrap_or_default()
 }
 
-pub(super) fn wait(until: Option<Rational>, why: About) -> Decided {
+pub(super) fn wait(until: Option<Rational>, why: Subject) -> Decided {
     Decided {
         decision: Decision::Wait { until },
         reason: Reason::new(Cause::NothingDue).about(why),

@@ -9,7 +9,7 @@ use indexmap::IndexMap;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Planning, Published, Together};
+use super::{LinkedParameters, Planning, Published};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -93,7 +93,7 @@ impl File {
     }
 
     /// Returns the groups of blanks that are filled in together.
-    pub(super) fn together(&self) -> Result<Vec<Together>, (Span, String)> {
+    pub(super) fn linked_parameters(&self) -> Result<Vec<LinkedParameters>, (Span, String)> {
         let mut together = Vec::new();
         for group in &self.together {
             let width = group.names.len();
@@ -105,7 +105,7 @@ impl File {
                 ));
             }
             let rows = group.rows.get_ref().iter();
-            together.push(Together {
+            together.push(LinkedParameters {
                 names: group.names.clone(),
                 rows: rows
                     .map(|row| row.get_ref().iter().map(text_of).collect())
@@ -175,8 +175,8 @@ impl File {
         };
         match &self.planner {
             Some(name) if name.get_ref() != EMBEDDED => {
-                known(name.get_ref()).map_err(|message| (name.span(), message))?;
-                Ok(Planning::Another {
+                check_planner(name.get_ref()).map_err(|message| (name.span(), message))?;
+                Ok(Planning::External {
                     name: name.get_ref().clone(),
                     seconds,
                 })
@@ -216,14 +216,14 @@ impl File {
             settings.planning_time = PlanningTime::Seconds(Rational::ZERO);
         }
         if let Some(most) = self.max_replans {
-            settings.most_replans = most;
+            settings.max_replans = most;
         }
         Ok(settings)
     }
 }
 
 /// Checks that there is a planner of that name. The error lists the known ones.
-fn known(name: &str) -> Result<(), String> {
+fn check_planner(name: &str) -> Result<(), String> {
     let found = elbowroom_external::Planner::named(name);
     found.map(|_| ()).map_err(|error| error.to_string())
 }

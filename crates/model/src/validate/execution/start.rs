@@ -2,10 +2,10 @@
 
 use elbowroom_num::Rational;
 
-use super::super::reading::Fault;
-use super::super::violation::{Mistake, When};
+use super::super::evaluate::Fault;
+use super::super::violation::{ConditionTime, ViolationKind};
 use super::Execution;
-use super::course::Lack;
+use super::present_state::Indeterminate;
 use crate::ground::{Action, Body, Condition};
 use crate::interference::Footprint;
 use crate::task::Task;
@@ -16,15 +16,15 @@ impl Execution {
         &self,
         action: &Action,
         duration: Option<&Rational>,
-    ) -> Option<Mistake> {
+    ) -> Option<ViolationKind> {
         let Body::Durative(body) = &action.body else {
             return None;
         };
         let Some(duration) = duration else {
-            return Some(Mistake::NoDuration);
+            return Some(ViolationKind::NoDuration);
         };
         if duration.is_negative() {
-            return Some(Mistake::NegativeDuration(duration.clone()));
+            return Some(ViolationKind::NegativeDuration(duration.clone()));
         }
         let at_start = body.duration.iter().filter(|bound| !bound.at_end);
         for constraint in at_start {
@@ -32,7 +32,7 @@ impl Execution {
                 continue;
             };
             if !constraint.comparison.holds(duration, &value) {
-                return Some(Mistake::Duration {
+                return Some(ViolationKind::Duration {
                     duration: duration.clone(),
                     comparison: constraint.comparison,
                     bound: self.task.describe_expression(&constraint.bound),
@@ -48,18 +48,18 @@ impl Execution {
         &self,
         action: &Action,
         duration: Option<&Rational>,
-    ) -> Option<Mistake> {
+    ) -> Option<ViolationKind> {
         let (condition, when) = match &action.body {
-            Body::Instantaneous(snap) => (&snap.condition, When::Now),
-            Body::Durative(body) => (&body.start.condition, When::Start),
+            Body::Instantaneous(snap) => (&snap.condition, ConditionTime::Now),
+            Body::Durative(body) => (&body.start.condition, ConditionTime::Start),
         };
         condition
             .conjuncts()
             .into_iter()
             .find_map(|part| match self.reads(part, duration) {
-                Ok(true) | Err(Lack::Doubt) => None,
+                Ok(true) | Err(Indeterminate::DoubtfulRead) => None,
                 Ok(false) => Some(self.unmet(part, when)),
-                Err(Lack::Fault(fault)) => {
+                Err(Indeterminate::Fault(fault)) => {
                     undefined(&self.task, &fault, self.task.describe_condition(part))
                 }
             })
@@ -70,7 +70,7 @@ impl Execution {
         &self,
         action: &Action,
         duration: Option<&Rational>,
-    ) -> Option<Mistake> {
+    ) -> Option<ViolationKind> {
         // An over-all condition is about the time between start and end.
         let duration = duration.filter(|duration| duration.is_positive())?;
         let reads_state = |part: &Condition| {
@@ -80,11 +80,11 @@ impl Execution {
         let parts = action.durative()?.over_all.conjuncts().into_iter();
         let mut of_duration = parts.filter(|part| !reads_state(part));
         let violated = of_duration.find(|part| self.reads(part, Some(duration)) == Ok(false))?;
-        Some(self.unmet(violated, When::OverAll))
+        Some(self.unmet(violated, ConditionTime::OverAll))
     }
 
-    fn unmet(&self, part: &Condition, when: When) -> Mistake {
-        Mistake::Condition {
+    fn unmet(&self, part: &Condition, when: ConditionTime) -> ViolationKind {
+        ViolationKind::Condition {
             when,
             condition: self.task.describe_condition(part),
             is_after: false,
@@ -96,13 +96,13 @@ impl Execution {
 }
 
 /// Returns the mistake of reading a fluent without a value or dividing by zero; `None` for other faults.
-fn undefined(task: &Task, fault: &Fault, within: String) -> Option<Mistake> {
+fn undefined(task: &Task, fault: &Fault, within: String) -> Option<ViolationKind> {
     match fault {
-        Fault::Undefined(fluent) => Some(Mistake::Undefined {
+        Fault::Undefined(fluent) => Some(ViolationKind::Undefined {
             fluent: task.fluent_name(*fluent),
             within,
         }),
-        Fault::DivisionByZero(divisor) => Some(Mistake::DivisionByZero {
+        Fault::DivisionByZero(divisor) => Some(ViolationKind::DivisionByZero {
             divisor: task.describe_expression(divisor),
             within,
         }),

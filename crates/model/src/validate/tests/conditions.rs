@@ -4,7 +4,7 @@ use super::world::{World, number};
 use crate::validate::Settings;
 
 #[test]
-fn a_plan_whose_actions_do_what_the_goal_asks_is_valid() {
+fn plan_that_achieves_goal_is_valid() {
     let world = World::new("(p)").instant("go", "(p)", "(q)").goal("(q)");
     assert_eq!(world.judge("1: go"), "valid");
 }
@@ -39,7 +39,7 @@ fn an_end_condition_reads_the_state_before_the_effects_of_the_end() {
 }
 
 #[test]
-fn an_end_condition_may_rest_on_the_start_effect() {
+fn end_condition_can_be_satisfied_by_start_effect() {
     let world = World::new("").durative("a", &[("end", "(p)"), ("start effect", "(p)")]);
     assert_eq!(world.judge("1: a [2]"), "valid");
 }
@@ -74,7 +74,7 @@ fn an_over_all_condition_breaks_where_another_action_deletes_it() {
 }
 
 #[test]
-fn an_over_all_condition_of_an_action_without_duration_is_never_read() {
+fn over_all_condition_of_zero_duration_action_is_ignored() {
     let world = World::new("").durative("a", &[("over all", "(p)")]);
     assert_eq!(world.judge("1: a [0]"), "valid");
 }
@@ -92,7 +92,7 @@ fn a_negative_condition_needs_the_fact_to_be_false() {
 }
 
 #[test]
-fn one_disjunct_is_enough_and_all_are_blamed() {
+fn disjunction_needs_one_disjunct_and_reports_all_if_false() {
     let world = World::new("(p) (= x 3)").instant("go", "(or (q) (>= x 5))", "");
     assert_eq!(
         world.judge("1: go"),
@@ -118,7 +118,7 @@ fn derived_facts_follow_from_their_rules() {
 }
 
 #[test]
-fn derived_facts_that_support_only_each_other_are_false() {
+fn cyclically_supported_derived_facts_are_false() {
     let world = World::new("")
         .rule("a", "(b)")
         .rule("b", "(a)")
@@ -127,7 +127,7 @@ fn derived_facts_that_support_only_each_other_are_false() {
 }
 
 #[test]
-fn a_derived_fact_that_depends_on_its_own_negation_cannot_be_judged() {
+fn derived_fact_that_depends_on_its_negation_is_undecided() {
     let world = World::new("")
         .rule("a", "(not (b))")
         .rule("b", "(a)")
@@ -170,7 +170,7 @@ fn a_fluent_without_a_value_is_named() {
 }
 
 #[test]
-fn a_fluent_without_a_value_does_not_matter_where_the_rest_decides() {
+fn undefined_fluent_is_ignored_if_other_parts_decide() {
     let world = World::new("(p)").instant("go", "(or (> x 0) (p))", "");
     assert_eq!(world.judge("1: go"), "valid");
 }
@@ -185,7 +185,7 @@ fn a_division_by_zero_is_named() {
 }
 
 #[test]
-fn a_number_left_open_cannot_be_judged() {
+fn open_number_is_undecided() {
     let world = World::new("(= x 0)").instant("go", "(> x ?open)", "");
     assert_eq!(
         world.judge("1: go"),

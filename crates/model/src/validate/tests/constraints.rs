@@ -15,7 +15,7 @@ type State = (Rational, [bool; 2]);
 
 /// Returns `true` if a sequence of states satisfies a constraint, by the literal definition of
 /// Gerevini & Long.
-fn is_kept(states: &[State], name: &str, times: &[i64]) -> bool {
+fn is_satisfied(states: &[State], name: &str, times: &[i64]) -> bool {
     let n = states.len();
     let time = |i: usize| states[i].0.clone();
     let after = |i: usize, wait: i64| states[i].0.clone() + Rational::from(wait);
@@ -47,9 +47,9 @@ fn is_kept(states: &[State], name: &str, times: &[i64]) -> bool {
 }
 
 /// Pseudorandom numbers.
-struct Dice(u64);
+struct Rng(u64);
 
-impl Dice {
+impl Rng {
     fn below(&mut self, limit: u64) -> u64 {
         self.0 = self
             .0
@@ -60,7 +60,7 @@ impl Dice {
 }
 
 #[test]
-fn the_judge_agrees_with_the_definition_on_random_courses() {
+fn validator_agrees_with_definition_on_random_trajectories() {
     let forms = [
         ("at end", 0, 1),
         ("always", 0, 1),
@@ -73,7 +73,7 @@ fn the_judge_agrees_with_the_definition_on_random_courses() {
         ("hold-during", 2, 1),
         ("hold-after", 1, 1),
     ];
-    let mut dice = Dice(1);
+    let mut dice = Rng(1);
     let mut kept = [0; 10];
     for round in 0..2000 {
         let kind = round % forms.len();
@@ -117,7 +117,7 @@ fn the_judge_agrees_with_the_definition_on_random_courses() {
             .instant("not-p-is-q", "", "(not (p)) (q)")
             .instant("not-p-not-q", "", "(not (p)) (not (q))")
             .constraint(&text);
-        let expected = is_kept(&states, name, numbers);
+        let expected = is_satisfied(&states, name, numbers);
         let verdict = world.judge(&plan);
         assert_eq!(
             verdict == "valid",
@@ -136,7 +136,7 @@ fn tank() -> World {
 }
 
 #[test]
-fn numbers_that_move_are_watched_between_happenings() {
+fn continuously_changing_numbers_are_checked_between_happenings() {
     let judge = |text: &str| tank().constraint(text).judge("1: fill [10]");
     assert_eq!(judge("(within 4 (>= level 3))"), "valid");
     assert_eq!(
@@ -165,7 +165,7 @@ fn numbers_that_move_are_watched_between_happenings() {
 }
 
 #[test]
-fn irrational_moments_are_compared_as_far_as_they_are_known() {
+fn irrational_times_are_compared_within_known_precision() {
     let world = |text: &str| {
         let fall = [("duration", "(= 10)"), ("rate", "speed 1 level speed")];
         World::new("(= level 0) (= speed 0)")
@@ -180,7 +180,7 @@ fn irrational_moments_are_compared_as_far_as_they_are_known() {
 }
 
 #[test]
-fn what_holds_before_anything_happens_counts() {
+fn constraint_includes_the_initial_state() {
     let world = |text: &str| {
         World::new("(p)")
             .instant("end", "", "(not (p))")
@@ -193,7 +193,7 @@ fn what_holds_before_anything_happens_counts() {
 }
 
 #[test]
-fn preferences_make_no_plan_invalid() {
+fn violated_preferences_leave_plan_valid() {
     let world = World::new("")
         .instant("do", "", "(p)")
         .prefer("never", "(always (not (p)))")
@@ -208,7 +208,7 @@ fn preferences_make_no_plan_invalid() {
 }
 
 #[test]
-fn a_course_that_has_begun_is_not_judged() {
+fn constraint_on_past_states_is_undecided() {
     let world = World::new("")
         .instant("do", "", "(p)")
         .constraint("(always (not (q)))");
@@ -220,7 +220,7 @@ fn a_course_that_has_begun_is_not_judged() {
     assert!(judge(&situation).is_valid());
     situation.time = 2.into();
     assert!(matches!(judge(&situation), crate::Verdict::Undecided(_)));
-    let rest = situation.rest_of_task(&task);
+    let rest = situation.remaining_task(&task);
     let verdict = crate::validate(&rest, &plan, &world.settings);
     assert!(matches!(verdict, crate::Verdict::Undecided(_)));
 }

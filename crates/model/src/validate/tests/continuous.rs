@@ -7,7 +7,7 @@ fn drain(condition: &str) -> World {
 }
 
 #[test]
-fn continuous_change_is_over_at_the_arrival_at_the_end() {
+fn continuous_change_is_complete_on_arrival_at_end() {
     let world = World::new("(= x 0)")
         .durative("a", &[("rate", "x 2"), ("end", "(= x 6)")])
         .goal("(= x 6)");
@@ -45,7 +45,7 @@ fn at_a_happening_in_between_the_state_after_it_counts() {
 }
 
 #[test]
-fn an_equation_holds_only_as_long_as_nothing_moves() {
+fn equation_holds_only_while_numbers_are_constant() {
     assert_eq!(
         drain("(= x 10)").judge("0: a [1]"),
         "just after 0.000: (a) needs (= (x) 10) over all: (x) = 9, off by 1"
@@ -89,7 +89,7 @@ fn a_rate_may_read_a_fluent_that_jumps() {
 }
 
 #[test]
-fn a_rate_may_read_a_fluent_that_moves() {
+fn rate_can_read_continuously_changing_fluent() {
     let world = World::new("(= x 0) (= v 0)")
         .durative("a", &[("rate", "x v v 2"), ("over all", "(< x 25)")])
         .goal("(= x 25)");
@@ -111,7 +111,7 @@ fn an_irrational_moment_is_found_to_within_a_millionth() {
 }
 
 #[test]
-fn a_product_of_moving_fluents_is_judged_too() {
+fn product_of_changing_fluents_is_validated() {
     let world = World::new("(= x 0) (= y 4)")
         .durative("a", &[("rate", "x 1 y -1"), ("over all", "(<= (* x y) 4)")]);
     assert_eq!(world.judge("0: a [4]"), "valid");
@@ -124,7 +124,7 @@ fn a_product_of_moving_fluents_is_judged_too() {
 }
 
 #[test]
-fn exponential_change_cannot_be_judged() {
+fn exponential_change_is_undecided() {
     let world = World::new("(= x 1)").durative("a", &[("rate", "x x")]);
     assert_eq!(
         world.judge("2: a [4]"),
@@ -134,7 +134,7 @@ fn exponential_change_cannot_be_judged() {
 }
 
 #[test]
-fn a_quotient_by_something_that_moves_cannot_be_judged() {
+fn quotient_by_changing_number_is_undecided() {
     assert_eq!(
         drain("(< (/ 1 x) 1)").judge("0: a [4]"),
         "undecided: at 0.000: nonlinear change: (< (/ 1 (x)) 1) divides by (x), which changes \
@@ -143,7 +143,7 @@ fn a_quotient_by_something_that_moves_cannot_be_judged() {
 }
 
 #[test]
-fn a_quotient_by_something_that_moves_does_not_matter_where_the_rest_decides() {
+fn quotient_by_changing_number_is_ignored_if_other_parts_decide() {
     assert_eq!(
         drain("(or (< (/ 1 x) 1) (> x 3))").judge("0: a [6]"),
         "valid"
@@ -151,7 +151,7 @@ fn a_quotient_by_something_that_moves_does_not_matter_where_the_rest_decides() {
 }
 
 #[test]
-fn of_several_breaks_the_earliest_is_told() {
+fn earliest_of_several_violations_is_reported() {
     let world = World::new("(= x 10)")
         .durative("keep", &[("over all", "(>= x 3)")])
         .durative("drain", &[("rate", "x -1"), ("over all", "(>= x 5)")]);
@@ -162,7 +162,7 @@ fn of_several_breaks_the_earliest_is_told() {
 }
 
 #[test]
-fn a_rate_that_cannot_be_read_is_blamed_on_its_action() {
+fn undefined_rate_is_reported_for_its_action() {
     let world = World::new("(= x 10)").durative("a", &[("rate", "x speed")]);
     assert_eq!(
         world.judge("2: a [5]"),
@@ -171,7 +171,7 @@ fn a_rate_that_cannot_be_read_is_blamed_on_its_action() {
 }
 
 #[test]
-fn a_derived_fact_may_rest_on_a_number_that_moves() {
+fn derived_fact_can_depend_on_changing_number() {
     let world = drain("(ok)")
         .rule("ok", "(> x 4)")
         .rule("ok", "(p)")
@@ -192,7 +192,7 @@ fn a_continuous_effect_counts_at_both_ends_of_its_action() {
 }
 
 #[test]
-fn a_report_tells_how_close_each_numeric_condition_came_to_failing() {
+fn report_contains_margin_of_each_numeric_condition() {
     let world = World::new("(= x 10)")
         .durative(
             "a",

@@ -61,13 +61,13 @@ fn durations_and_start_times_are_not_negative() {
 }
 
 #[test]
-fn without_bounds_any_duration_will_do() {
+fn any_duration_is_valid_without_bounds() {
     let world = World::new("").durative("a", &[]);
     assert_eq!(world.judge("0: a [12345/7]"), "valid");
 }
 
 #[test]
-fn the_tolerance_forgives_durations_by_as_much_but_not_strict_bounds() {
+fn tolerance_applies_to_durations_but_not_to_strict_bounds() {
     let tolerant = Settings {
         tolerance: number("0.1"),
         ..Settings::default()

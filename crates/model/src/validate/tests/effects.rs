@@ -3,7 +3,7 @@
 use super::world::World;
 
 #[test]
-fn an_addition_wins_over_a_deletion_by_the_same_happening() {
+fn addition_overrides_deletion_of_same_happening() {
     let world = World::new("")
         .instant("go", "", "(p) (not (p))")
         .goal("(p)");
@@ -42,7 +42,7 @@ fn scaling_multiplies_and_divides() {
 }
 
 #[test]
-fn one_happening_gives_a_fluent_one_value() {
+fn conflicting_assignments_of_one_happening_are_refused() {
     let world = World::new("(= x 1)").instant("go", "", "(assign x 2) (increase x 1)");
     assert_eq!(
         world.judge("1: go"),
@@ -73,7 +73,7 @@ fn a_conditional_effect_reads_the_state_on_arrival_at_its_own_time() {
 }
 
 #[test]
-fn a_conditional_effect_remembers_what_it_read_at_the_start() {
+fn conditional_effect_uses_condition_value_from_start() {
     let world = World::new("(p)")
         .durative(
             "a",
@@ -104,7 +104,7 @@ fn a_conditional_effect_over_all_takes_place_only_if_its_condition_never_fails()
 }
 
 #[test]
-fn timed_initials_take_place() {
+fn timed_initials_are_applied() {
     let world = World::new("(p) (= x 1)")
         .timed("5", "(not (p))")
         .timed("6", "(= x 9)")

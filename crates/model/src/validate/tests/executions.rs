@@ -58,11 +58,11 @@ impl Executed {
 
     fn see(&mut self, time: &str, name: &str, truth: bool) {
         let fact = self.task.fact_named(name).unwrap();
-        self.execution.see_fact(&number(time), fact, truth);
+        self.execution.observe_fact(&number(time), fact, truth);
     }
 }
 
-fn gone() -> World {
+fn trip_world() -> World {
     World::new("(home)")
         .durative(
             "go",
@@ -78,7 +78,7 @@ fn gone() -> World {
 
 #[test]
 fn start_needs_its_condition_on_arrival() {
-    let mut executed = Executed::of(gone());
+    let mut executed = Executed::of(trip_world());
     assert_eq!(executed.start(0, "0", "go", "6"), "valid");
     executed.end(0, "9");
     assert!(
@@ -90,8 +90,8 @@ fn start_needs_its_condition_on_arrival() {
 }
 
 #[test]
-fn failed_action_leaves_what_is_seen() {
-    let mut executed = Executed::of(gone());
+fn failed_action_keeps_observed_state() {
+    let mut executed = Executed::of(trip_world());
     assert_eq!(executed.start(0, "0", "go", "6"), "valid");
     executed.stop(0, "6");
     assert!(executed.command(1, "6", "go", "6").contains("(home)"));
@@ -104,7 +104,7 @@ fn failed_action_leaves_what_is_seen() {
 }
 
 #[test]
-fn commanded_duration_satisfies_conditions_over_all_that_read_it_alone() {
+fn commanded_duration_satisfies_over_all_conditions_on_duration() {
     let world = World::new("").durative(
         "soak",
         &[
@@ -122,8 +122,8 @@ fn commanded_duration_satisfies_conditions_over_all_that_read_it_alone() {
 }
 
 #[test]
-fn action_is_judged_as_the_domain_has_it() {
-    let mut executed = Executed::of(gone());
+fn action_is_validated_against_unmodified_domain() {
+    let mut executed = Executed::of(trip_world());
     let mut remainder = Action::clone(&executed.action("go"));
     if let crate::ground::Body::Durative(body) = &mut remainder.body {
         body.duration.clear();
@@ -159,8 +159,8 @@ fn numbers_move_while_an_action_runs() {
 }
 
 #[test]
-fn cancelled_action_leaves_its_end_in_doubt_until_it_has_ended() {
-    let mut executed = Executed::of(gone());
+fn end_effects_of_cancelled_action_are_doubtful_until_it_ends() {
+    let mut executed = Executed::of(trip_world());
     assert_eq!(executed.start(0, "0", "go", "6"), "valid");
     executed.execution.cancel(0);
     // The action may have been faster than the command.
@@ -190,7 +190,7 @@ fn goal_counts_after_all_timed_initials() {
     let world = World::new("(p)").goal("(p)").timed("3", "(not (p))");
     let executed = Executed::of(world);
     assert_eq!(
-        executed.execution.reaches(executed.task.goal()),
+        executed.execution.reaches_goal(executed.task.goal()),
         Some(false)
     );
 }
@@ -206,8 +206,8 @@ fn two_starts_at_once_that_interfere_are_invalid() {
 }
 
 #[test]
-fn refused_start_has_not_happened() {
-    let mut executed = Executed::of(gone());
+fn refused_start_has_no_effect() {
+    let mut executed = Executed::of(trip_world());
     assert_eq!(executed.command(0, "1", "go", "6"), "valid");
     executed.stop(0, "1");
     assert_eq!(executed.start(1, "1", "go", "6"), "valid");

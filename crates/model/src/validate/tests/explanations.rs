@@ -2,7 +2,7 @@
 
 use super::world::{World, number};
 use crate::problem::{Body, Condition, ObjectId, Term};
-use crate::validate::{Mistake, Reason, When};
+use crate::validate::{ConditionTime, Reason, ViolationKind};
 
 #[test]
 fn a_numeric_condition_names_values_and_the_shortfall() {
@@ -16,7 +16,7 @@ fn a_numeric_condition_names_values_and_the_shortfall() {
 }
 
 #[test]
-fn a_false_fact_names_what_last_made_it_false() {
+fn false_fact_names_happening_that_deleted_it() {
     let world = World::new("(at)")
         .durative("leave", &[("start effect", "(not (at))")])
         .instant("use", "(at)", "");
@@ -27,7 +27,7 @@ fn a_false_fact_names_what_last_made_it_false() {
 }
 
 #[test]
-fn fact_that_becomes_true_at_the_same_time_is_said_to_come_too_late() {
+fn simultaneously_achieved_fact_is_reported_as_too_late() {
     let world = World::new("")
         .durative("make", &[("end effect", "(p)")])
         .instant("use", "(p)", "");
@@ -48,7 +48,7 @@ fn fact_that_becomes_true_at_the_same_time_is_said_to_come_too_late() {
 }
 
 #[test]
-fn number_that_suffices_at_the_same_time_is_said_to_come_too_late() {
+fn simultaneously_sufficient_number_is_reported_as_too_late() {
     let world = World::new("(= x 3)")
         .instant("more", "", "(increase x 2)")
         .durative("use", &[("start", "(>= x 5)")]);
@@ -88,7 +88,7 @@ fn false_equality_names_its_objects() {
 }
 
 #[test]
-fn only_the_conjunct_that_fails_is_blamed() {
+fn only_failing_conjunct_is_reported() {
     let world = World::new("(p)").instant("go", "(and (p) (q) (r))", "");
     assert_eq!(
         world.judge("1: go"),
@@ -102,10 +102,10 @@ fn a_violation_has_fields_for_programs() {
     let verdict = world.verdict("1: go");
     let violation = verdict.violation().expect("invalid");
     assert_eq!(violation.time, number("1"));
-    let Mistake::Condition { when, reasons, .. } = &violation.mistake else {
+    let ViolationKind::Condition { when, reasons, .. } = &violation.kind else {
         panic!()
     };
-    assert_eq!(*when, When::Now);
+    assert_eq!(*when, ConditionTime::Now);
     let [Reason::Comparison { left, right, .. }] = reasons.as_slice() else {
         panic!()
     };

@@ -23,7 +23,7 @@ fn interfering_happenings_keep_epsilon_apart() {
 }
 
 #[test]
-fn what_happens_at_the_same_time_does_not_see_each_other() {
+fn simultaneous_happenings_do_not_read_each_others_effects() {
     assert_eq!(
         handover().judge("1: give\n1: take"),
         "at 1.000: (take) needs (p): (p) is false; (give) at 1.000 changes this only after the \
@@ -52,7 +52,7 @@ fn happenings_that_do_not_interfere_may_coincide() {
 }
 
 #[test]
-fn the_start_and_the_end_of_one_action_keep_their_distance_too() {
+fn start_and_end_of_one_action_are_separated() {
     let world =
         World::new("").durative("a", &[("start effect", "(p)"), ("end effect", "(not (p))")]);
     assert_eq!(world.judge("1: a [0.001]"), "valid");
@@ -174,7 +174,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn the_goal_is_read_as_if_an_action_without_effects_came_after_all(draft in drafts()) {
+    fn goal_is_read_by_a_virtual_final_action(draft in drafts()) {
         let plan = draft.1.iter().map(|(time, step)| format!("{time}: step{step}\n"));
         let plan: String = plan.collect();
         let verdict = drafted(&draft).verdict(&plan);
@@ -184,13 +184,13 @@ proptest! {
         });
         let longer = after_all.verdict(&format!("{plan}99: nothing"));
         prop_assert_eq!(verdict.is_valid(), longer.is_valid());
-        let mistake = |verdict: &Verdict| verdict.violation().map(|found| found.mistake.clone());
+        let mistake = |verdict: &Verdict| verdict.violation().map(|found| found.kind.clone());
         prop_assert_eq!(mistake(&verdict), mistake(&longer));
     }
 }
 
 #[test]
-fn what_is_read_and_written_at_one_time_is_allowed_only_if_the_settings_say_so() {
+fn simultaneous_read_and_write_is_allowed_only_by_setting() {
     let world = |settings| {
         World::new("(p)")
             .instant("use", "(p)", "(q)")
@@ -216,7 +216,7 @@ fn what_is_read_and_written_at_one_time_is_allowed_only_if_the_settings_say_so()
 }
 
 #[test]
-fn the_tolerance_merges_what_is_within_a_tenth_of_it_after_the_first() {
+fn happenings_within_a_tenth_of_tolerance_are_merged() {
     let world = handover().settings(Settings::like_val(number("0.01")));
     assert_eq!(
         world.judge("1: give\n1.001: take"),

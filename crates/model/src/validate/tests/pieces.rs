@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::world::{World, number};
-use crate::validate::Mistake;
+use crate::validate::ViolationKind;
 use elbowroom_num::Rational;
 
 /// Generates a comparison of `x` or `y` with a small number, in one of five ways.
@@ -30,7 +30,7 @@ proptest! {
     /// With slopes and values that are small whole numbers, all comparisons of linear terms
     /// change at multiples of 1/60; a finer grid meets each cell unless a product is compared.
     #[test]
-    fn a_condition_holds_throughout_iff_it_holds_on_a_dense_grid(
+    fn condition_holds_throughout_exactly_if_it_holds_on_dense_grid(
         condition in condition(),
         x in -3..4_i32, y in -3..4_i32, dx in -2..3_i32, dy in -2..3_i32,
     ) {
@@ -64,14 +64,14 @@ proptest! {
     /// The plan that ends at the reported first violation is valid; one that ends a little later is
     /// not.
     #[test]
-    fn the_first_break_is_the_first(
+    fn reported_violation_is_the_earliest(
         condition in condition(),
         x in -3..4_i32, y in -3..4_i32, dx in -2..3_i32, dy in -2..3_i32,
     ) {
         let world = World::new(&format!("(= x {x}) (= y {y})"))
             .durative("a", &[("rate", &format!("x {dx} y {dy}")), ("over all", &condition)]);
         if let Some(violation) = world.verdict("0: a [3]").violation() {
-            let Mistake::Condition { is_exact, .. } = violation.mistake else { panic!() };
+            let ViolationKind::Condition { is_exact, .. } = violation.kind else { panic!() };
             if is_exact {
                 prop_assert_eq!(world.judge(&format!("0: a [{}]", violation.time)), "valid");
             }

@@ -55,14 +55,14 @@ struct Step {
 }
 
 #[derive(Debug)]
-struct Seen {
+struct ReferenceState {
     p: bool,
     q: bool,
     x: Rational,
 }
 
 /// Returns the state at a moment. Happenings at that moment count only if `after`.
-fn seen(steps: &[Step], now: &Rational, after: bool) -> Seen {
+fn seen(steps: &[Step], now: &Rational, after: bool) -> ReferenceState {
     let is_past = |time: &Rational| time < now || (after && time == now);
     // All changes of facts by time, beginning with the initial state; the last one counts.
     let mut changes = vec![
@@ -95,7 +95,7 @@ fn seen(steps: &[Step], now: &Rational, after: bool) -> Seen {
         past.max_by(|a, b| a.0.cmp(&b.0))
             .is_some_and(|change| change.2)
     };
-    Seen {
+    ReferenceState {
         p: last('p'),
         q: last('q'),
         x,
@@ -257,13 +257,13 @@ fn cut(
 
 proptest! {
     #[test]
-    fn the_judge_agrees_with_its_slow_twin(steps in steps()) {
+    fn validator_agrees_with_reference_implementation(steps in steps()) {
         let said = world().judge(&text(&steps));
         prop_assert_eq!(is_valid(&steps), said == "valid", "{}", said);
     }
 
     #[test]
-    fn what_is_left_of_a_plan_is_judged_as_the_plan_is(steps in steps(), half in 0..12_i64) {
+    fn remaining_plan_gets_same_verdict_as_whole_plan(steps in steps(), half in 0..12_i64) {
         let now = Rational::new(2 * half + 1, 4);
         let world = world();
         let (task, plan) = world.task_and_plan(&text(&steps));
@@ -282,7 +282,7 @@ proptest! {
 }
 
 #[test]
-fn a_plan_in_mid_execution_goes_on_with_what_is_running() {
+fn plan_in_mid_execution_continues_running_actions() {
     let world = world();
     let steps = [Step {
         action: "drain",

@@ -49,7 +49,7 @@ fn constants_have_no_zeros() {
 
 proptest! {
     #[test]
-    fn all_zeros_inside_are_found_and_no_others(
+    fn exactly_the_zeros_inside_interval_are_found(
         roots in prop::collection::vec((-8..40_i64, 1..5_i64), 1..6),
     ) {
         let roots: Vec<_> = roots.into_iter().map(|(n, d)| Rational::new(n, d)).collect();

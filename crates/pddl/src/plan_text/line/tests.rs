@@ -23,7 +23,7 @@ fn shown(text: &str) -> String {
 }
 
 #[test]
-fn each_planner_has_its_own_way_to_write_an_action() {
+fn action_notation_of_each_planner_is_read() {
     assert_eq!(
         shown("0.000: (move a b)  [12.000]"),
         "0.000/move a b/12.000"
@@ -42,7 +42,7 @@ fn each_planner_has_its_own_way_to_write_an_action() {
 }
 
 #[test]
-fn what_is_not_an_action_is_noise() {
+fn line_without_action_is_noise() {
     assert_eq!(shown("b (10.000 | 0.100)b (8.000 | 0.200)"), "Noise");
     assert_eq!(shown("; Plan found with metric 12.0"), "Heading");
     assert_eq!(shown(";;;; Solution Found"), "Heading");
@@ -81,14 +81,14 @@ fn comments_are_headings_only_as_planners_print_them() {
 }
 
 #[test]
-fn a_broken_action_says_what_is_expected_where() {
+fn broken_action_reports_expected_token_and_position() {
     assert!(matches!(line("0.0: (a b", 0), Line::Broken(9, _)));
     assert!(matches!(line("0.0: [b]", 0), Line::Broken(0, _)));
     assert!(matches!(line("0.0: (a b) [3", 0), Line::Broken(13, _)));
 }
 
 #[test]
-fn each_notation_is_told_by_its_line() {
+fn notation_is_recognised_from_line() {
     let forms = |text: &str| -> Vec<Form> {
         match line(text, 0) {
             Line::Steps(steps) => steps.iter().map(|step| step.form).collect(),

@@ -62,11 +62,13 @@ fn build(
     let mut plan = read(text.as_bytes(), &task).unwrap_or_else(|errors| panic!("{errors}"));
     // All nodes but the timed initials, which files do not mention.
     let nodes = plan.plan.nodes.len() - 1;
-    plan.plan.constraints.extend(given(nodes, constraints));
+    plan.plan
+        .constraints
+        .extend(merged_constraints(nodes, constraints));
     for (index, (nominal, weight, lower, upper, place)) in parameters.into_iter().enumerate() {
         let id = ParameterId::from(plan.parameters.len());
         let mut kind = ParameterKind::Bound;
-        if let Some(instance) = duration_place(&plan.plan, place) {
+        if let Some(instance) = pick_durative_instance(&plan.plan, place) {
             kind = ParameterKind::Duration(instance);
             plan.plan.free_duration(instance);
             plan.plan.constraints.push(Constraint {
@@ -101,7 +103,7 @@ fn build(
     plan
 }
 
-fn duration_place(plan: &StnPlan, place: Pick) -> Option<InstanceId> {
+fn pick_durative_instance(plan: &StnPlan, place: Pick) -> Option<InstanceId> {
     let durative = |instance: &Instance| instance.action.durative().is_some();
     let all: Vec<_> = (0..plan.instances.len())
         .filter(|&index| durative(&plan.instances[index]))
@@ -110,7 +112,7 @@ fn duration_place(plan: &StnPlan, place: Pick) -> Option<InstanceId> {
 }
 
 /// Generates at most one numeric constraint per pair, because the writer merges them.
-fn given(nodes: usize, constraints: Vec<PickedConstraint>) -> Vec<Constraint> {
+fn merged_constraints(nodes: usize, constraints: Vec<PickedConstraint>) -> Vec<Constraint> {
     let mut seen = std::collections::BTreeSet::new();
     let bound = |value: Option<Rational>| value.map_or(Bound::Infinite, Bound::Finite);
     constraints
@@ -155,7 +157,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn a_mutated_file_is_refused_or_stays_as_it_is_written(bytes in mutated()) {
+    fn mutated_file_is_refused_or_round_trips(bytes in mutated()) {
         let task = rover();
         match read(&bytes, &task) {
             Ok(plan) => {
@@ -172,18 +174,18 @@ proptest! {
 
 proptest! {
     #[test]
-    fn writing_and_reading_gives_the_plan_back(plan in plans()) {
+    fn written_and_reread_plan_is_identical(plan in plans()) {
         let text = write(&rover(), &plan).unwrap();
         prop_assert_eq!(parsed(&text), plan);
     }
 
     #[test]
-    fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+    fn arbitrary_bytes_do_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         let _ = read(&bytes, &rover());
     }
 
     #[test]
-    fn no_broken_file_makes_the_reader_panic(
+    fn malformed_file_does_not_panic(
         cut in any::<prop::sample::Index>(),
         other in any::<prop::sample::Index>(),
         junk in "[ -~\\n;:é]{0,4}",

@@ -6,12 +6,12 @@ use super::super::compile::Action;
 use super::super::expressions::Moment;
 use super::super::formula::Formula;
 use super::super::network::SETTLED;
-use super::super::state::{Open, State};
+use super::super::state::{OpenAction, State};
 use super::super::symbolic::{self, Piece};
 use super::{Stepper, duration_form};
 
 /// Maximum number of alternatives of a goal that are tried one by one.
-const MOST_GOALS: usize = 32;
+const MAX_GOALS: usize = 32;
 
 /// Position of a moment relative to the open interval of an over-all condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ impl Stepper<'_> {
             part.visit_tests(&mut |_| has_tests = true);
             has_tests
         };
-        let alternatives = goal.alternatives(&has_tests, MOST_GOALS);
+        let alternatives = goal.alternatives(&has_tests, MAX_GOALS);
         let alternatives = alternatives.unwrap_or_else(|| vec![goal.clone()]);
         alternatives.iter().find_map(|goal| {
             let mut attempt = state.clone();
@@ -67,10 +67,10 @@ impl Stepper<'_> {
     }
 
     /// Demands the over-all condition of an action at some moment.
-    pub(super) fn watch_all(
+    pub(super) fn recheck_all(
         &mut self,
         state: &mut State,
-        open: &mut Open,
+        open: &mut OpenAction,
         (side, moment): (Side, &Moment),
     ) -> Option<()> {
         if state.symbolic.is_none() {
@@ -83,7 +83,7 @@ impl Stepper<'_> {
                 .then(|| duration_form(open.duration.as_ref(), open.node, open.end)),
         };
         let lost = &mut self.has_rounded;
-        let Open {
+        let OpenAction {
             beginnings, chosen, ..
         } = open;
         let piece = match side {
@@ -99,7 +99,7 @@ impl Stepper<'_> {
     }
 
     /// Demands the over-all conditions of all running actions that read one of the fluents.
-    pub(super) fn watch(
+    pub(super) fn recheck_over_all(
         &mut self,
         state: &mut State,
         fluents: &[u32],
@@ -114,7 +114,7 @@ impl Stepper<'_> {
             });
             if reads {
                 let mut open = state.open[place].clone();
-                self.watch_all(state, &mut open, (side, moment))?;
+                self.recheck_all(state, &mut open, (side, moment))?;
                 state.open[place] = open;
             }
         }
@@ -130,15 +130,15 @@ impl Stepper<'_> {
     ) -> Option<()> {
         condition
             .holds(&state.facts, &mut |test| {
-                state.passes(self.compiled, test, duration)
+                state.test_holds(self.compiled, test, duration)
             })
             .then_some(())
     }
 
     /// Returns `Some` if the over-all conditions of the running actions still hold.
-    pub(super) fn keeps_conditions(&self, state: &State) -> Option<()> {
+    pub(super) fn preserves_conditions(&self, state: &State) -> Option<()> {
         if state.symbolic.is_some() {
-            return self.keeps_facts(state);
+            return self.preserves_facts(state);
         }
         state
             .open
@@ -151,17 +151,18 @@ impl Stepper<'_> {
             .then_some(())
     }
 
-    /// As [`keeps_conditions`](Self::keeps_conditions), where numbers depend on times and are
+    /// As [`preserves_conditions`](Self::keeps_conditions), where numbers depend on times and are
     /// watched as they change.
-    fn keeps_facts(&self, state: &State) -> Option<()> {
+    fn preserves_facts(&self, state: &State) -> Option<()> {
         let symbolic = state.symbolic.as_ref()?;
-        let may_pass = |test: u32, open: &Open| {
+        let may_pass = |test: u32, open: &OpenAction| {
             let mut is_governed = false;
             let difference = &self.compiled.tests[test as usize].difference;
-            difference.visit_fluents(&mut |fluent| is_governed |= symbolic.governs(fluent));
+            difference
+                .visit_fluents(&mut |fluent| is_governed |= symbolic.is_time_dependent(fluent));
             is_governed
                 || difference.reads_duration()
-                || state.passes(self.compiled, test, open.duration.as_ref())
+                || state.test_holds(self.compiled, test, open.duration.as_ref())
         };
         state
             .open

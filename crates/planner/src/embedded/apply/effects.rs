@@ -74,7 +74,7 @@ impl Stepper<'_> {
             return Some(());
         }
         let fluents: Vec<u32> = updates.iter().map(|update| update.fluent).collect();
-        self.watch(state, &fluents, (Side::Arrival, moment))?;
+        self.recheck_over_all(state, &fluents, (Side::Arrival, moment))?;
         let read: Option<Vec<_>> = updates
             .iter()
             .map(|update| symbolic::read(state, update, moment))
@@ -82,7 +82,7 @@ impl Stepper<'_> {
         for (fluent, operator, amount) in read? {
             symbolic::update(state, fluent, operator, &amount, moment)?;
         }
-        self.watch(state, &fluents, (Side::After, moment))
+        self.recheck_over_all(state, &fluents, (Side::After, moment))
     }
 }
 

@@ -18,12 +18,12 @@ pub(super) use durations::reads_duration;
 use super::compressibility::excludes_itself;
 use super::directions::Shifts;
 use super::fixed_durations::{needs_fixed_duration, variants_with_fixed_duration};
+use super::full_form::full_actions;
 use super::guarded::{has_products, moving_fluents, variants_by_guards};
 use super::interference::{Links, Separations};
 use super::macros::Macro;
 use super::metric::Draft;
 use super::reads::{read_action, visit_changes, visit_disputed};
-use super::shortened::full_actions;
 use super::symbols::Symbols;
 use super::times::has_fixed_numbers;
 use super::unfolded::unfolded;
@@ -47,7 +47,7 @@ pub(crate) enum Failure {
 
 /// The compilation's input besides the problem.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Wanted<'a> {
+pub(crate) struct CompileInput<'a> {
     /// The initial situation.
     pub(crate) situation: &'a Situation,
     /// `true` if the problem's metric is the objective.
@@ -60,10 +60,10 @@ pub(crate) struct Wanted<'a> {
 pub(crate) fn compile(
     task: &Task,
     grounding: &Grounding,
-    wanted: Wanted<'_>,
+    wanted: CompileInput<'_>,
     goes_on: &mut dyn FnMut() -> bool,
 ) -> Result<Compiled, Failure> {
-    let Wanted { situation, .. } = wanted;
+    let CompileInput { situation, .. } = wanted;
     let mut full = full_actions(task, grounding, goes_on).ok_or(Failure::Stopped)?;
     if !goes_on() {
         return Err(Failure::Stopped);
@@ -267,7 +267,7 @@ impl<'a> Builder<'a> {
         match &action.body {
             Body::Instantaneous(body) => self.instant(action, body, separations),
             Body::Durative(body) => {
-                separations.need_from_now_on(self.task, &body.over_all, &self.links);
+                separations.add_over_all_start(self.task, &body.over_all, &self.links);
                 let mut guards = Vec::new();
                 let snap = self.snap(&body.start, &mut guards);
                 let start = self.push_snap(snap, separations);
@@ -366,7 +366,7 @@ impl<'a> Builder<'a> {
         guards: &mut Vec<Formula>,
     ) -> u32 {
         let mut separations = Separations::of(footprint, shifts, self.epsilon, &self.links);
-        separations.needed_until_now(self.task, &body.over_all, &self.links);
+        separations.add_over_all_end(self.task, &body.over_all, &self.links);
         let snap = self.snap(&body.end, guards);
         self.push_snap(snap, separations)
     }

@@ -115,7 +115,7 @@ pub(super) fn nested_reads<'a>(
 
 /// Removes the conditions on these facts from happenings and actions, and records their windows.
 /// Returns the calendars used by the conditions.
-pub(super) fn take_out(
+pub(super) fn extract_conditions(
     facts: &[DatedFact],
     epsilon: Ticks,
     actions: &mut [Action],
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn readers_keep_away_from_all_timed_initials_of_the_fact() {
+    fn readers_are_separated_from_timed_initials_of_the_fact() {
         let times = dated().reading_times(true, 1);
         assert_eq!(times, [(11, 19), (21, 29), (32, NEVER)]);
         assert_eq!(dated().reading_times(false, 1), [(-NEVER, 9)]);

@@ -72,12 +72,12 @@ pub(super) fn obstacle_among_numbers(parts: Parts<'_>) -> Option<&'static str> {
             "several happenings of one time may keep a numeric over-all condition together",
         );
     }
-    let ends = Circles::of(parts, |action, uses| {
+    let ends = DependencyGraph::of(parts, |action, uses| {
         end_uses(action, parts, uses);
-        uses.may_wait_for_itself =
+        uses.ignores_self_cycle =
             is_idempotent(action, parts.snaps) && !counts(action, parts.snaps);
     });
-    ends.exist().then_some(TOGETHER)
+    ends.has_cycle().then_some(TOGETHER)
 }
 
 /// Returns the reason why it may miss plans even without numbers, if there is one.
@@ -91,7 +91,7 @@ pub(super) fn obstacle_among_facts(parts: Parts<'_>) -> Option<&'static str> {
             "several happenings of one time may keep a disjunctive over-all condition together",
         );
     }
-    let starts = Circles::of(parts, |action, uses| {
+    let starts = DependencyGraph::of(parts, |action, uses| {
         let Some(start) = parts.snaps.get(action.start as usize) else {
             return;
         };
@@ -101,22 +101,22 @@ pub(super) fn obstacle_among_facts(parts: Parts<'_>) -> Option<&'static str> {
                 uses.needs.push(*literal);
             }
         }
-        start_gives(action, parts, uses);
+        record_start_literals(action, parts, uses);
     });
-    if starts.exist() {
+    if starts.has_cycle() {
         return Some("actions may need each other's start effects from the same moment on");
     }
-    let ends = Circles::of(parts, |action, uses| {
+    let ends = DependencyGraph::of(parts, |action, uses| {
         end_uses(action, parts, uses);
-        uses.may_wait_for_itself = is_idempotent(action, parts.snaps);
+        uses.ignores_self_cycle = is_idempotent(action, parts.snaps);
     });
-    ends.exist().then_some(TOGETHER)
+    ends.has_cycle().then_some(TOGETHER)
 }
 
 /// Returns `true` if actions may need start effects of each other, so that no order of their starts
 /// keeps all over-all conditions.
 pub(super) fn do_starts_depend_on_each_other(parts: Parts<'_>) -> bool {
-    let starts = Circles::of(parts, |action, uses| {
+    let starts = DependencyGraph::of(parts, |action, uses| {
         let Some(start) = parts.snaps.get(action.start as usize) else {
             return;
         };
@@ -126,34 +126,34 @@ pub(super) fn do_starts_depend_on_each_other(parts: Parts<'_>) -> bool {
             strata,
             ..
         } = parts;
-        let changes = Changes::by_start(action, snaps, tests, strata);
-        let needs: Formula = changes.not_made(&action.over_all, tests);
+        let changes = Changes::of_start(action, snaps, tests, strata);
+        let needs: Formula = changes.unsatisfied_part(&action.over_all, tests);
         needs.visit_literals(&mut |literal| {
             if !start.condition.literals.contains(&literal) {
                 uses.needs.push(literal);
             }
         });
-        start_gives(action, parts, uses);
+        record_start_literals(action, parts, uses);
     });
-    starts.exist()
+    starts.has_cycle()
 }
 
 const TOGETHER: &str =
     "actions may destroy each other's over-all conditions by ending at the same moment";
 
 /// Records the literals that a start may make true. Starts that need one of them come later.
-fn start_gives(action: &Action, parts: Parts<'_>, uses: &mut Uses) {
-    let changes = Changes::by_start(action, parts.snaps, parts.tests, parts.strata);
-    uses.gives = changes.literals.into_iter().collect();
+fn record_start_literals(action: &Action, parts: Parts<'_>, uses: &mut Uses) {
+    let changes = Changes::of_start(action, parts.snaps, parts.tests, parts.strata);
+    uses.provides = changes.literals.into_iter().collect();
 }
 
 /// Records that an end must precede the happenings that break its over-all condition.
 fn end_uses(action: &Action, parts: Parts<'_>, uses: &mut Uses) {
     if let Some(end) = parts.snaps.get(action.end as usize) {
-        let changes = Changes::by(end, parts.tests, parts.strata);
+        let changes = Changes::of_happening(end, parts.tests, parts.strata);
         uses.needs = changes.literals.into_iter().collect();
         let lasting = &action.over_all.literals;
-        uses.gives = lasting.iter().map(|literal| opposite(*literal)).collect();
+        uses.provides = lasting.iter().map(|literal| opposite(*literal)).collect();
     }
 }
 
@@ -173,18 +173,18 @@ fn opposite(literal: Literal) -> Literal {
 #[derive(Clone, Debug, Default)]
 struct Uses {
     needs: Vec<Literal>,
-    gives: Vec<Literal>,
+    provides: Vec<Literal>,
     /// `true` if a cycle of this action alone does not count.
-    may_wait_for_itself: bool,
+    ignores_self_cycle: bool,
 }
 
 /// Graph of actions and literals, for the detection of cycles.
-struct Circles {
+struct DependencyGraph {
     uses: Vec<Uses>,
     literal_count: usize,
 }
 
-impl Circles {
+impl DependencyGraph {
     fn of(parts: Parts<'_>, look: impl Fn(&Action, &mut Uses)) -> Self {
         let uses = parts.actions.iter().map(|action| {
             let mut uses = Uses::default();
@@ -199,9 +199,9 @@ impl Circles {
 
     /// Returns `true` if the graph has a cycle: if nodes remain after repeatedly removing those
     /// without predecessors (Kahn 1962).
-    fn exist(&self) -> bool {
+    fn has_cycle(&self) -> bool {
         let mut givers = vec![0_usize; self.literal_count];
-        for literal in self.uses.iter().flat_map(|uses| &uses.gives) {
+        for literal in self.uses.iter().flat_map(|uses| &uses.provides) {
             givers[literal.index()] += 1;
         }
         let mut needed_by: Vec<Vec<usize>> = vec![Vec::new(); self.literal_count];
@@ -210,7 +210,7 @@ impl Circles {
         let mut waits = vec![0_usize; self.uses.len()];
         for (action, uses) in self.uses.iter().enumerate() {
             for literal in &uses.needs {
-                if uses.may_wait_for_itself && uses.gives.contains(literal) {
+                if uses.ignores_self_cycle && uses.provides.contains(literal) {
                     waits[action] += givers[literal.index()] - 1;
                     rivals[literal.index()].push(action);
                 } else {
@@ -227,7 +227,7 @@ impl Circles {
         loop {
             if let Some(action) = actions.pop() {
                 left -= 1;
-                for literal in &self.uses[action].gives {
+                for literal in &self.uses[action].provides {
                     givers[literal.index()] -= 1;
                     if givers[literal.index()] == 0 {
                         literals.push(literal.index());

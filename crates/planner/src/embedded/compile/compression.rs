@@ -13,11 +13,11 @@ use crate::embedded::formula::{Formula, Literal};
 
 /// The facts that matter only when true.
 #[derive(Debug)]
-pub(super) struct Ends {
+pub(super) struct PositiveFacts {
     matters_only_true: Vec<bool>,
 }
 
-impl Ends {
+impl PositiveFacts {
     pub(super) fn of(
         actions: &[Action],
         snaps: &[Snap],
@@ -79,7 +79,7 @@ impl Ends {
     }
 
     /// Returns `true` if the end of the action only adds such facts.
-    pub(super) fn only_add(&self, action: &Action, snaps: &[Snap]) -> bool {
+    pub(super) fn only_adds_positive_facts(&self, action: &Action, snaps: &[Snap]) -> bool {
         if action.start == NONE || action.end == NONE {
             return false;
         }

@@ -82,7 +82,7 @@ impl Shifts {
 
 /// Returns the fluents that a condition reads, each with the directions of change that can make it
 /// true.
-pub(super) fn wanted(condition: &Condition) -> Vec<(FluentId, Direction)> {
+pub(super) fn enabling_directions(condition: &Condition) -> Vec<(FluentId, Direction)> {
     let mut wanted: Vec<(FluentId, Direction)> = Vec::new();
     let mut note = |fluent: FluentId, direction: Direction| match wanted
         .iter_mut()

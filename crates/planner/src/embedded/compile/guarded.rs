@@ -17,7 +17,7 @@ use elbowroom_model::reachability::Grounding;
 use crate::embedded::formula::Linear;
 
 /// Maximum number of conditions of one action whose truth is chosen.
-const MOST_DECIDED: usize = 4;
+const MAX_DECIDED: usize = 4;
 
 /// Returns the fluents whose values may depend on the times of happenings.
 pub(super) fn moving_fluents(grounding: &Grounding) -> BTreeSet<FluentId> {
@@ -29,7 +29,7 @@ pub(super) fn moving_fluents(grounding: &Grounding) -> BTreeSet<FluentId> {
             let mut add = |snap: &SnapAction| {
                 for effect in &snap.effects {
                     if let Change::Update { fluent, value, .. } = &effect.change
-                        && moves(value, duration_is_chosen, &moving)
+                        && reads_moving_number(value, duration_is_chosen, &moving)
                     {
                         moving.insert(*fluent);
                     }
@@ -63,7 +63,7 @@ pub(super) fn has_products(grounding: &Grounding, moving: &BTreeSet<FluentId>) -
             operator,
             UpdateOperator::ScaleUp | UpdateOperator::ScaleDown
         );
-        moves(value, false, moving) && (scales || Linear::of(value).is_none())
+        reads_moving_number(value, false, moving) && (scales || Linear::of(value).is_none())
     };
     grounding.actions.iter().any(|action| {
         let (first, second) = match &action.body {
@@ -84,7 +84,11 @@ fn has_chosen_duration(action: &Action) -> bool {
     action.durative().is_some_and(|body| !is_fixed(body))
 }
 
-fn moves(expression: &Expression, reads_duration: bool, moving: &BTreeSet<FluentId>) -> bool {
+fn reads_moving_number(
+    expression: &Expression,
+    reads_duration: bool,
+    moving: &BTreeSet<FluentId>,
+) -> bool {
     let mut moves = false;
     expression.visit_leaves(&mut |leaf| {
         moves |= match leaf {
@@ -108,11 +112,11 @@ enum Moment {
 pub(super) fn variants_by_guards(action: &Action, moving: &BTreeSet<FluentId>) -> Vec<Action> {
     let guards = moving_guards(action, moving);
     let mut variants = vec![action.clone()];
-    for (moment, condition) in guards.iter().take(MOST_DECIDED) {
+    for (moment, condition) in guards.iter().take(MAX_DECIDED) {
         variants = variants
             .iter()
             .flat_map(|variant| {
-                [true, false].map(|truth| decided(variant, (*moment, condition), truth))
+                [true, false].map(|truth| with_truth(variant, (*moment, condition), truth))
             })
             .collect();
     }
@@ -126,7 +130,7 @@ fn moving_guards(action: &Action, moving: &BTreeSet<FluentId>) -> Vec<(Moment, C
     let mut look = |moment: Moment, condition: &Condition| {
         let mut is_moving = false;
         condition.visit_expressions(&mut |expression| {
-            is_moving |= moves(expression, duration_is_chosen, moving);
+            is_moving |= reads_moving_number(expression, duration_is_chosen, moving);
         });
         let guard = (moment, condition.clone());
         if is_moving && !found.contains(&guard) {
@@ -157,7 +161,7 @@ fn moving_guards(action: &Action, moving: &BTreeSet<FluentId>) -> Vec<(Moment, C
 
 /// Returns the action with a demand that a condition has this truth. Effects under the condition
 /// become unconditional, or are removed.
-fn decided(action: &Action, (moment, condition): (Moment, &Condition), truth: bool) -> Action {
+fn with_truth(action: &Action, (moment, condition): (Moment, &Condition), truth: bool) -> Action {
     let settle = |part: &mut Condition| {
         let is_meant = part == condition;
         if is_meant && truth {

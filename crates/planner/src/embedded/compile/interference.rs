@@ -52,7 +52,7 @@ pub(super) struct Separations {
 #[derive(Debug, Default)]
 pub(super) struct Links {
     /// For each access, the accesses that it must not overtake.
-    overtaken: Map<Access, Vec<Access>>,
+    not_overtaken: Map<Access, Vec<Access>>,
     /// `true` if the direction of a change decides whether it can break a condition. Where numbers
     /// depend on times, each change must keep its place in the order.
     has_directions: bool,
@@ -106,7 +106,7 @@ impl Separations {
             separations.makes.push(Assigned(fluent));
         }
         for made in separations.makes.clone() {
-            if let Some(overtaken) = links.overtaken.get(&made) {
+            if let Some(overtaken) = links.not_overtaken.get(&made) {
                 separations.after(overtaken.iter().copied(), 0);
             }
         }
@@ -120,12 +120,12 @@ impl Separations {
 
     /// Adds the separations that an over-all condition requires at the start of its action: the
     /// facts and fluents that it reads were changed before.
-    pub(super) fn need_from_now_on(&mut self, task: &Task, condition: &Condition, links: &Links) {
+    pub(super) fn add_over_all_start(&mut self, task: &Task, condition: &Condition, links: &Links) {
         for conjunct in condition.conjuncts() {
             for fact in Footprint::of_condition(task, conjunct).reads {
                 self.after([Added(fact), Deleted(fact)], 0);
             }
-            for (fluent, wanted) in directions::wanted(conjunct) {
+            for (fluent, wanted) in directions::enabling_directions(conjunct) {
                 self.after([Assigned(fluent)], 0);
                 let wanted = links.direction(wanted);
                 if wanted.up {
@@ -140,7 +140,7 @@ impl Separations {
 
     /// Adds the accesses of the end of an action by its over-all condition, from which later
     /// happenings must be separated.
-    pub(super) fn needed_until_now(&mut self, task: &Task, condition: &Condition, links: &Links) {
+    pub(super) fn add_over_all_end(&mut self, task: &Task, condition: &Condition, links: &Links) {
         for conjunct in condition.conjuncts() {
             match conjunct {
                 Condition::Fact(fact) if !task.is_derived(*fact) => {
@@ -154,7 +154,7 @@ impl Separations {
                     for fact in Footprint::of_condition(task, other).reads {
                         self.makes.extend([NeededTrue(fact), NeededFalse(fact)]);
                     }
-                    for (fluent, wanted) in directions::wanted(other) {
+                    for (fluent, wanted) in directions::enabling_directions(other) {
                         let wanted = links.direction(wanted);
                         if wanted.up {
                             self.makes.push(NeededHigh(fluent));
@@ -173,7 +173,7 @@ impl Links {
     /// Returns links without conditions.
     pub(super) fn new(has_directions: bool) -> Self {
         Self {
-            overtaken: Map::default(),
+            not_overtaken: Map::default(),
             has_directions,
         }
     }
@@ -204,7 +204,7 @@ impl Links {
                 mending.extend([Added(fact), Deleted(fact)]);
                 spoiling.extend([Added(fact), Deleted(fact)]);
             }
-            for (fluent, wanted) in directions::wanted(conjunct) {
+            for (fluent, wanted) in directions::enabling_directions(conjunct) {
                 mending.push(Assigned(fluent));
                 spoiling.push(Assigned(fluent));
                 let wanted = self.direction(wanted);
@@ -218,7 +218,7 @@ impl Links {
                 }
             }
             for access in spoiling {
-                let overtaken = self.overtaken.entry(access).or_default();
+                let overtaken = self.not_overtaken.entry(access).or_default();
                 for &mended in &mending {
                     if !overtaken.contains(&mended) {
                         overtaken.push(mended);

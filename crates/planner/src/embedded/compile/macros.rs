@@ -22,7 +22,9 @@ impl Macro {
         let envelopes = (0..).zip(&compiled.actions);
         let envelopes = envelopes.filter(|(_, action)| can_be_envelope(compiled, action));
         let envelopes: Vec<(u32, &Action)> = envelopes.collect();
-        let offers = envelopes.iter().map(|(_, action)| offers(compiled, action));
+        let offers = envelopes
+            .iter()
+            .map(|(_, action)| literals_while_running(compiled, action));
         let offers: Vec<Vec<Literal>> = offers.collect();
         if offers.iter().all(Vec::is_empty) {
             return Vec::new();
@@ -40,7 +42,7 @@ impl Macro {
         for ((envelope, action), offers) in envelopes.into_iter().zip(&offers) {
             let contents = offers.iter().flat_map(|offer| &contents[offer]);
             let fitting = contents.filter(|&&content| {
-                content != envelope && fits(compiled, action, compiled.action(content))
+                content != envelope && can_contain(compiled, action, compiled.action(content))
             });
             macros.extend(fitting.map(|&content| Self { envelope, content }));
         }
@@ -89,7 +91,7 @@ fn is_plain(compiled: &Compiled, action: &Action) -> bool {
 }
 
 /// Returns the literals that hold while the action runs because it runs.
-fn offers(compiled: &Compiled, action: &Action) -> Vec<Literal> {
+fn literals_while_running(compiled: &Compiled, action: &Action) -> Vec<Literal> {
     let (start, end) = (compiled.snap(action.start), compiled.snap(action.end));
     effects(start)
         .filter(|&literal| makes(end, opposite(literal)))
@@ -113,7 +115,7 @@ fn needs_throughout<'a>(
 }
 
 /// Returns `true` if the content may run while the envelope runs.
-fn fits(compiled: &Compiled, envelope: &Action, content: &Action) -> bool {
+fn can_contain(compiled: &Compiled, envelope: &Action, content: &Action) -> bool {
     let before = compiled.snap(envelope.start);
     let mut snaps = [content.start, content.end]
         .into_iter()

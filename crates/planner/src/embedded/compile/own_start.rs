@@ -14,8 +14,8 @@ impl Compiled {
         if action.start == NONE || self.starts_depend_on_each_other {
             return Formula::default();
         }
-        let changes = Changes::by_start(action, &self.snaps, &self.tests, &self.strata);
-        changes.not_made(&action.over_all, &self.tests)
+        let changes = Changes::of_start(action, &self.snaps, &self.tests, &self.strata);
+        changes.unsatisfied_part(&action.over_all, &self.tests)
     }
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Changes {
 
 impl Changes {
     /// Returns the changes by a happening, including consequences by rules.
-    pub(super) fn by(snap: &Snap, tests: &[Test], strata: &[Vec<Rule>]) -> Self {
+    pub(super) fn of_happening(snap: &Snap, tests: &[Test], strata: &[Vec<Rule>]) -> Self {
         let mut changes = Self::default();
         changes.add_effects(snap);
         changes.add_derived(tests, strata);
@@ -37,7 +37,7 @@ impl Changes {
 
     /// Returns the changes by the start of an action, including continuous changes that begin with
     /// it.
-    pub(super) fn by_start(
+    pub(super) fn of_start(
         action: &Action,
         snaps: &[Snap],
         tests: &[Test],
@@ -107,7 +107,7 @@ impl Changes {
     }
 
     /// Returns the literals and choices of a condition that these changes do not make true.
-    pub(super) fn not_made(&self, condition: &Formula, tests: &[Test]) -> Formula {
+    pub(super) fn unsatisfied_part(&self, condition: &Formula, tests: &[Test]) -> Formula {
         let is_foreign = |literal: &&Literal| !self.literals.contains(literal);
         let literals = condition.literals.iter().filter(is_foreign).copied();
         let is_untouched =

@@ -10,7 +10,7 @@ use elbowroom_model::ground::{Action, Body, Condition, FactId, Guard, SnapAction
 use elbowroom_model::reachability::Grounding;
 
 /// Maximum number of parts of all definitions together.
-const MOST_PARTS: usize = 2_000;
+const MAX_PARTS: usize = 2_000;
 
 /// Returns the grounding without derived facts that read numbers, or `None` if there are none, some
 /// depend on themselves, or their definitions are too long.
@@ -86,7 +86,7 @@ impl Definitions<'_> {
 
     fn unfold(&mut self, condition: &Condition) -> Option<Condition> {
         self.parts += usize::from(!self.is_complete);
-        if self.parts > MOST_PARTS {
+        if self.parts > MAX_PARTS {
             return None;
         }
         Some(match condition {

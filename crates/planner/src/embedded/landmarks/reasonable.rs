@@ -13,17 +13,17 @@ use super::super::relaxed::{Graph, Labels};
 use super::Landmarks;
 
 /// Maximum number of landmarks for reasonable orders, whose computation takes quadratic time.
-const MOST_ORDERED: usize = 1_000;
+const MAX_ORDERED: usize = 1_000;
 
 impl Landmarks {
     /// Adds reasonable orders between landmarks unless they form cycles, and sorts the landmarks
     /// accordingly.
     pub(crate) fn order_reasonably(&mut self, graph: &Graph, labels: &Labels, mutexes: &Mutexes) {
-        if self.list.len() > MOST_ORDERED {
+        if self.list.len() > MAX_ORDERED {
             return;
         }
         self.close();
-        let around = self.around(graph, labels);
+        let around = self.context_literals(graph, labels);
         let count = u32::try_from(self.list.len()).unwrap_or(u32::MAX);
         for later in 0..count {
             let landmark = &self.list[later as usize];
@@ -79,7 +79,7 @@ impl Landmarks {
 
     /// Returns for each landmark the literals that are true when it becomes true, or just before:
     /// the landmark, its preconditions, and the literals that become true together with it.
-    fn around(&self, graph: &Graph, labels: &Labels) -> Vec<Vec<Literal>> {
+    fn context_literals(&self, graph: &Graph, labels: &Labels) -> Vec<Vec<Literal>> {
         let mut place = vec![None; graph.proposition_count];
         for (number, landmark) in self.list.iter().enumerate() {
             place[landmark.proposition as usize] = Some(number);

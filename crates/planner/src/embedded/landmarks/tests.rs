@@ -9,8 +9,8 @@ use super::Landmarks;
 use crate::embedded::apply::Stepper;
 use crate::embedded::compile::{Compiled, Compressibility};
 use crate::embedded::formula::{Literal, is_set};
+use crate::embedded::h2::tests::{Draft, drafts, numeric_drafts};
 use crate::embedded::mutex::Mutexes;
-use crate::embedded::pairs::tests::{Draft, drafts, numeric_drafts};
 use crate::embedded::relaxed::{Graph, Labels, Relaxed};
 use crate::embedded::root::root;
 use crate::embedded::search::is_goal;
@@ -30,7 +30,7 @@ fn reached_without(graph: &Graph, labels: &Labels, without: Option<u32>) -> (Vec
     let achievements = achievements(graph, labels);
     let mut reached: Vec<bool> = (0..)
         .take(graph.proposition_count)
-        .map(|proposition| labels.held(proposition) && Some(proposition) != without)
+        .map(|proposition| labels.held_initially(proposition) && Some(proposition) != without)
         .collect();
     let mut comes = vec![false; graph.operators.len()];
     loop {
@@ -72,7 +72,7 @@ fn check_labels(graph: &Graph, labels: &Labels) {
         );
     }
     let listed = (0..).take_while(|&proposition| graph.is_listed(proposition));
-    for landmark in listed.filter(|&listed| !labels.held(listed)) {
+    for landmark in listed.filter(|&listed| !labels.held_initially(listed)) {
         let (reached, _) = reached_without(graph, labels, Some(landmark));
         for (proposition, &is_reached) in (0..).zip(&reached) {
             let Some(label) = labels.of(proposition) else {
@@ -103,7 +103,7 @@ fn check_needs(graph: &Graph, labels: &Labels, landmarks: &Landmarks) {
             })
             .collect();
         for other in &landmarks.list {
-            let is_needed = !labels.held(landmark.proposition)
+            let is_needed = !labels.held_initially(landmark.proposition)
                 && needs.iter().all(|needs| needs.contains(&other.proposition));
             assert_eq!(
                 other.needed_by.contains(&number),
@@ -194,12 +194,12 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
 
     #[test]
-    fn landmarks_are_what_nothing_reaches_the_goal_without(draft in drafts()) {
+    fn landmarks_are_necessary_for_goal(draft in drafts()) {
         check(&draft);
     }
 
     #[test]
-    fn so_are_tests_of_numbers(draft in numeric_drafts()) {
+    fn numeric_landmarks_are_necessary_for_goal(draft in numeric_drafts()) {
         check(&draft);
     }
 }
@@ -219,7 +219,7 @@ const BLOCKS: &str = "(define (domain blocks) (:requirements :typing :durative-a
 /// A block can be taken only when it is clear, so a block placed on it too early would have to be
 /// removed again.
 #[test]
-fn a_tower_is_built_from_below() {
+fn landmark_order_builds_tower_bottom_up() {
     let problem = "(define (problem p) (:domain blocks) (:objects a b c - block)
         (:init (clear a) (clear b) (clear c) (table a) (table b) (table c) (free))
         (:goal (and (on a b) (on b c))))";

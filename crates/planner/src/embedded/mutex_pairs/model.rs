@@ -25,7 +25,7 @@ pub(super) struct Operator {
 }
 
 /// Assumed minimum number of evaluations of each operator, forward and backward together.
-const FEWEST_ROUNDS: u64 = 8;
+const MIN_ROUNDS: u64 = 8;
 
 impl Operator {
     /// Returns the number of table rows that one evaluation reads and writes.
@@ -95,7 +95,7 @@ impl Model {
         }
         let words = model.atom_count.div_ceil(64) as u64;
         let round: usize = model.operators.iter().map(Operator::size).sum();
-        (words * round as u64 <= most_work / FEWEST_ROUNDS).then_some(model)
+        (words * round as u64 <= most_work / MIN_ROUNDS).then_some(model)
     }
 
     /// Returns the operator of an action's start.

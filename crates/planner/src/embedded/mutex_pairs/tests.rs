@@ -10,7 +10,7 @@ use super::model::{Model, Operator};
 use super::{Finder, MutexPairs, table};
 use crate::embedded::apply::{Step, Stepper};
 use crate::embedded::compile::Compiled;
-use crate::embedded::pairs::tests::drafts;
+use crate::embedded::h2::tests::drafts;
 use crate::embedded::root::root;
 use crate::embedded::state::State;
 use crate::embedded::testing::{choices, compiled};
@@ -18,12 +18,12 @@ use crate::embedded::testing::{choices, compiled};
 type PairSet = BTreeSet<(usize, usize)>;
 
 /// Fixpoints over all operators and all pairs, without change tracking.
-struct Twin<'a> {
+struct ReferenceTable<'a> {
     model: &'a Model,
     reached: PairSet,
 }
 
-impl<'a> Twin<'a> {
+impl<'a> ReferenceTable<'a> {
     fn of(model: &'a Model, state: &State) -> Self {
         let initial: Vec<usize> = table::bits(&model.atoms_of(state)).collect();
         let mut twin = Self {
@@ -71,7 +71,7 @@ impl<'a> Twin<'a> {
     }
 
     /// Returns `true` if the operator certainly makes a true atom false.
-    fn is_gone(&self, operator: &Operator, atom: usize) -> bool {
+    fn is_removed(&self, operator: &Operator, atom: usize) -> bool {
         let runs_twice = || {
             let start = self.model.start_of(operator.action);
             start.is_some_and(|start| {
@@ -89,7 +89,7 @@ impl<'a> Twin<'a> {
         let made: Vec<usize> = [&operator.adds[..], &operator.may_add].concat();
         let context = self.context(operator).into_iter();
         let mut others: Vec<usize> = context
-            .filter(|&atom| !self.is_gone(operator, atom))
+            .filter(|&atom| !self.is_removed(operator, atom))
             .collect();
         others.extend(&made);
         let mut pairs = product(&made, &others);
@@ -132,7 +132,9 @@ impl<'a> Twin<'a> {
 
     fn sure_after(operator: &Operator) -> Vec<usize> {
         let needs = operator.needs.iter().copied();
-        let mut after: Vec<usize> = needs.filter(|&need| !may_be_gone(operator, need)).collect();
+        let mut after: Vec<usize> = needs
+            .filter(|&need| !can_be_removed(operator, need))
+            .collect();
         after.extend(&operator.adds);
         after
     }
@@ -144,19 +146,21 @@ impl<'a> Twin<'a> {
         }
         let after = Self::sure_after(operator);
         let is_left = |&atom: &usize| {
-            may_be_gone(operator, atom)
+            can_be_removed(operator, atom)
                 || live.contains(&(atom, atom)) && after.iter().all(|&b| live.contains(&(atom, b)))
         };
         let context: Vec<usize> = self.context(operator).into_iter().filter(is_left).collect();
         let gone = context.iter().copied();
-        let gone: Vec<usize> = gone.filter(|&atom| may_be_gone(operator, atom)).collect();
+        let gone: Vec<usize> = gone
+            .filter(|&atom| can_be_removed(operator, atom))
+            .collect();
         let mut pairs = product(&gone, &context);
         pairs.retain(|&(one, other)| self.holds(one, other));
         pairs
     }
 }
 
-fn may_be_gone(operator: &Operator, atom: usize) -> bool {
+fn can_be_removed(operator: &Operator, atom: usize) -> bool {
     operator.deletes.contains(&atom)
         || operator.may_delete.contains(&atom)
         || operator.ends == Some(atom)
@@ -223,7 +227,7 @@ proptest! {
         let mut goes_on = || true;
         let mut finder = Finder::new(&model, u64::MAX, &mut goes_on);
         let reached = finder.forward(&state).expect("no limit");
-        let twin = Twin::of(&model, &state);
+        let twin = ReferenceTable::of(&model, &state);
         prop_assert_eq!(pairs_of(&reached, model.atom_count), twin.reached.clone());
         let live = finder.backward(&reached).expect("no limit");
         let expected = twin.live();
@@ -234,7 +238,7 @@ proptest! {
     }
 
     #[test]
-    fn no_plan_visits_a_dead_end(draft in drafts()) {
+    fn valid_plans_avoid_dead_ends(draft in drafts()) {
         let task = draft.task();
         let compiled = compiled(&task);
         let start = root(&compiled);

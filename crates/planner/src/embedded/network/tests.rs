@@ -8,7 +8,7 @@ use super::{Inconsistent, NEVER, Network, NodeId, Within};
 use crate::embedded::windows::{Interval, Windows};
 
 #[test]
-fn a_late_end_pushes_its_start_and_what_follows_it() {
+fn late_end_delays_its_start_and_successors() {
     let mut network = Network::default();
     let start = network.add_node(0, NEVER, &[]).unwrap();
     let follower = network.add_node(0, NEVER, &[(start, 1)]).unwrap();
@@ -19,7 +19,7 @@ fn a_late_end_pushes_its_start_and_what_follows_it() {
 }
 
 #[test]
-fn a_cycle_that_pushes_itself_is_found() {
+fn positive_cycle_is_detected() {
     let mut network = Network::default();
     let start = network.add_node(0, NEVER, &[]).unwrap();
     let inside = network.add_node(0, NEVER, &[(start, 11)]).unwrap();
@@ -34,7 +34,7 @@ type Draft = (Vec<(usize, i64)>, Option<(usize, i64)>);
 
 proptest! {
     #[test]
-    fn what_is_projected_keeps_all_distances(
+    fn projection_keeps_all_distances(
         drafts in prop::collection::vec(
             (
                 prop::collection::vec((0..6_usize, 0..9_i64), 0..3),
@@ -93,7 +93,7 @@ proptest! {
 }
 
 #[test]
-fn what_nothing_can_push_any_more_is_settled() {
+fn unpushable_node_is_settled() {
     let mut network = Network::default();
     let first = network.add_node(5, NEVER, &[]).unwrap();
     let second = network.add_node(7, NEVER, &[(first, 1)]).unwrap();
@@ -160,7 +160,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2_000, ..ProptestConfig::default() })]
 
     #[test]
-    fn windows_have_the_least_times_of_all_choices_of_intervals(drafts in windowed_drafts()) {
+    fn windows_give_earliest_times_over_all_interval_choices(drafts in windowed_drafts()) {
         let mut windows = Windows::default();
         let lists: Vec<Option<u32>> = drafts
             .iter()

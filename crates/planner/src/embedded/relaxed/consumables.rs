@@ -26,14 +26,14 @@ pub(crate) struct Consumable {
 }
 
 impl Consumable {
-    fn left(&self, state: &State) -> f64 {
+    fn remaining(&self, state: &State) -> f64 {
         let value = state.values[self.fluent as usize].as_ref();
         value.map_or(self.size, |value| value.to_f64() - self.floor)
     }
 
     /// Returns the fraction that a state has used up.
     pub(crate) fn used(&self, state: &State) -> f64 {
-        1.0 - self.left(state) / self.size
+        1.0 - self.remaining(state) / self.size
     }
 }
 
@@ -70,7 +70,7 @@ pub(crate) fn consumables(compiled: &Compiled) -> Vec<Consumable> {
     for flow in compiled.actions.iter().flat_map(|action| &action.flows) {
         floors[flow.fluent as usize] = None;
     }
-    let initial = &compiled.beginning.values;
+    let initial = &compiled.initial.values;
     let consumables = (0..).zip(floors).filter_map(|(fluent, floor)| {
         let floor = floor?;
         let size = initial[fluent as usize].as_ref()?.to_f64() - floor;
@@ -93,7 +93,7 @@ pub(super) struct Consumables {
     /// For each test, the operators that add to its difference, and the amounts.
     adders: Vec<Vec<(u32, f64)>>,
     /// The remaining amount of each after a relaxed plan.
-    left: Vec<f64>,
+    remaining: Vec<f64>,
 }
 
 impl Consumables {
@@ -133,7 +133,7 @@ impl Consumables {
             }
         }
         Self {
-            left: Vec::with_capacity(list.len()),
+            remaining: Vec::with_capacity(list.len()),
             list,
             draws,
             adders,
@@ -145,10 +145,13 @@ impl Consumables {
     }
 
     /// Begins a new relaxed plan.
-    pub(super) fn begin(&mut self, state: &State) {
-        self.left.clear();
-        self.left
-            .extend(self.list.iter().map(|consumable| consumable.left(state)));
+    pub(super) fn reset(&mut self, state: &State) {
+        self.remaining.clear();
+        self.remaining.extend(
+            self.list
+                .iter()
+                .map(|consumable| consumable.remaining(state)),
+        );
     }
 
     /// Returns the number of times the remaining amounts suffice for an operator, at most `most`.
@@ -163,7 +166,9 @@ impl Consumables {
                 clippy::cast_sign_loss,
                 reason = "clamped to a small positive range"
             )]
-            let times = ((self.left[place] + 1e-9) / amount).floor().clamp(0.0, 1e6) as u32;
+            let times = ((self.remaining[place] + 1e-9) / amount)
+                .floor()
+                .clamp(0.0, 1e6) as u32;
             most.min(times)
         })
     }
@@ -174,13 +179,13 @@ impl Consumables {
             return;
         }
         for &(place, amount) in &self.draws[operator as usize] {
-            self.left[place] -= amount * f64::from(times);
+            self.remaining[place] -= amount * f64::from(times);
         }
     }
 
     /// Returns `true` if some consumable is overdrawn.
     pub(super) fn are_overdrawn(&self) -> bool {
-        self.left.iter().any(|&left| left < -1e-9)
+        self.remaining.iter().any(|&left| left < -1e-9)
     }
 
     /// Returns the operators that add to the difference of a test.

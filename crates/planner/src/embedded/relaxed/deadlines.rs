@@ -5,8 +5,8 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::super::compile::{Compiled, NONE};
+use super::super::end_windows::EndWindows;
 use super::super::network::SETTLED;
-use super::super::spans::Spans;
 use super::super::state::State;
 use super::super::time::{NEVER, Ticks};
 use super::graph::{Graph, Kind, Operator};
@@ -18,7 +18,7 @@ pub(super) struct Deadlines {
     time: Vec<Ticks>,
     missing: Vec<u32>,
     /// The earliest start of each operator; [`NEVER`] while a precondition is missing.
-    begin: Vec<Ticks>,
+    earliest_starts: Vec<Ticks>,
     queue: BinaryHeap<Reverse<(Ticks, u32)>>,
 }
 
@@ -29,23 +29,23 @@ impl Deadlines {
     ///
     /// If choices come in chronological order, `spans` gives the latest ends of the running
     /// actions. Returns `true` if all of them may still end in time.
-    pub(super) fn exclude_late(
+    pub(super) fn exclude_late_operators(
         &mut self,
         compiled: &Compiled,
         graph: &Graph,
         state: &State,
         horizon: Ticks,
-        spans: Option<&Spans>,
+        spans: Option<&EndWindows>,
         waiting: &mut [u32],
     ) -> bool {
         self.time.clear();
         self.time.resize(graph.proposition_count, NEVER);
         self.missing.clone_from(&graph.precondition_counts);
-        self.begin.clear();
+        self.earliest_starts.clear();
         let now = spans.map_or(compiled.now, |spans| spans.now);
-        self.begin.resize(graph.operators.len(), now);
+        self.earliest_starts.resize(graph.operators.len(), now);
         self.queue.clear();
-        self.reach_what_holds(compiled, graph, state, spans);
+        self.reach_true_propositions(compiled, graph, state, spans);
         for &operator in &graph.sources {
             self.fire(compiled, graph, state, operator, horizon);
         }
@@ -53,10 +53,10 @@ impl Deadlines {
             if self.time[proposition as usize] != time {
                 continue;
             }
-            for position in graph.needing(proposition) {
+            for position in graph.dependents(proposition) {
                 let operator = graph.needing_list[position];
                 self.missing[operator as usize] -= 1;
-                let begin = &mut self.begin[operator as usize];
+                let begin = &mut self.earliest_starts[operator as usize];
                 *begin = (*begin).max(time);
                 if self.missing[operator as usize] == 0 {
                     self.fire(compiled, graph, state, operator, horizon);
@@ -64,29 +64,29 @@ impl Deadlines {
             }
         }
         for (number, waiting) in waiting.iter_mut().enumerate() {
-            if self.missing[number] > 0 || self.begin[number] >= NEVER {
+            if self.missing[number] > 0 || self.earliest_starts[number] >= NEVER {
                 *waiting += 1;
             }
         }
-        spans.is_none_or(|spans| self.all_end_in_time(graph, state, spans))
+        spans.is_none_or(|spans| self.can_all_end_in_time(graph, state, spans))
     }
 
     /// Returns `true` if the end condition of each running action may become true before the action
     /// has to end.
-    fn all_end_in_time(&self, graph: &Graph, state: &State, spans: &Spans) -> bool {
+    fn can_all_end_in_time(&self, graph: &Graph, state: &State, spans: &EndWindows) -> bool {
         let mut ends = state.open.iter().zip(&spans.ends);
         ends.all(|(open, &(_, latest))| {
             let end = graph.end_of[open.action as usize] as usize;
-            self.missing[end] == 0 && self.begin[end] <= latest
+            self.missing[end] == 0 && self.earliest_starts[end] <= latest
         })
     }
 
-    fn reach_what_holds(
+    fn reach_true_propositions(
         &mut self,
         compiled: &Compiled,
         graph: &Graph,
         state: &State,
-        spans: Option<&Spans>,
+        spans: Option<&EndWindows>,
     ) {
         let now = spans.map_or(compiled.now, |spans| spans.now);
         for (fact, annotations) in compiled.fact_annotations.iter().enumerate() {
@@ -107,7 +107,7 @@ impl Deadlines {
             let number = u32::try_from(test).expect("few tests");
             let is_free =
                 graph.is_free_test[test] || super::depends_on_times(compiled, number, state);
-            if is_free || state.passes(compiled, number, None) {
+            if is_free || state.test_holds(compiled, number, None) {
                 self.lower(graph, graph.test(number) as usize, now);
             }
         }
@@ -135,7 +135,7 @@ impl Deadlines {
         if time < self.time[proposition] {
             self.time[proposition] = time;
             let number = u32::try_from(proposition).expect("numbered by u32");
-            if graph.needing(number).is_empty() {
+            if graph.dependents(number).is_empty() {
                 return;
             }
             self.queue.push(Reverse((time, number)));
@@ -151,7 +151,7 @@ impl Deadlines {
         horizon: Ticks,
     ) {
         let operator = &graph.operators[number as usize];
-        let mut begin = self.begin[number as usize];
+        let mut begin = self.earliest_starts[number as usize];
         if let Kind::Timed(timed) = operator.kind {
             if timed < state.timed {
                 begin = NEVER;
@@ -167,14 +167,14 @@ impl Deadlines {
         if let Kind::End(action) = operator.kind {
             // An end that is too late for all running instances, where no other instance can start.
             let is_running_only = compiled.action(action).start == NONE;
-            let is_late = |open: &super::super::state::Open| {
+            let is_late = |open: &super::super::state::OpenAction| {
                 open.action != action || open.most < NEVER && begin > open.start + open.most
             };
             if is_running_only && state.open.iter().all(is_late) {
                 begin = NEVER;
             }
         }
-        self.begin[number as usize] = begin;
+        self.earliest_starts[number as usize] = begin;
         if begin >= NEVER {
             return;
         }

@@ -72,7 +72,7 @@ pub(crate) struct Graph {
     pub(crate) stays: Vec<Stay>,
     /// For each action, the operators that are applicable neither while it is running, nor after
     /// it.
-    pub(crate) kept_out: Vec<Vec<u32>>,
+    pub(crate) excluded_operators: Vec<Vec<u32>>,
     /// For each action, the operator of its end.
     pub(crate) end_of: Vec<u32>,
     /// For each action, the operator of its start, or of the whole action.
@@ -142,8 +142,8 @@ impl Graph {
             matches!(operator.kind, Kind::Start(action) if graph.end_of[action as usize] != NONE)
         });
         graph.index();
-        graph.kept_out = if compiled.tuning.uses(Technique::Exclusions) {
-            graph.find_kept_out(compiled)
+        graph.excluded_operators = if compiled.tuning.uses(Technique::Exclusions) {
+            graph.find_excluded_operators(compiled)
         } else {
             vec![Vec::new(); compiled.actions.len()]
         };
@@ -151,7 +151,7 @@ impl Graph {
     }
 
     /// Sets the cost of each step.
-    pub(crate) fn weigh(&mut self, step_costs: &StepCosts) {
+    pub(crate) fn set_step_costs(&mut self, step_costs: &StepCosts) {
         for operator in &mut self.operators {
             operator.cost = match operator.kind {
                 Kind::Start(action) => step_costs.start(action),
@@ -163,7 +163,7 @@ impl Graph {
     }
 
     /// Excludes the starts of these actions, by action number.
-    pub(crate) fn leave_out(&mut self, compiled: &Compiled, is_left_out: &[bool]) {
+    pub(crate) fn exclude_starts(&mut self, compiled: &Compiled, is_left_out: &[bool]) {
         for (number, operator) in self.operators.iter().enumerate() {
             let is_out = match operator.kind {
                 Kind::Start(action) | Kind::Compressed(action) => is_left_out[action as usize],
@@ -220,7 +220,7 @@ impl Graph {
     }
 
     /// Returns the range in `needing_list` of the operators that need the proposition.
-    pub(crate) fn needing(&self, proposition: u32) -> Range<usize> {
+    pub(crate) fn dependents(&self, proposition: u32) -> Range<usize> {
         let begin = match proposition {
             0 => 0,
             _ => self.needing_ends[proposition as usize - 1],

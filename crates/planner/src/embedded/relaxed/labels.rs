@@ -26,8 +26,8 @@ pub(crate) struct Labels {
     missing: Vec<u32>,
     holds: Vec<bool>,
     gaps: Vec<f64>,
-    waiting: VecDeque<u32>,
-    is_waiting: Vec<bool>,
+    pending: VecDeque<u32>,
+    is_pending: Vec<bool>,
     union: Vec<u32>,
     spare: Vec<u32>,
 }
@@ -47,8 +47,8 @@ impl Relaxed<'_> {
             missing: self.missing.clone(),
             holds: self.cost.iter().map(|&cost| cost != UNREACHED).collect(),
             gaps: self.gaps.clone(),
-            waiting: VecDeque::new(),
-            is_waiting: vec![false; graph.operators.len()],
+            pending: VecDeque::new(),
+            is_pending: vec![false; graph.operators.len()],
             union: Vec::new(),
             spare: Vec::new(),
         };
@@ -58,7 +58,7 @@ impl Relaxed<'_> {
             if is_past {
                 labels.missing[operator as usize] += 1;
             } else if labels.missing[operator as usize] == 0 {
-                labels.wait(operator);
+                labels.enqueue(operator);
             }
         }
         for proposition in 0..graph.proposition_count {
@@ -75,10 +75,10 @@ impl Relaxed<'_> {
     pub(crate) fn propagate(&self, labels: &mut Labels, most: u64) -> (u64, bool) {
         let mut work = 0;
         while work < most {
-            let Some(operator) = labels.waiting.pop_front() else {
+            let Some(operator) = labels.pending.pop_front() else {
                 return (work, true);
             };
-            labels.is_waiting[operator as usize] = false;
+            labels.is_pending[operator as usize] = false;
             work += labels.fire(&self.graph, operator);
         }
         (work, false)
@@ -97,7 +97,7 @@ impl Labels {
     }
 
     /// Returns `true` if the proposition held from the beginning.
-    pub(crate) fn held(&self, proposition: u32) -> bool {
+    pub(crate) fn held_initially(&self, proposition: u32) -> bool {
         self.holds[proposition as usize]
     }
 
@@ -131,19 +131,19 @@ impl Labels {
 
     /// Processes a proposition that is reached for the first time.
     fn reach(&mut self, graph: &Graph, proposition: u32) {
-        for position in graph.needing(proposition) {
+        for position in graph.dependents(proposition) {
             let operator = graph.needing_list[position];
             let missing = &mut self.missing[operator as usize];
             *missing -= 1;
             if *missing == 0 {
-                self.wait(operator);
+                self.enqueue(operator);
             }
         }
     }
 
-    fn wait(&mut self, operator: u32) {
-        if !std::mem::replace(&mut self.is_waiting[operator as usize], true) {
-            self.waiting.push_back(operator);
+    fn enqueue(&mut self, operator: u32) {
+        if !std::mem::replace(&mut self.is_pending[operator as usize], true) {
+            self.pending.push_back(operator);
         }
     }
 
@@ -198,10 +198,10 @@ impl Labels {
         }
         if self.spare.len() < before {
             label.clone_from(&self.spare);
-            for position in graph.needing(proposition) {
+            for position in graph.dependents(proposition) {
                 let operator = graph.needing_list[position];
                 if self.missing[operator as usize] == 0 {
-                    self.wait(operator);
+                    self.enqueue(operator);
                 }
             }
         }

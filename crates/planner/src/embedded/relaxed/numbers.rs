@@ -13,7 +13,7 @@ pub(super) fn gap(compiled: &Compiled, test: u32, state: &State) -> f64 {
     let test = &compiled.tests[test as usize];
     match test.difference.value(&state.values, None) {
         None => f64::NAN,
-        Some(value) => strictly(test.comparison) - value.to_f64(),
+        Some(value) => strict_margin(test.comparison) - value.to_f64(),
     }
 }
 
@@ -38,7 +38,7 @@ pub(super) fn gap_of_levels(
     let (_, level) = levels.iter().find(|(own, _)| own == fluent)?;
     let difference = coefficient * level + &linear.constant;
     let fails = !test.comparison.holds(&difference, &Rational::ZERO);
-    fails.then(|| strictly(test.comparison) - difference.to_f64())
+    fails.then(|| strict_margin(test.comparison) - difference.to_f64())
 }
 
 /// Returns the number of repetitions of a change that close a gap, or `None` if it never closes.
@@ -116,11 +116,11 @@ fn gap_after(compiled: &Compiled, test: u32, updates: &[&Update]) -> Option<f64>
     if test.comparison.holds(&difference, &Rational::ZERO) {
         return Some(0.0);
     }
-    Some(strictly(test.comparison) - difference.to_f64())
+    Some(strict_margin(test.comparison) - difference.to_f64())
 }
 
 /// Returns the margin by which a strict test must be passed.
-fn strictly(comparison: Comparison) -> f64 {
+fn strict_margin(comparison: Comparison) -> f64 {
     match comparison {
         Comparison::Greater => 1e-9,
         Comparison::Less => -1e-9,

@@ -25,7 +25,7 @@ impl Relaxed<'_> {
             wanted.extend_from_slice(&self.graph.preconditions[needs]);
         }
         if !self.consumables.is_empty() {
-            self.consumables.begin(state);
+            self.consumables.reset(state);
         }
         self.collect(&mut wanted, &mut used, &mut touched, estimate);
         if !self.consumables.is_empty() && self.consumables.are_overdrawn() {
@@ -33,7 +33,7 @@ impl Relaxed<'_> {
         }
         let mut later = Vec::new();
         if !self.resources.is_empty() {
-            later = self.fill_up(state, &mut wanted, &mut used, &mut touched, estimate);
+            later = self.add_replenishment(state, &mut wanted, &mut used, &mut touched, estimate);
         }
         for &operator in &used {
             let data = &self.graph.operators[operator as usize];
@@ -79,9 +79,9 @@ impl Relaxed<'_> {
                 continue;
             }
             touched.push(proposition);
-            if self.consumables.is_empty() || !self.add_up(proposition, wanted, used, estimate) {
+            if self.consumables.is_empty() || !self.close_gap(proposition, wanted, used, estimate) {
                 let operator = self.achiever[index];
-                self.use_with_needs(operator, wanted, used);
+                self.add_with_preconditions(operator, wanted, used);
                 let more = self.repetitions[index] - 1;
                 estimate.steps += more * self.graph.cost_of_repetition(operator);
             }
@@ -90,7 +90,7 @@ impl Relaxed<'_> {
 
     /// Adds an operator to the plan unless it is part of it, and its preconditions to the wanted
     /// propositions. Returns `true` if it is new.
-    fn use_with_needs(
+    fn add_with_preconditions(
         &mut self,
         operator: u32,
         wanted: &mut Vec<u32>,
@@ -106,7 +106,7 @@ impl Relaxed<'_> {
             // A started action must end.
             let end = self.graph.end_of[action as usize];
             if end != NONE && self.missing[end as usize] == 0 {
-                self.use_with_needs(end, wanted, used);
+                self.add_with_preconditions(end, wanted, used);
             }
         }
         true
@@ -114,7 +114,7 @@ impl Relaxed<'_> {
 
     /// Closes the gap of a test by steps that add to its difference, each as often as the
     /// consumables allow, beginning with the cheapest. Returns `false` if it is not such a test.
-    fn add_up(
+    fn close_gap(
         &mut self,
         proposition: u32,
         wanted: &mut Vec<u32>,
@@ -155,14 +155,14 @@ impl Relaxed<'_> {
             let had = u32::from(self.is_used[step as usize]);
             let times = self.consumables.times(step, needed - had);
             if times > 0 {
-                let more = times - u32::from(self.use_with_needs(step, wanted, used));
+                let more = times - u32::from(self.add_with_preconditions(step, wanted, used));
                 self.consumables.draw(step, more);
                 estimate.steps += more * self.graph.cost_of_repetition(step);
             }
             gap -= gain * f64::from(had + times);
         }
         if gap >= 1e-12 {
-            self.use_with_needs(achiever, wanted, used);
+            self.add_with_preconditions(achiever, wanted, used);
             estimate.steps += OVERDRAWN;
         }
         true
@@ -170,7 +170,7 @@ impl Relaxed<'_> {
 
     /// Adds operators that replenish the resources used up by the relaxed plan. Returns the
     /// operators that are not worth a step before a resource is used up.
-    fn fill_up(
+    fn add_replenishment(
         &mut self,
         state: &State,
         wanted: &mut Vec<u32>,
@@ -179,7 +179,7 @@ impl Relaxed<'_> {
         estimate: &mut Estimate,
     ) -> Vec<u32> {
         let mut later = Vec::new();
-        self.resources.begin(self.compiled, state);
+        self.resources.reset(self.compiled, state);
         let mut noted = 0;
         loop {
             for &operator in &used[noted..] {
@@ -250,7 +250,7 @@ impl Relaxed<'_> {
         let is_lost = |&&test: &&u32| {
             let data = &compiled.tests[test as usize];
             let after = data.difference.value(&values, None);
-            state.passes(compiled, test, None)
+            state.test_holds(compiled, test, None)
                 && after.is_some_and(|value| !data.comparison.holds(&value, &Rational::ZERO))
         };
         compiled.goal.tests.iter().filter(is_lost).count()

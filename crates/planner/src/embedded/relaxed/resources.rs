@@ -55,7 +55,7 @@ pub(super) struct Resources {
     /// The amount of each in the state, minus its floor.
     levels: Vec<f64>,
     /// The remaining amount of each after a relaxed plan.
-    left: Vec<f64>,
+    remaining: Vec<f64>,
     is_settled: Vec<bool>,
 }
 
@@ -117,7 +117,7 @@ impl Resources {
     }
 
     /// Begins a new relaxed plan. The continuous changes of running actions count as complete.
-    pub(super) fn begin(&mut self, compiled: &Compiled, state: &State) {
+    pub(super) fn reset(&mut self, compiled: &Compiled, state: &State) {
         self.levels.clear();
         self.is_settled.clear();
         for Resource { reservoir, .. } in &self.list {
@@ -133,13 +133,13 @@ impl Resources {
             self.levels.push(level - reservoir.floor);
             self.is_settled.push(false);
         }
-        self.left.clone_from(&self.levels);
+        self.remaining.clone_from(&self.levels);
     }
 
     /// Records that the relaxed plan contains an operator `times` times.
     pub(super) fn note(&mut self, operator: u32, times: u32) {
         for &(place, amount) in &self.changes[operator as usize] {
-            self.left[place] += amount * f64::from(times);
+            self.remaining[place] += amount * f64::from(times);
         }
     }
 
@@ -147,7 +147,7 @@ impl Resources {
     /// once. `cost` returns the cost of a reachable operator.
     pub(super) fn shortage(&mut self, cost: impl Fn(u32) -> Option<u32>) -> Option<Shortage> {
         for (place, resource) in self.list.iter().enumerate() {
-            if self.left[place] >= 0.0 || self.is_settled[place] {
+            if self.remaining[place] >= 0.0 || self.is_settled[place] {
                 continue;
             }
             self.is_settled[place] = true;
@@ -163,7 +163,7 @@ impl Resources {
                 clippy::cast_sign_loss,
                 reason = "clamped to a small positive range"
             )]
-            let times = (-self.left[place] / amount).ceil().clamp(1.0, 1000.0) as u32;
+            let times = (-self.remaining[place] / amount).ceil().clamp(1.0, 1000.0) as u32;
             let room = resource.size() - self.levels[place];
             return Some(Shortage {
                 operator,
@@ -205,7 +205,7 @@ pub(crate) fn reservoirs(compiled: &Compiled) -> Vec<Reservoir> {
     }
     let bounds = (0..).zip(floors.into_iter().zip(ceilings));
     let reservoirs = bounds.filter_map(|(fluent, (floor, ceiling))| {
-        let initial = compiled.beginning.values[fluent as usize].as_ref();
+        let initial = compiled.initial.values[fluent as usize].as_ref();
         let initial = initial.map_or(f64::INFINITY, Rational::to_f64);
         Some(Reservoir {
             fluent,

@@ -12,7 +12,7 @@ use super::graph::{Gain, Kind};
 use super::{Estimate, MOST, Relaxed, UNREACHED};
 use crate::embedded::apply::Stepper;
 use crate::embedded::compile::{Compiled, Compressibility, NONE};
-use crate::embedded::pairs::tests::{Draft, drafts, numeric_drafts};
+use crate::embedded::h2::tests::{Draft, drafts, numeric_drafts};
 use crate::embedded::root::root;
 use crate::embedded::state::State;
 use crate::embedded::testing::{self, compiled};
@@ -22,7 +22,7 @@ fn whole(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Estimate> {
     relaxed.serves_repairs = false;
     let is_in_time = relaxed.prepare(state);
     if is_in_time {
-        relaxed.spread(state, false);
+        relaxed.propagate_costs(state, false);
     }
     relaxed.buckets.iter_mut().for_each(Vec::clear);
     relaxed.serves_repairs = true;
@@ -178,7 +178,7 @@ fn walk(draft: &Draft, prices: &[u32], choices: &[prop::sample::Index]) -> usize
         }
         let tests = 0..u32::try_from(compiled.tests.len()).expect("few");
         failed += tests
-            .filter(|&test| !state.passes(&compiled, test, None))
+            .filter(|&test| !state.test_holds(&compiled, test, None))
             .count();
         let steps = testing::choices(&compiled, &state);
         let nexts = steps.filter_map(|step| Stepper::new(&compiled).apply(&state, step));
@@ -203,7 +203,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
     #[test]
-    fn an_estimate_that_stops_early_is_that_of_all_that_can_be_reached(
+    fn early_stop_keeps_estimate_of_full_exploration(
         draft in drafts(),
         prices in prices(),
         choices in choices(),
@@ -215,7 +215,7 @@ proptest! {
 /// As above, for problems in which numbers are compared and changed. The test counts how often they
 /// matter.
 #[test]
-fn an_estimate_that_stops_early_is_that_of_all_that_can_be_reached_with_numbers() {
+fn early_stop_keeps_estimate_of_full_exploration_with_numbers() {
     let config = ProptestConfig {
         cases: 192,
         failure_persistence: None,

@@ -7,15 +7,15 @@
 use super::super::answer::{Counts, Stopped};
 use super::super::tuning::Technique;
 use super::Planner;
-use super::refining::Nearby;
-use super::strand::{OPERATOR_WORK, Strand};
+use super::refining::LocalSearch;
+use super::worker::{OPERATOR_WORK, Worker};
 
 /// Number of comparisons of a clean-up's work with the limit.
 const REPORTS: u64 = 16;
 
 /// Minimum number of states of a first plan for a clean-up: below it, the preparation takes longer
 /// than the plan.
-const LEAST_STATES: u64 = 64;
+const MIN_STATES: u64 = 64;
 
 /// Divisor of the work up to the first plan, which gives the work of a clean-up: a unit near a plan
 /// takes several times as long as one of a search.
@@ -50,7 +50,7 @@ impl Planner<'_> {
         let Counts {
             work, evaluated, ..
         } = self.progress.counts;
-        if evaluated < LEAST_STATES {
+        if evaluated < MIN_STATES {
             return;
         }
         self.stopped = None;
@@ -62,12 +62,12 @@ impl Planner<'_> {
         let most = work / SHARE;
         self.frame.limit_report_work(most / REPORTS);
         let (frame, best, unreported) = (self.frame, self.best.clone(), self.unreported);
-        let mut nearby = Nearby::new(frame.compiled, 1);
+        let mut nearby = LocalSearch::new(frame.compiled, 1);
         let memory = frame.settings.max_memory;
         nearby.limit_memory(memory.saturating_sub(self.progress.counts.memory));
-        let (newest, mut base) = (self.finds, self.progress.counts);
-        let mut hear = |report| self.hear(&mut base, report);
-        let mut strand = Strand::new(frame, best, unreported, &mut hear);
+        let (newest, mut base) = (self.improvement_count, self.progress.counts);
+        let mut hear = |report| self.process_report(&mut base, report);
+        let mut strand = Worker::new(frame, best, unreported, &mut hear);
         strand.refine(&mut nearby, newest, most / OPERATOR_WORK);
         self.unreported = strand.end(false);
         if self.stopped != Some(Stopped::Interrupted) {
@@ -82,9 +82,9 @@ impl Planner<'_> {
             && self.stopped != Some(Stopped::Interrupted)
             && let Some(best) = self.best.clone()
         {
-            self.show(&best);
+            self.add_to_progress(&best);
             // The run ends in any case.
-            self.tell(None);
+            self.report_to_caller(None);
         }
     }
 }

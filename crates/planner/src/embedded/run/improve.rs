@@ -13,9 +13,9 @@ use super::super::answer::Stopped;
 use super::super::search::{Aim, Search, Strategy};
 use super::super::symmetry::Symmetry;
 use super::super::tuning::Technique;
-use super::refining::Nearby;
-use super::side_by_side::{Job, Tell};
-use super::strand::{Allowance, Frame, Outcome, Strand};
+use super::parallel::{Job, ReportCallback};
+use super::refining::LocalSearch;
+use super::worker::{Frame, Outcome, SearchBudget, Worker};
 use super::{Planner, share};
 
 /// Divisor of the memory left by the searches: limit for the repair of each of two strands. Half of
@@ -23,13 +23,13 @@ use super::{Planner, share};
 const REPAIRS_SHARE: usize = 4;
 
 /// A search and its strategy. The search is created at its first turn.
-pub(super) struct Entrant<'a> {
+pub(super) struct SearchSlot<'a> {
     pub(super) strategy: Strategy,
     pub(super) search: Option<Search<'a>>,
     pub(super) is_over: bool,
 }
 
-impl<'a> Entrant<'a> {
+impl<'a> SearchSlot<'a> {
     pub(super) fn new(strategy: Strategy) -> Self {
         Self {
             strategy,
@@ -48,16 +48,16 @@ impl<'a> Entrant<'a> {
 }
 
 /// Searches that take turns.
-pub(super) struct Contest<'a> {
+pub(super) struct SearchPool<'a> {
     frame: Frame<'a>,
     symmetry: &'a Symmetry,
-    pub(super) entrants: Vec<Entrant<'a>>,
+    pub(super) slots: Vec<SearchSlot<'a>>,
     /// Index of the current search.
     current: usize,
     /// Number of turns of each search in this round.
     budget: u64,
     /// Number of turns left to the current search, once it is known.
-    left: Option<u64>,
+    remaining_turns: Option<u64>,
     /// Work that the searches may still do; negative if they have done too much.
     credit: i64,
     /// `true` if the current search has found a plan with a better metric in this turn. It may then
@@ -66,49 +66,49 @@ pub(super) struct Contest<'a> {
 }
 
 /// Result of a strand: the work since its last report, and the remaining search space.
-struct Ended {
+struct WorkerResult {
     unreported: u64,
-    rest: Rest,
+    remaining: RemainingSpace,
 }
 
 /// Remaining search space of the searches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Rest {
-    Something,
+enum RemainingSpace {
+    Unexplored,
     /// Exhausted, but some plans are out of reach of the searches.
-    OutOfReach,
+    ExhaustedIncomplete,
     /// Exhausted.
-    Nothing,
+    Exhausted,
 }
 
-impl<'a> Contest<'a> {
+impl<'a> SearchPool<'a> {
     /// Forgets the current turn, whose search may have been removed.
     pub(super) fn forget_turn(&mut self) {
-        (self.left, self.is_finding, self.credit) = (None, false, 0);
+        (self.remaining_turns, self.is_finding, self.credit) = (None, false, 0);
     }
 
     /// Lets searches take turns for at most `most` work. Returns the work done, and the remaining
     /// search space.
-    fn go_on(&mut self, strand: &mut Strand<'a, '_>, most: u64) -> (u64, Rest) {
+    fn run_turns(&mut self, strand: &mut Worker<'a, '_>, most: u64) -> (u64, RemainingSpace) {
         let compiled = self.frame.compiled;
         let mut done = 0;
         while done < most {
-            if self.entrants.iter().all(|entrant| entrant.is_over) {
-                return (done, Rest::OutOfReach);
+            if self.slots.iter().all(|entrant| entrant.is_over) {
+                return (done, RemainingSpace::ExhaustedIncomplete);
             }
-            if self.current == self.entrants.len() {
+            if self.current == self.slots.len() {
                 self.current = 0;
                 self.budget = self.budget.saturating_mul(2);
             }
-            let entrant = &mut self.entrants[self.current];
+            let entrant = &mut self.slots[self.current];
             if entrant.is_over {
                 self.current += 1;
                 continue;
             }
             let search = entrant.search(self.frame, self.symmetry);
             let turns = share(search, self.budget, compiled);
-            let left = self.left.take().unwrap_or(turns);
-            let allowance = Allowance {
+            let left = self.remaining_turns.take().unwrap_or(turns);
+            let allowance = SearchBudget {
                 turns: left,
                 work: most - done,
             };
@@ -117,19 +117,19 @@ impl<'a> Contest<'a> {
             let finds = outcome == Outcome::Better && compiled.metric.is_some();
             self.is_finding = finds || self.is_finding && outcome == Outcome::WorkDone;
             match outcome {
-                Outcome::Stopped => return (done, Rest::Something),
+                Outcome::Stopped => return (done, RemainingSpace::Unexplored),
                 // A search that finds better plans may continue.
-                Outcome::Better => self.left = Some(turns),
-                Outcome::WorkDone => self.left = Some(left - spent.min(left)),
+                Outcome::Better => self.remaining_turns = Some(turns),
+                Outcome::WorkDone => self.remaining_turns = Some(left - spent.min(left)),
                 Outcome::TurnsSpent => self.current += 1,
                 Outcome::Over if search.is_incomplete() => {
                     entrant.is_over = true;
                     self.current += 1;
                 }
-                Outcome::Over => return (done, Rest::Nothing),
+                Outcome::Over => return (done, RemainingSpace::Exhausted),
             }
         }
-        (done, Rest::Something)
+        (done, RemainingSpace::Unexplored)
     }
 }
 
@@ -144,22 +144,22 @@ impl<'a> Planner<'a> {
             let compressing = strategies.iter().filter(|strategy| {
                 strategy.compresses.is_some() && strategy.replenishes == self.has_reservoirs
             });
-            entrants.extend(compressing.map(|strategy| strategy.towards(aim)));
+            entrants.extend(compressing.map(|strategy| strategy.with_aim(aim)));
         }
-        entrants.push(Strategy::COMPLETE.towards(Aim::WeightedAStar(1)));
-        let stopped = self.begin_to_compete(entrants);
+        entrants.push(Strategy::COMPLETE.with_aim(Aim::WeightedAStar(1)));
+        let stopped = self.start_searches(entrants);
         let metric = self.frame.compiled.metric.as_ref();
         if stopped != Stopped::Exhausted || !metric.is_some_and(|metric| metric.only_grows) {
             return stopped;
         }
-        let ties = strategies.iter().map(|one| one.towards(Aim::Shortest));
-        self.begin_to_compete(ties.collect())
+        let ties = strategies.iter().map(|one| one.with_aim(Aim::Shortest));
+        self.start_searches(ties.collect())
     }
 
-    fn begin_to_compete(&mut self, strategies: Vec<Strategy>) -> Stopped {
-        let entrants = strategies.into_iter().map(Entrant::new).collect();
+    fn start_searches(&mut self, strategies: Vec<Strategy>) -> Stopped {
+        let entrants = strategies.into_iter().map(SearchSlot::new).collect();
         let before = self.progress.counts.memory;
-        let stopped = self.compete(entrants, (0, self.frame.compiled.tuning.improving_round));
+        let stopped = self.run_searches(entrants, (0, self.frame.compiled.tuning.improving_round));
         if stopped == Stopped::Exhausted {
             self.progress.counts.memory = before;
         }
@@ -168,38 +168,40 @@ impl<'a> Planner<'a> {
 
     /// Lets searches take turns until a complete one has exhausted its space, and meanwhile
     /// searches for better plans near the best one. It begins with the turn of search `first`.
-    pub(super) fn compete(
+    pub(super) fn run_searches(
         &mut self,
-        entrants: Vec<Entrant<'a>>,
+        entrants: Vec<SearchSlot<'a>>,
         (first, budget): (usize, u64),
     ) -> Stopped {
-        let mut contest = Contest {
+        let mut contest = SearchPool {
             frame: self.frame,
             symmetry: self.symmetry,
-            entrants,
+            slots: entrants,
             current: first,
             budget,
-            left: None,
+            remaining_turns: None,
             credit: 0,
             is_finding: false,
         };
         loop {
-            self.keep_room(&mut contest);
+            self.reserve_memory(&mut contest);
             let rest = self.leg(&mut contest);
-            if self.clear_room(&mut contest) {
+            if self.abandon_all_searches(&mut contest) {
                 continue;
             }
             if let Some(stopped) = self.stopped {
                 return stopped;
             }
             let is_over = match rest {
-                Rest::Something => false,
+                RemainingSpace::Unexplored => false,
                 // Plans that the searches cannot reach may be found near the best plan.
-                Rest::OutOfReach => !self.is_refining() || self.improved_for >= self.least(),
-                Rest::Nothing => return Stopped::Exhausted,
+                RemainingSpace::ExhaustedIncomplete => {
+                    !self.is_refining() || self.improvement_work >= self.least()
+                }
+                RemainingSpace::Exhausted => return Stopped::Exhausted,
             };
             if is_over {
-                return self.all_over();
+                return self.stop_reason();
             }
         }
     }
@@ -208,7 +210,7 @@ impl<'a> Planner<'a> {
     /// complete space.
     fn least(&self) -> u64 {
         let tuning = &self.frame.compiled.tuning;
-        let weight = self.refiners.first().map_or(0, Nearby::weight);
+        let weight = self.refiners.first().map_or(0, LocalSearch::weight);
         tuning
             .improving_round
             .saturating_mul(tuning.refining_share_later)
@@ -226,30 +228,32 @@ impl<'a> Planner<'a> {
     }
 
     /// Runs one leg. Returns the remaining search space.
-    fn leg(&mut self, contest: &mut Contest<'a>) -> Rest {
+    fn leg(&mut self, contest: &mut SearchPool<'a>) -> RemainingSpace {
         let compiled = self.frame.compiled;
         let tuning = &compiled.tuning;
-        let (frame, newest, unreported) = (self.frame, self.finds, self.unreported);
+        let (frame, newest, unreported) = (self.frame, self.improvement_count, self.unreported);
         if !self.is_refining() {
             let best = self.best.clone();
-            let mut ended = self.hear_all(vec![Box::new(move |tell: Tell<'_>| {
-                let mut strand = Strand::new(frame, best, unreported, tell);
-                let (_, rest) = contest.go_on(&mut strand, u64::MAX);
-                Ended {
+            let mut ended = self.run_workers(vec![Box::new(move |tell: ReportCallback<'_>| {
+                let mut strand = Worker::new(frame, best, unreported, tell);
+                let (_, rest) = contest.run_turns(&mut strand, u64::MAX);
+                WorkerResult {
                     unreported: strand.end(false),
-                    rest,
+                    remaining: rest,
                 }
             })]);
-            return ended.pop().map_or(Rest::Something, |ended| ended.rest);
+            return ended
+                .pop()
+                .map_or(RemainingSpace::Unexplored, |ended| ended.remaining);
         }
         let mut refiners = std::mem::take(&mut self.refiners);
-        let own_task = self.own_task.take();
+        let own_task = self.second_task.take();
         if refiners.is_empty() {
-            refiners.push(Nearby::new(compiled, 1));
+            refiners.push(LocalSearch::new(compiled, 1));
         }
-        let has_second = self.improved_for >= tuning.second_strand_after;
+        let has_second = self.improvement_work >= tuning.second_strand_after;
         if has_second && refiners.len() == 1 {
-            refiners.push(Nearby::new(compiled, 2));
+            refiners.push(LocalSearch::new(compiled, 2));
         }
         // A repair frees its memory at its end, so this memory is not part of the counts.
         let room = frame.settings.max_memory;
@@ -257,7 +261,7 @@ impl<'a> Planner<'a> {
         for refiner in &mut refiners {
             refiner.limit_memory(room);
         }
-        let doubled = tuning.first_leg.saturating_add(self.improved_for);
+        let doubled = tuning.first_leg.saturating_add(self.improvement_work);
         let length = doubled.min(tuning.leg);
         let strands = 1 + u64::from(has_second);
         let own = strands * length / (1 + refiners[0].share());
@@ -268,42 +272,45 @@ impl<'a> Planner<'a> {
         let (first, others) = refiners.split_at_mut(1);
         let first = &mut first[0];
         let best = self.best.clone();
-        let mut jobs: Vec<Job<'_, Ended>> = vec![Box::new(move |tell: Tell<'_>| {
-            let mut strand = Strand::new(frame, best, unreported, tell);
-            let (mut work, mut rest) = (0, Rest::Something);
-            if contest.is_finding {
-                (work, rest) = contest.go_on(&mut strand, length);
-            } else if let Ok(most) = u64::try_from(contest.credit)
-                && most > 0
-            {
-                (work, rest) = contest.go_on(&mut strand, most);
-                contest.credit = contest.credit.saturating_sub_unsigned(work);
-            }
-            if !strand.is_stopped && rest != Rest::Nothing {
-                strand.refine(first, newest, length.saturating_sub(work));
-            }
-            Ended {
-                unreported: strand.end(false),
-                rest,
-            }
-        })];
+        let mut jobs: Vec<Job<'_, WorkerResult>> =
+            vec![Box::new(move |tell: ReportCallback<'_>| {
+                let mut strand = Worker::new(frame, best, unreported, tell);
+                let (mut work, mut rest) = (0, RemainingSpace::Unexplored);
+                if contest.is_finding {
+                    (work, rest) = contest.run_turns(&mut strand, length);
+                } else if let Ok(most) = u64::try_from(contest.credit)
+                    && most > 0
+                {
+                    (work, rest) = contest.run_turns(&mut strand, most);
+                    contest.credit = contest.credit.saturating_sub_unsigned(work);
+                }
+                if !strand.is_stopped && rest != RemainingSpace::Exhausted {
+                    strand.refine(first, newest, length.saturating_sub(work));
+                }
+                WorkerResult {
+                    unreported: strand.end(false),
+                    remaining: rest,
+                }
+            })];
         if let (Some(second), Some(task)) = (others.first_mut(), &own_task) {
             let frame = Frame { task, ..frame };
             let best = self.best.clone();
-            jobs.push(Box::new(move |tell: Tell<'_>| {
-                let mut strand = Strand::new(frame, best, 0, tell);
+            jobs.push(Box::new(move |tell: ReportCallback<'_>| {
+                let mut strand = Worker::new(frame, best, 0, tell);
                 strand.refine(second, newest, length);
-                Ended {
+                WorkerResult {
                     unreported: strand.end(false),
-                    rest: Rest::Something,
+                    remaining: RemainingSpace::Unexplored,
                 }
             }));
         }
-        let ended = self.hear_all(jobs);
+        let ended = self.run_workers(jobs);
         self.unreported = ended.iter().map(|ended| ended.unreported).sum();
-        self.improved_for = self.improved_for.saturating_add(length);
+        self.improvement_work = self.improvement_work.saturating_add(length);
         self.refiners = refiners;
-        self.own_task = own_task;
-        ended.first().map_or(Rest::Something, |ended| ended.rest)
+        self.second_task = own_task;
+        ended
+            .first()
+            .map_or(RemainingSpace::Unexplored, |ended| ended.remaining)
     }
 }

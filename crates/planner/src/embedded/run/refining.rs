@@ -3,19 +3,19 @@
 use super::super::answer::Phase;
 use super::super::apply::Step;
 use super::super::compile::Compiled;
-use super::super::refine::{Refiner, Ticker};
+use super::super::local_search::{Refiner, WorkMeter};
 use super::super::search::Strategy;
 use super::super::tuning::Member;
-use super::strand::{Judged, Strand};
+use super::worker::{CandidateVerdict, Worker};
 
 /// A refiner, and the best plan that it has processed.
-pub(super) struct Nearby<'a> {
+pub(super) struct LocalSearch<'a> {
     refiner: Refiner<'a>,
     /// The number of the best plan that it continues from; zero for none.
     pub(super) known: u64,
 }
 
-impl<'a> Nearby<'a> {
+impl<'a> LocalSearch<'a> {
     /// Creates the first refiner, or the second one; their random numbers differ.
     pub(super) fn new(compiled: &'a Compiled, number: u64) -> Self {
         let compresses = Strategy::of(Member::Compressing, &compiled.tuning).compresses;
@@ -47,15 +47,15 @@ impl<'a> Nearby<'a> {
 }
 
 /// Result of a piece of work near the best plan.
-struct Piece {
+struct RefinementResult {
     found: Option<Vec<Step>>,
     work: u64,
 }
 
-impl Strand<'_, '_> {
+impl Worker<'_, '_> {
     /// Searches for better plans near the best one, for at most `most` work. `newest` is the number
     /// of the best plan.
-    pub(super) fn refine(&mut self, nearby: &mut Nearby<'_>, newest: u64, most: u64) {
+    pub(super) fn refine(&mut self, nearby: &mut LocalSearch<'_>, newest: u64, most: u64) {
         let mut is_fresh = nearby.known != newest;
         nearby.known = newest;
         let refiner = &mut nearby.refiner;
@@ -64,8 +64,8 @@ impl Strand<'_, '_> {
             if std::mem::take(&mut is_fresh)
                 && let Some(best) = self.best.clone()
             {
-                let piece = self.piece(refiner, |refiner, ticker| {
-                    refiner.take(&best.steps, ticker);
+                let piece = self.refine_piece(refiner, |refiner, ticker| {
+                    refiner.adopt(&best.steps, ticker);
                     None
                 });
                 work += piece.work;
@@ -76,20 +76,20 @@ impl Strand<'_, '_> {
             if !refiner.has_plan() {
                 return;
             }
-            let piece = self.piece(refiner, Refiner::turn);
+            let piece = self.refine_piece(refiner, Refiner::try_change);
             work += piece.work + 1;
             if self.is_stopped {
                 return;
             }
             let Some(steps) = piece.found else { continue };
             match self.judge(&steps) {
-                Judged::Stopped => return,
+                CandidateVerdict::Stopped => return,
                 // The choices are the refiner's own.
-                Judged::Better => {}
-                Judged::NoBetter => self.counts.evaluated += steps.len() as u64,
-                Judged::Refused => {
+                CandidateVerdict::Better => {}
+                CandidateVerdict::NoBetter => self.counts.evaluated += steps.len() as u64,
+                CandidateVerdict::Refused => {
                     self.counts.evaluated += steps.len() as u64;
-                    refiner.forget();
+                    refiner.discard_plan();
                     is_fresh = true;
                 }
             }
@@ -97,28 +97,28 @@ impl Strand<'_, '_> {
     }
 
     /// Runs a piece of the refiner's work, and regularly asks whether to continue.
-    fn piece<'r>(
+    fn refine_piece<'r>(
         &mut self,
         refiner: &mut Refiner<'r>,
-        work: impl FnOnce(&mut Refiner<'r>, &mut Ticker<'_>) -> Option<Vec<Step>>,
-    ) -> Piece {
+        work: impl FnOnce(&mut Refiner<'r>, &mut WorkMeter<'_>) -> Option<Vec<Step>>,
+    ) -> RefinementResult {
         self.phase = Phase::Improving;
         let before = self.counts.evaluated;
         let mut known = 0;
         let mut goes_on = |work: u64, evaluated: u64| {
             let more = work - known;
             known = work;
-            self.counted(before, evaluated, more)
+            self.count_work(before, evaluated, more)
         };
-        let mut ticker = Ticker {
+        let mut ticker = WorkMeter {
             weight: 1 + refiner.weight(),
             work: 0,
             evaluated: 0,
-            goes_on: &mut goes_on,
+            should_continue: &mut goes_on,
             is_stopped: false,
         };
         let found = work(refiner, &mut ticker);
-        Piece {
+        RefinementResult {
             found,
             work: ticker.work,
         }

@@ -2,7 +2,7 @@
 //! and the frequency of its computation.
 
 use super::super::compile::Compiled;
-use super::super::pairs::Pairs;
+use super::super::h2::H2;
 use super::super::state::State;
 use super::super::time::{NEVER, Ticks};
 
@@ -11,7 +11,7 @@ use super::super::time::{NEVER, Ticks};
 pub(super) struct DeadEnds<'a> {
     compiled: &'a Compiled,
     /// Created at its first use.
-    pairs: Option<Pairs<'a>>,
+    pairs: Option<H2<'a>>,
     /// `true` if there are too many pairs.
     is_too_large: bool,
     budget: CheckBudget,
@@ -45,7 +45,7 @@ impl<'a> DeadEnds<'a> {
     /// the budget does not permit one.
     pub(super) fn is_dead_end(&mut self, state: &State) -> bool {
         if self.pairs.is_none() && !self.is_too_large {
-            self.pairs = Pairs::of(self.compiled);
+            self.pairs = H2::of(self.compiled);
             self.is_too_large = self.pairs.is_none();
         }
         let Some(pairs) = &mut self.pairs else {
@@ -53,7 +53,7 @@ impl<'a> DeadEnds<'a> {
         };
         let patience = self.compiled.tuning.dead_end_patience.max(1);
         let share = 1 + self.evaluated / patience;
-        if !self.budget.asks(self.size, share) {
+        if !self.budget.may_check(self.size, share) {
             return false;
         }
         pairs.horizon = self.horizon;
@@ -89,7 +89,7 @@ impl CheckBudget {
 
     /// Adds the credit for one more state with an estimate of size `size`. `share` grows with the
     /// duration of the search. Returns `true` if a check is permitted.
-    fn asks(&mut self, size: u64, share: u64) -> bool {
+    fn may_check(&mut self, size: u64, share: u64) -> bool {
         self.credit = (self.credit + (16 + self.cuts * share / 4) * size).min(2 * self.price);
         self.credit >= self.price
     }

@@ -244,7 +244,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_difference_makes_one_state_of_the_other(
+        fn difference_reconstructs_other_state(
             one in states(),
             other in states(),
             choices in prop::collection::vec(any::<bool>(), 50),

@@ -26,7 +26,7 @@ pub(crate) fn is_goal(compiled: &Compiled, state: &State) -> bool {
     if state.symbolic.is_some() {
         stepper.reach_goal(state.to_mut()).is_some()
     } else {
-        let mut passes = |test| state.passes(compiled, test, None);
+        let mut passes = |test| state.test_holds(compiled, test, None);
         compiled.goal.holds(&state.facts, &mut passes)
     }
 }

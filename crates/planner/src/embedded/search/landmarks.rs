@@ -6,7 +6,7 @@ use super::super::relaxed::Labels;
 use super::super::state::State;
 use super::super::tuning::IS_WHOLE;
 use super::novelty::goals_left;
-use super::{Search, Turn};
+use super::{Expansion, Search};
 
 /// Work of a turn that searches for landmarks, per unit of the maximum work of an estimate.
 const WORK_OF_TURN: u64 = 4;
@@ -16,23 +16,23 @@ const WORK_OF_TURN: u64 = 4;
 pub(super) enum SearchLandmarks {
     Unknown,
     /// The landmarks are being computed. The number is the work done so far.
-    InTheMaking(Box<Labels>, u64),
+    Computing(Box<Labels>, u64),
     Known(Landmarks),
 }
 
 impl Search<'_> {
     /// Computes the landmarks of the first state, if they count, a part of them in each turn.
     /// Returns `None` when this is finished.
-    pub(super) fn find_landmarks(&mut self, initial: &State) -> Option<Turn> {
+    pub(super) fn find_landmarks(&mut self, initial: &State) -> Option<Expansion> {
         if !self.strategy.counts_landmarks {
             return None;
         }
         let found = match std::mem::replace(&mut self.landmarks, SearchLandmarks::Unknown) {
             SearchLandmarks::Unknown => {
                 let labels = self.relaxed.labels(initial);
-                labels.map(|labels| SearchLandmarks::InTheMaking(Box::new(labels), 0))
+                labels.map(|labels| SearchLandmarks::Computing(Box::new(labels), 0))
             }
-            SearchLandmarks::InTheMaking(mut labels, before) => {
+            SearchLandmarks::Computing(mut labels, before) => {
                 let most = WORK_OF_TURN * (1 + self.weight());
                 let (work, is_all) = self.relaxed.propagate(&mut labels, most);
                 let work = before + work;
@@ -41,7 +41,7 @@ impl Search<'_> {
                     let found = Landmarks::of(graph, &labels, &initial.open);
                     // If all landmarks are goals, they are no better than counting goals.
                     let is_only = self.compiled.tuning.only.is_some();
-                    let found = found.filter(|found| found.on_the_way > 0 || is_only);
+                    let found = found.filter(|found| found.intermediate_count > 0 || is_only);
                     found.map(|mut landmarks| {
                         if IS_WHOLE && self.compiled.tuning.reasonable_orders > 0 {
                             let most = self.compiled.tuning.most_mutex_work;
@@ -53,7 +53,7 @@ impl Search<'_> {
                 } else if work > self.compiled.tuning.most_landmark_work {
                     None
                 } else {
-                    Some(SearchLandmarks::InTheMaking(labels, work))
+                    Some(SearchLandmarks::Computing(labels, work))
                 }
             }
             SearchLandmarks::Known(landmarks) => {
@@ -61,20 +61,20 @@ impl Search<'_> {
                 return None;
             }
         };
-        self.labour += WORK_OF_TURN;
+        self.total_work += WORK_OF_TURN;
         let Some(found) = found else {
             // Without landmarks, this search has no purpose.
-            self.has_lost = true;
-            return Some(Turn::Over);
+            self.is_lossy = true;
+            return Some(Expansion::Over);
         };
         self.landmarks = found;
-        Some(Turn::Nothing)
+        Some(Expansion::Nothing)
     }
 
     /// Returns the accepted landmarks after a choice that led to the state, and the number of
     /// remaining ones. Where novelty counts without landmarks, returns the number of remaining
     /// goals.
-    pub(super) fn left(&self, parent: u32, state: &State) -> (Vec<u64>, u32) {
+    pub(super) fn remaining_landmarks(&self, parent: u32, state: &State) -> (Vec<u64>, u32) {
         if let SearchLandmarks::Known(landmarks) = &self.landmarks {
             let parent = self.nodes.get(parent as usize);
             let before = parent.and_then(|parent| self.shared.accepted.get(parent.accepted));

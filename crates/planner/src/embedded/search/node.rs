@@ -7,15 +7,15 @@ use super::super::hash::Map;
 use super::super::state::Projection;
 use super::novelty::Progress;
 use super::runaway::Drift;
-use super::waiting::Waiting;
+use super::successor_list::QueuedSuccessor;
 
 /// A node. Its state is stored separately, as most searches need little memory for a node.
 #[derive(Debug)]
 pub(super) struct Node {
     /// The previous node, and the step that led here.
-    pub(super) origin: Waiting,
+    pub(super) origin: QueuedSuccessor,
     /// The number of remaining goals or landmarks, where that matters.
-    pub(super) left: u32,
+    pub(super) remaining: u32,
     /// Number of its [accepted landmarks](SharedNotes::accepted), or [`NONE`].
     pub(super) accepted: u32,
     /// Number of its [progress](SharedNotes::progress), or [`NONE`].

@@ -18,7 +18,7 @@ use super::super::state::State;
 /// The facts seen so far, by the worth of states.
 #[derive(Debug)]
 pub(super) struct Novelty {
-    looks_at_pairs: bool,
+    includes_pairs: bool,
     /// For each worth, a bit for each fact; then for each fact a bit for each fact up to it, in
     /// separate words.
     seen: Map<(u32, u32), Vec<u64>>,
@@ -53,7 +53,7 @@ impl Progress {
 impl Novelty {
     pub(super) fn new(compiled: &Compiled) -> Self {
         Self {
-            looks_at_pairs: compiled.facts.len() <= compiled.tuning.most_facts_for_novel_pairs,
+            includes_pairs: compiled.facts.len() <= compiled.tuning.most_facts_for_novel_pairs,
             seen: Map::default(),
             words: 0,
             relaxed_plans: Vec::new(),
@@ -116,7 +116,7 @@ impl Novelty {
             return (3, 0);
         }
         let singles = state.facts.len();
-        let pairs = if self.looks_at_pairs {
+        let pairs = if self.includes_pairs {
             row(compiled.facts.len())
         } else {
             0
@@ -127,7 +127,7 @@ impl Novelty {
             memory = 8 * size;
             vec![0; size]
         });
-        let (novelty, words) = newness(seen, &state.facts, self.looks_at_pairs);
+        let (novelty, words) = newness(seen, &state.facts, self.includes_pairs);
         self.words += words;
         (novelty, memory)
     }
@@ -194,9 +194,9 @@ pub(super) fn goals_left(compiled: &Compiled, state: &State) -> u32 {
     let tests = goal
         .tests
         .iter()
-        .filter(|&&test| !state.passes(compiled, test, None));
+        .filter(|&&test| !state.test_holds(compiled, test, None));
     let choices = goal.choices.iter().filter(|choice| {
-        let mut passes = |test: u32| state.passes(compiled, test, None);
+        let mut passes = |test: u32| state.test_holds(compiled, test, None);
         !choice
             .iter()
             .any(|part| part.holds(&state.facts, &mut passes))
@@ -213,12 +213,12 @@ mod tests {
 
     /// Sets of facts and of pairs, as in the definition.
     #[derive(Default)]
-    struct Twin {
+    struct ReferenceNovelty {
         facts: BTreeSet<usize>,
         pairs: BTreeSet<(usize, usize)>,
     }
 
-    impl Twin {
+    impl ReferenceNovelty {
         fn newness(&mut self, facts: &BTreeSet<usize>) -> i64 {
             let mut novelty = 3;
             for &one in facts {
@@ -238,12 +238,12 @@ mod tests {
     }
 
     #[test]
-    fn newness_is_that_of_sets_of_facts_and_pairs() {
+    fn novelty_agrees_with_sets_of_facts_and_pairs() {
         let mut counts = [0; 3];
         for count in [1, 5, 63, 64, 65, 150, 200] {
             let singles = usize::div_ceil(count, 64);
             let mut seen = vec![0; singles + row(count)];
-            let mut twin = Twin::default();
+            let mut twin = ReferenceNovelty::default();
             let mut random = 1_u64;
             for _ in 0..300 {
                 let mut facts = BTreeSet::new();

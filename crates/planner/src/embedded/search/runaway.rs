@@ -7,7 +7,7 @@ use super::super::state::State;
 use super::{Node, Search};
 
 /// Number of such steps without a penalty.
-const FREE: u32 = 8;
+const PENALTY_FREE_STEPS: u32 = 8;
 
 /// Length of the latest part of a state's path that only changed numbers.
 #[derive(Clone, Copy, Debug, Default)]
@@ -23,7 +23,7 @@ pub(super) struct Drift {
 impl Drift {
     /// Returns the addition to the rank.
     pub(super) fn penalty(self) -> i64 {
-        i64::from(self.length.saturating_sub(FREE))
+        i64::from(self.length.saturating_sub(PENALTY_FREE_STEPS))
     }
 }
 

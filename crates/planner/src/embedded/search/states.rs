@@ -13,10 +13,10 @@ use super::difference;
 
 /// The maximum length of a chain of differences. The next difference is to the first state, so that
 /// restoring takes few steps.
-const MOST_LINKS: u8 = 8;
+const MAX_LINKS: u8 = 8;
 
 /// The number of states in the cache.
-const MOST_RECENT: usize = 8;
+const MAX_RECENT: usize = 8;
 
 /// The number of bytes that are allocated together.
 const CHUNK: usize = 1 << 16;
@@ -24,7 +24,7 @@ const CHUNK: usize = 1 << 16;
 /// Storage of states by number. The first state is number 0.
 #[derive(Debug, Default)]
 pub(super) struct States {
-    kept: Vec<Kept>,
+    stored: Vec<StoredState>,
     /// Complete states: the first one, unsettled ones, and those with large numbers or numbers that depend on
     /// times.
     whole: Vec<Arc<State>>,
@@ -32,12 +32,12 @@ pub(super) struct States {
     /// The states used last; the most recent one is at the end.
     recent: VecDeque<(u32, Arc<State>)>,
     /// The difference that is being written.
-    written: Vec<u8>,
+    buffer: Vec<u8>,
 }
 
 /// Location of a stored state.
 #[derive(Clone, Copy, Debug)]
-struct Kept {
+struct StoredState {
     /// The state that it differs from; [`WHOLE`] if it is stored completely.
     base: u32,
     /// The chunk and the position in it of the number of links, which the difference follows; or
@@ -51,37 +51,37 @@ impl States {
     /// Stores a state whose parent is `parent`, and returns its memory in bytes. The first state
     /// has no parent.
     pub(super) fn push(&mut self, parent: Option<u32>, state: State) -> usize {
-        let number = u32::try_from(self.kept.len()).expect("memory is used up long before");
+        let number = u32::try_from(self.stored.len()).expect("memory is used up long before");
         let state = Arc::new(state);
-        let memory = size_of::<Kept>() + self.keep(parent, &state);
+        let memory = size_of::<StoredState>() + self.store_state(parent, &state);
         if self.whole(number).is_none() {
             self.note(number, state);
         }
         memory
     }
 
-    fn keep(&mut self, parent: Option<u32>, state: &Arc<State>) -> usize {
+    fn store_state(&mut self, parent: Option<u32>, state: &Arc<State>) -> usize {
         if let Some(parent) = parent.filter(|_| is_settled(state)) {
-            let links = match self.kept[parent as usize].base {
+            let links = match self.stored[parent as usize].base {
                 WHOLE => 0,
                 _ => self.written_at(parent)[0],
             };
-            let (base, links) = if links < MOST_LINKS {
+            let (base, links) = if links < MAX_LINKS {
                 (parent, links + 1)
             } else {
                 (0, 1)
             };
             let from = self.get(base);
-            self.written.clear();
-            self.written.push(links);
-            if difference::write(&from, state, &mut self.written).is_some()
+            self.buffer.clear();
+            self.buffer.push(links);
+            if difference::write(&from, state, &mut self.buffer).is_some()
                 && let Some(place) = self.store()
             {
-                self.kept.push(Kept { base, place });
-                return self.written.len();
+                self.stored.push(StoredState { base, place });
+                return self.buffer.len();
             }
         }
-        self.kept.push(Kept {
+        self.stored.push(StoredState {
             base: WHOLE,
             place: u32::try_from(self.whole.len()).expect("fewer than there are states"),
         });
@@ -91,7 +91,7 @@ impl States {
 
     /// Copies the new difference into a chunk. Returns `None` if it does not fit.
     fn store(&mut self) -> Option<u32> {
-        let length = self.written.len();
+        let length = self.buffer.len();
         let has_room = |chunk: &Vec<u8>| chunk.len() + length <= CHUNK;
         if !self.chunks.last().is_some_and(has_room) {
             self.chunks.push(Vec::new());
@@ -102,13 +102,13 @@ impl States {
             return None;
         }
         let place = u32::try_from(number * CHUNK + chunk.len()).ok()?;
-        chunk.extend_from_slice(&self.written);
+        chunk.extend_from_slice(&self.buffer);
         Some(place)
     }
 
     /// Returns the number of links to the next whole state, followed by the difference.
     fn written_at(&self, number: u32) -> &[u8] {
-        let place = self.kept[number as usize].place as usize;
+        let place = self.stored[number as usize].place as usize;
         &self.chunks[place / CHUNK][place % CHUNK..]
     }
 
@@ -138,7 +138,7 @@ impl States {
     }
 
     fn whole(&self, number: u32) -> Option<&Arc<State>> {
-        let kept = self.kept[number as usize];
+        let kept = self.stored[number as usize];
         (kept.base == WHOLE).then(|| &self.whole[kept.place as usize])
     }
 
@@ -159,14 +159,14 @@ impl States {
             // Changes of facts are their own inverse, in any order.
             let of_link = difference::apply_facts(&self.written_at(base)[1..], facts);
             timed = timed.or(Some(of_link));
-            base = self.kept[base as usize].base;
+            base = self.stored[base as usize].base;
         };
         *facts == whole.facts && timed.unwrap_or(whole.timed) == state.timed
     }
 
     /// Restores the state.
     pub(super) fn restore(&self, number: u32, state: &mut State) {
-        let mut links = Vec::with_capacity(usize::from(MOST_LINKS));
+        let mut links = Vec::with_capacity(usize::from(MAX_LINKS));
         let mut base = number;
         let whole = loop {
             let whole = if links.len() < 2 {
@@ -178,7 +178,7 @@ impl States {
                 break whole;
             }
             links.push(base);
-            base = self.kept[base as usize].base;
+            base = self.stored[base as usize].base;
         };
         copy(whole, state);
         for &link in links.iter().rev() {
@@ -201,7 +201,7 @@ impl States {
     fn note(&mut self, number: u32, state: Arc<State>) {
         if let Some(place) = self.recent.iter().position(|recent| recent.0 == number) {
             self.recent.remove(place);
-        } else if self.recent.len() == MOST_RECENT {
+        } else if self.recent.len() == MAX_RECENT {
             self.recent.pop_front();
         }
         self.recent.push_back((number, state));

@@ -210,7 +210,7 @@ impl Strategy {
     }
 
     /// Returns the same strategy with another aim.
-    pub(crate) fn towards(self, aim: Aim) -> Self {
+    pub(crate) fn with_aim(self, aim: Aim) -> Self {
         Self { aim, ..self }
     }
 }

@@ -6,7 +6,7 @@ use super::super::relaxed::{Estimate, OVERDRAWN};
 use super::super::state::State;
 use super::super::time::NEVER;
 use super::novelty::Progress;
-use super::waiting::Waiting;
+use super::successor_list::QueuedSuccessor;
 use super::{Aim, NoveltyOf, ROOT, Search};
 
 impl Search<'_> {
@@ -18,7 +18,7 @@ impl Search<'_> {
             return;
         }
         let left = if self.strategy.counts_landmarks {
-            self.nodes[number as usize].left
+            self.nodes[number as usize].remaining
         } else {
             0
         };
@@ -36,20 +36,22 @@ impl Search<'_> {
         }
         let rank = self.rank(number, estimate.steps);
         for &step in &estimate.preferred {
-            self.memory += self.preferred.push(rank, Waiting::step(number, step));
+            self.memory += self
+                .preferred
+                .push(rank, QueuedSuccessor::step(number, step));
         }
         self.generated += estimate.applicable.len() as u64;
         if self.is_timeless && !estimate.applicable.is_empty() {
             // Most of them are never expanded, and the list is the same at any time.
-            self.add_waiting(rank, Waiting::all_of(number));
+            self.add_waiting(rank, QueuedSuccessor::all_of(number));
         } else {
             for &step in &estimate.applicable {
-                self.add_waiting(rank, Waiting::step(number, step));
+                self.add_waiting(rank, QueuedSuccessor::step(number, step));
             }
         }
     }
 
-    fn add_waiting(&mut self, rank: i64, waiting: Waiting) {
+    fn add_waiting(&mut self, rank: i64, waiting: QueuedSuccessor) {
         self.memory += self.all.push(rank, waiting);
         if self.strategy.is_complete() {
             self.memory += self.oldest.push_back(waiting);
@@ -65,7 +67,7 @@ impl Search<'_> {
                 return Some((parent, step));
             }
             let steps = self.list(parent);
-            self.all.put_back(rank, parent, &steps);
+            self.all.push_first(rank, parent, &steps);
         }
     }
 
@@ -79,7 +81,7 @@ impl Search<'_> {
             }
             let steps = self.list(parent);
             for &step in steps.iter().rev() {
-                self.oldest.push_front(Waiting::step(parent, step));
+                self.oldest.push_front(QueuedSuccessor::step(parent, step));
             }
         }
     }
@@ -105,19 +107,19 @@ impl Search<'_> {
         let state = self.states.get(number);
         let node = &self.nodes[number as usize];
         let before = self.progress(node.origin.parent);
-        let progress = novelty.progress(&state, node.left, before, &estimate.subgoals);
-        self.weighed += estimate.applicable.len() as u64;
+        let progress = novelty.progress(&state, node.remaining, before, &estimate.subgoals);
+        self.novelty_evaluations += estimate.applicable.len() as u64;
         for &step in &estimate.applicable {
-            let Some((_, next)) = self.make(&state, step) else {
+            let Some((_, next)) = self.generate(&state, step) else {
                 continue;
             };
-            let (_, left) = self.left(number, &next);
+            let (_, left) = self.remaining_landmarks(number, &next);
             let worth = novelty.worth(&next, left, &progress);
             let (new, memory) = novelty.of(self.compiled, &next, worth);
             self.memory += memory;
             let rank = new << 48 | i64::from(worth.0) << 24;
             self.generated += 1;
-            let waiting = Waiting::step(number, step);
+            let waiting = QueuedSuccessor::step(number, step);
             if estimate.preferred.binary_search(&step).is_ok() {
                 self.memory += self.preferred.push(rank, waiting);
             }
@@ -176,14 +178,14 @@ impl Search<'_> {
     /// Returns the rank of a state in the queue of its search; lower ranks come first.
     fn rank(&mut self, number: u32, estimate: u32) -> i64 {
         if let Some(novelty) = &mut self.novelty {
-            let left = self.nodes[number as usize].left;
+            let left = self.nodes[number as usize].remaining;
             let state = self.states.get(number);
             let (new, memory) = novelty.of(self.compiled, &state, (left, estimate));
             self.memory += memory;
             return new << 48 | i64::from(left) << 24 | i64::from(estimate.min(1 << 23));
         }
         if self.strategy.counts_landmarks {
-            let left = self.nodes[number as usize].left;
+            let left = self.nodes[number as usize].remaining;
             let (overdrawn, estimate) = (estimate / OVERDRAWN, estimate % OVERDRAWN);
             return i64::from(overdrawn) << 48 | i64::from(left) << 24 | i64::from(estimate);
         }
@@ -201,7 +203,7 @@ impl Search<'_> {
 
     /// Generates the successor. In a compressing search, the started action is also ended, if
     /// possible.
-    pub(super) fn make(&mut self, state: &State, step: Step) -> Option<(Step, State)> {
+    pub(super) fn generate(&mut self, state: &State, step: Step) -> Option<(Step, State)> {
         if let Step::Start(action) | Step::Compressed(action) = step {
             let data = self.compiled.action(action);
             let runs_already = || {
@@ -215,7 +217,7 @@ impl Search<'_> {
             if data.end != NONE && data.exclusion == NONE && may_run_twice {
                 let most = usize::from(self.strategy.is_complete());
                 if runs_already() > most {
-                    self.has_lost = true;
+                    self.is_lossy = true;
                     return None;
                 }
             }
@@ -226,13 +228,13 @@ impl Search<'_> {
             if is_compressed && data.end != NONE {
                 let whole = Step::Compressed(action);
                 if let Some(next) = self.stepper.apply(state, whole) {
-                    self.has_lost = true;
+                    self.is_lossy = true;
                     return Some((whole, next));
                 }
             }
         }
         if let Step::Macro(_) = step {
-            self.has_lost = true;
+            self.is_lossy = true;
             return Some((step, self.stepper.apply(state, step)?));
         }
         let step = match step {
@@ -245,7 +247,7 @@ impl Search<'_> {
             && !self.strategy.joins
             && self.compiled.action(action).is_compression_safe
             && state.symbolic.is_none()
-            && self.relaxed.is_end_the_only_way(&next, action)
+            && self.relaxed.is_end_unavoidable(&next, action)
         {
             // No plan is lost: see `compile::compression`.
             let whole = Step::Compressed(action);

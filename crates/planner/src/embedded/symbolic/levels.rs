@@ -12,7 +12,7 @@ use super::super::expressions::{Form, Symbolic};
 use super::super::network::Network;
 use super::super::state::State;
 use super::super::time::Scale;
-use super::{is_assigned_later, settled_course};
+use super::{is_assigned_later, settled_function};
 
 /// Returns an upper bound on the value of a fluent after the ends of all running actions, without
 /// its jumps at these ends, or `None` if it has no bound.
@@ -24,7 +24,7 @@ pub(crate) fn highest_level(compiled: &Compiled, state: &State, fluent: u32) -> 
     if is_assigned_later(compiled, state, fluent) {
         return None;
     }
-    let course = settled_course(symbolic, state, fluent)?;
+    let course = settled_function(symbolic, state, fluent)?;
     if !course.rate.is_zero() {
         return None;
     }

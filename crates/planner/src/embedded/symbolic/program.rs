@@ -120,7 +120,7 @@ pub(crate) fn is_possible(
         return true;
     };
     let limit = limit
-        .filter(|(metric, _)| metric.only_grows && !symbolic.courses.is_empty())
+        .filter(|(metric, _)| metric.only_grows && !symbolic.functions.is_empty())
         .and_then(|(metric, bound)| {
             let (spent, time) = objective(state, metric)?;
             Some(Limit { spent, time, bound })
@@ -130,7 +130,7 @@ pub(crate) fn is_possible(
     }
     // Off the grid, an undelayed happening is later than in the network.
     let is_projected = compiled.tuning.uses(Technique::Projection)
-        && compiled.scale.units(compiled.now) == compiled.beginning.time;
+        && compiled.scale.units(compiled.now) == compiled.initial.time;
     if !is_projected {
         return has_solution(&state.network, &symbolic.demands, compiled, limit.as_ref());
     }
@@ -227,7 +227,7 @@ fn objective(state: &State, metric: &Metric) -> Option<(Form, Rational)> {
     for (fluent, weight) in &values.terms {
         if let Some(value) = &state.values[*fluent as usize] {
             sum.constant += weight * value;
-        } else if let Some(course) = symbolic.course(*fluent) {
+        } else if let Some(course) = symbolic.linear_function(*fluent) {
             if !course.rate.is_zero() {
                 return None;
             }

@@ -21,7 +21,7 @@ use tempfile::TempDir;
 use super::Input;
 
 /// Polling interval of a child process.
-const LOOK: Duration = Duration::from_millis(10);
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Plan with rounded times, and its exact text.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ pub(super) struct Planned {
 }
 
 /// Time limit of a child process, and a flag that ends it early.
-pub(super) struct Patience {
+pub(super) struct ChildLimits {
     pub(super) within: Duration,
     pub(super) is_over: Arc<AtomicBool>,
 }
@@ -43,7 +43,7 @@ pub(super) struct Patience {
 pub(super) fn plan(
     elbowroom: &str,
     request: &PlanRequest,
-    patience: &Patience,
+    patience: &ChildLimits,
 ) -> Result<Planned, String> {
     let said = ask(
         elbowroom,
@@ -66,7 +66,11 @@ pub(super) fn plan(
 ///
 /// # Errors
 /// The domain is invalid. The text holds the messages of the command.
-pub(super) fn validate(elbowroom: &str, domain: String, patience: &Patience) -> Result<(), String> {
+pub(super) fn validate(
+    elbowroom: &str,
+    domain: String,
+    patience: &ChildLimits,
+) -> Result<(), String> {
     // The problem is empty, because only the domain is checked.
     let problem = format!(
         "(define (problem any) (:domain {}) (:init) (:goal (and)))",
@@ -94,7 +98,7 @@ pub(super) fn sub_goals(
     elbowroom: &str,
     texts: &PlanRequest,
     plan: String,
-    patience: &Patience,
+    patience: &ChildLimits,
 ) -> Result<Vec<Tree>, String> {
     let folder = folder_with(texts)?;
     let path = folder.path().join("plan.plan");
@@ -141,7 +145,7 @@ fn name_of(domain: &str) -> String {
 }
 
 /// Output of the command.
-struct Said {
+struct CommandOutput {
     status: ExitStatus,
     out: String,
     errors: String,
@@ -152,8 +156,8 @@ fn ask(
     elbowroom: &str,
     line: &[&str],
     texts: &PlanRequest,
-    patience: &Patience,
-) -> Result<Said, String> {
+    patience: &ChildLimits,
+) -> Result<CommandOutput, String> {
     ask_in(&folder_with(texts)?, elbowroom, line, patience)
 }
 
@@ -162,8 +166,8 @@ fn ask_in(
     folder: &TempDir,
     elbowroom: &str,
     line: &[&str],
-    patience: &Patience,
-) -> Result<Said, String> {
+    patience: &ChildLimits,
+) -> Result<CommandOutput, String> {
     let [out, errors] = ["out", "errors"].map(|name| folder.path().join(name));
     let create = |path: &Path| File::create(path).map_err(|e| unusable(path, &e));
     let mut child = Command::new(elbowroom)
@@ -178,7 +182,7 @@ fn ask_in(
     let status =
         ended.ok_or_else(|| format!("it took longer than {} s", patience.within.as_secs_f64()))?;
     let read = |path: &Path| fs::read_to_string(path).unwrap_or_default();
-    Ok(Said {
+    Ok(CommandOutput {
         status,
         out: read(&out),
         errors: read(&errors),
@@ -186,7 +190,7 @@ fn ask_in(
 }
 
 /// Waits for the process to end. Returns `None` if it was killed.
-fn wait(child: &mut Child, patience: &Patience) -> io::Result<Option<ExitStatus>> {
+fn wait(child: &mut Child, patience: &ChildLimits) -> io::Result<Option<ExitStatus>> {
     let mut waited = Duration::ZERO;
     loop {
         if let Some(status) = child.try_wait()? {
@@ -197,8 +201,8 @@ fn wait(child: &mut Child, patience: &Patience) -> io::Result<Option<ExitStatus>
             child.wait()?;
             return Ok(None);
         }
-        thread::sleep(LOOK);
-        waited += LOOK;
+        thread::sleep(POLL_INTERVAL);
+        waited += POLL_INTERVAL;
     }
 }
 
@@ -207,10 +211,10 @@ fn steps_of(document: &str) -> Option<Planned> {
     let number = |value: &Value| value["decimal"].as_f64();
     let step = |step: &Value| {
         Some(PlanItem {
-            time: narrowed(number(&step["start"])?),
+            time: to_f32(number(&step["start"])?),
             action: step["action"].as_str()?.to_owned(),
             // An instantaneous action has no duration.
-            duration: number(&step["duration"]).map_or(0.0, narrowed),
+            duration: number(&step["duration"]).map_or(0.0, to_f32),
         })
     };
     let items: Option<Vec<_>> = document["steps"].as_array()?.iter().map(step).collect();
@@ -225,7 +229,7 @@ fn steps_of(document: &str) -> Option<Planned> {
     clippy::cast_possible_truncation,
     reason = "the messages have no wider numbers"
 )]
-fn narrowed(number: f64) -> f32 {
+fn to_f32(number: f64) -> f32 {
     number as f32
 }
 
@@ -279,7 +283,7 @@ impl Running {
         let over = inputs.clone();
         thread::spawn(move || {
             let code = child.wait().ok().and_then(|status| status.code());
-            let _ = over.send(Input::Over(code));
+            let _ = over.send(Input::RunEnded(code));
         });
         Ok(Self {
             pid,
@@ -311,7 +315,7 @@ fn listen(listener: &UnixListener, inputs: &Sender<Input>) {
     let Ok(answers) = stream.try_clone() else {
         return;
     };
-    let _ = inputs.send(Input::Talks(answers));
+    let _ = inputs.send(Input::Connected(answers));
     for line in BufReader::new(stream).lines() {
         let Ok(line) = line else { break };
         if inputs.send(Input::Line(line)).is_err() {

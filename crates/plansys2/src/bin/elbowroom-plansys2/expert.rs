@@ -6,35 +6,35 @@ use std::time::Duration;
 
 use elbowroom_plansys2::interface::Empty;
 use elbowroom_plansys2::knowledge::{AffectRequest, AffectResponse, StatesResponse};
-use elbowroom_plansys2::{Answer, Call, CallId, Mirror, Seen};
+use elbowroom_plansys2::{Answer, Call, CallId, ExternalChange, ProblemSync};
 
-use super::network::{Asker, Network, Requests, reliable};
-use super::{Input, remark};
+use super::network::{Network, RequestId, ServiceClient, reliable};
+use super::{Input, warn};
 
 /// Maximum number of pending requests. Older ones are assumed to be lost.
 const MOST_OPEN: usize = 64;
 
 /// Message of the problem expert.
-pub(super) enum Heard {
+pub(super) enum ExpertMessage {
     /// Its state has changed.
     Changed,
     /// Answer to that request, which may be from another client.
-    States(Asker, StatesResponse),
+    States(RequestId, StatesResponse),
     /// Answer to that request, which may be from another client.
-    Done(Asker, AffectResponse),
+    Done(RequestId, AffectResponse),
 }
 
 /// Client of the problem expert.
 pub(super) struct Expert {
-    mirror: Mirror,
-    predicates: Requests<Empty>,
-    functions: Requests<Empty>,
-    add: Requests<AffectRequest>,
-    remove: Requests<AffectRequest>,
-    define: Requests<AffectRequest>,
-    update: Requests<AffectRequest>,
-    forget: Requests<AffectRequest>,
-    open: VecDeque<(Asker, CallId)>,
+    mirror: ProblemSync,
+    predicates: ServiceClient<Empty>,
+    functions: ServiceClient<Empty>,
+    add: ServiceClient<AffectRequest>,
+    remove: ServiceClient<AffectRequest>,
+    define: ServiceClient<AffectRequest>,
+    update: ServiceClient<AffectRequest>,
+    forget: ServiceClient<AffectRequest>,
+    open: VecDeque<(RequestId, CallId)>,
 }
 
 impl Expert {
@@ -47,12 +47,12 @@ impl Expert {
             "problem_expert/update_notify",
             "std_msgs::msg::dds_::Empty_",
             &reliable(100),
-            |_: Empty| Input::Expert(Heard::Changed),
+            |_: Empty| Input::Expert(ExpertMessage::Changed),
         )?;
         let states = "plansys2_msgs::srv::dds_::GetStates";
         let mut ask_states = |name: &str| {
             network.ask(&format!("problem_expert/{name}"), states, |to, it| {
-                Input::Expert(Heard::States(to, it))
+                Input::Expert(ExpertMessage::States(to, it))
             })
         };
         let predicates = ask_states("get_problem_predicates")?;
@@ -60,11 +60,11 @@ impl Expert {
         let affect = "plansys2_msgs::srv::dds_::AffectNode";
         let mut ask_to = |name: &str| {
             network.ask(&format!("problem_expert/{name}"), affect, |to, it| {
-                Input::Expert(Heard::Done(to, it))
+                Input::Expert(ExpertMessage::Done(to, it))
             })
         };
         Ok(Self {
-            mirror: Mirror::default(),
+            mirror: ProblemSync::default(),
             predicates,
             functions,
             add: ask_to("add_problem_predicate")?,
@@ -87,8 +87,12 @@ impl Expert {
     }
 
     /// Takes the beliefs of the run.
-    pub(super) fn believe(&mut self, facts: &[(String, bool)], values: &[(String, Option<f64>)]) {
-        self.mirror.believe(facts, values);
+    pub(super) fn set_beliefs(
+        &mut self,
+        facts: &[(String, bool)],
+        values: &[(String, Option<f64>)],
+    ) {
+        self.mirror.set_beliefs(facts, values);
     }
 
     /// Returns `true` if no change is pending.
@@ -96,28 +100,25 @@ impl Expert {
         self.mirror.is_idle()
     }
 
-    pub(super) fn hear(&mut self, heard: Heard) {
+    pub(super) fn handle(&mut self, heard: ExpertMessage) {
         let outcome = |success, why| if success { Ok(()) } else { Err(why) };
         let (to, answer) = match heard {
-            Heard::Changed => return self.mirror.notified(),
-            Heard::States(to, it) => {
+            ExpertMessage::Changed => return self.mirror.on_change(),
+            ExpertMessage::States(to, it) => {
                 let said = outcome(it.success, it.error_info);
                 (to, Answer::States(said.map(|()| it.states)))
             }
-            Heard::Done(to, it) => (to, Answer::Done(outcome(it.success, it.error_info))),
+            ExpertMessage::Done(to, it) => (to, Answer::Done(outcome(it.success, it.error_info))),
         };
-        let place = self
-            .open
-            .iter()
-            .position(|(asked, _)| asked.is_meant_by(&to));
+        let place = self.open.iter().position(|(asked, _)| asked.matches(&to));
         if let Some((_, call)) = place.and_then(|place| self.open.remove(place)) {
-            self.mirror.answered(call, answer);
+            self.mirror.on_answer(call, answer);
         }
     }
 
     /// Sends the requests that are due, and returns the changes of others. To be called a few times
     /// a second.
-    pub(super) fn settle(&mut self, now: Duration) -> Vec<Seen> {
+    pub(super) fn settle(&mut self, now: Duration) -> Vec<ExternalChange> {
         let is_there = self.predicates.is_served()
             & self.functions.is_served()
             & self.add.is_served()
@@ -125,14 +126,15 @@ impl Expert {
             & self.define.is_served()
             & self.update.is_served()
             & self.forget.is_served();
-        self.mirror.found(is_there);
+        self.mirror.set_available(is_there);
         self.mirror.tick(now);
         for (id, call) in self.mirror.calls() {
-            let to =
-                |requests: &mut Requests<AffectRequest>, node| requests.say(AffectRequest { node });
+            let to = |requests: &mut ServiceClient<AffectRequest>, node| {
+                requests.send(AffectRequest { node })
+            };
             let asked = match call {
-                Call::Predicates => self.predicates.say(Empty::default()),
-                Call::Functions => self.functions.say(Empty::default()),
+                Call::Predicates => self.predicates.send(Empty::default()),
+                Call::Functions => self.functions.send(Empty::default()),
                 Call::Add(node) => to(&mut self.add, node),
                 Call::Remove(node) => to(&mut self.remove, node),
                 Call::Define(node) => to(&mut self.define, node),
@@ -142,14 +144,14 @@ impl Expert {
             match asked {
                 Ok(asked) => self.open.push_back((asked, id)),
                 // The request is repeated after its time-out.
-                Err(why) => remark(&why),
+                Err(why) => warn(&why),
             }
         }
         while self.open.len() > MOST_OPEN {
             self.open.pop_front();
         }
         for text in self.mirror.remarks() {
-            remark(&text);
+            warn(&text);
         }
         self.mirror.seen()
     }

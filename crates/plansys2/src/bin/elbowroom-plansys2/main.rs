@@ -22,10 +22,10 @@ use elbowroom_plansys2::knowledge::Tree;
 use elbowroom_plansys2::message::{ActionExecution, ActionPerformerStatus};
 
 use command::Planned;
-use expert::{Expert, Heard};
-use network::{Asker, Network};
+use expert::{Expert, ExpertMessage};
+use network::{Network, RequestId};
 use options::{Mode, Options, ProblemExpert, ServeOptions};
-use services::{Asked, Services};
+use services::{ServiceRequest, Services};
 use topics::Topics;
 
 /// Event of the main loop.
@@ -39,23 +39,23 @@ pub(crate) enum Input {
     /// A message on `performers_status`.
     Status(ActionPerformerStatus),
     /// A warning for the user.
-    Trouble(String),
+    Warning(String),
     /// A client calls a service.
-    Asked(Box<Asked>),
+    ServiceRequest(Box<ServiceRequest>),
     /// A planner has ended: the client, its request and the result.
-    Planned(Asker, PlanRequest, Result<Planned, String>),
+    Planned(RequestId, PlanRequest, Result<Planned, String>),
     /// A domain was checked: the client, and the messages if the domain is invalid.
-    Validated(Asker, Result<(), String>),
+    Validated(RequestId, Result<(), String>),
     /// The order of the subgoals in the plan of that run, or why it could not be computed.
     Ordered(u64, Result<Vec<Tree>, String>),
     /// A message of the problem expert.
-    Expert(Heard),
+    Expert(ExpertMessage),
     /// A run has connected. Answers to it are written to this stream.
-    Talks(UnixStream),
+    Connected(UnixStream),
     /// A run has ended, with that exit code.
-    Over(Option<i32>),
+    RunEnded(Option<i32>),
     /// The user asks the program to end.
-    End,
+    Stop,
 }
 
 fn main() -> ExitCode {
@@ -68,7 +68,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
-            remark(&format!("error: {why}"));
+            warn(&format!("error: {why}"));
             ExitCode::from(2)
         }
     }
@@ -98,15 +98,15 @@ fn serve(options: Options, serving: ServeOptions) -> Result<(), String> {
     network.listen(inputs.clone())?;
     let ends = inputs.clone();
     let ended = ctrlc::set_handler(move || {
-        let _ = ends.send(Input::End);
+        let _ = ends.send(Input::Stop);
     });
     ended.map_err(|e| format!("cannot listen to signals: {e}"))?;
-    let sides = serve::Sides {
+    let sides = serve::Connections {
         topics,
         services,
         expert,
     };
-    serve::Serving::new(&settings, serving, sides, inputs).run(&received);
+    serve::Server::new(&settings, serving, sides, inputs).run(&received);
     Ok(())
 }
 
@@ -121,7 +121,7 @@ fn read(inputs: &Sender<Input>) {
 }
 
 /// Writes a message for the user to standard error.
-pub(crate) fn remark(text: &str) {
+pub(crate) fn warn(text: &str) {
     // A failure is ignored, because there is nowhere left to report it.
     let _ = writeln!(io::stderr(), "elbowroom-plansys2: {text}");
 }

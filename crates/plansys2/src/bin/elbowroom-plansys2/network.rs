@@ -29,12 +29,12 @@ use serde::de::DeserializeOwned;
 
 use super::Input;
 use super::options::Settings;
-pub(super) use answers::Answers;
+pub(super) use answers::ServiceReplies;
 use raw::{Raw, RawAdapter};
 
 /// Identity of a request, for matching it with its answer.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asker {
+pub(super) struct RequestId {
     pub(super) identity: SampleIdentity,
     /// Prefix of each request and each answer, if ROS runs on Cyclone DDS.
     header: Option<Header>,
@@ -43,9 +43,9 @@ pub(super) struct Asker {
 /// Client and sequence number, as in `rmw_cyclonedds`.
 type Header = (u64, i64);
 
-impl Asker {
+impl RequestId {
     /// Returns `true` if an answer to `other` is an answer to this request.
-    pub(super) fn is_meant_by(&self, other: &Self) -> bool {
+    pub(super) fn matches(&self, other: &Self) -> bool {
         match (self.header, other.header) {
             (None, None) => self.identity == other.identity,
             (header, other) => header == other,
@@ -59,7 +59,7 @@ pub(super) struct Network {
     publisher: Publisher,
     subscriber: Subscriber,
     namespace: String,
-    ears: Vec<Box<dyn Ear>>,
+    sources: Vec<Box<dyn MessageSource>>,
 }
 
 impl Network {
@@ -88,7 +88,7 @@ impl Network {
                 .map_err(failed)?,
             participant,
             namespace: settings.namespace.clone(),
-            ears: Vec::new(),
+            sources: Vec::new(),
         })
     }
 
@@ -108,18 +108,18 @@ impl Network {
         topic.map_err(|e| format!("cannot use the topic {name}: {e}"))
     }
 
-    fn hear<T>(
+    fn add_source<T>(
         &mut self,
         topic: &Topic,
         is_service: bool,
-        input: impl Fn(Asker, T) -> Input + Send + 'static,
+        input: impl Fn(RequestId, T) -> Input + Send + 'static,
     ) -> Result<(), String>
     where
         T: DeserializeOwned + Send + 'static,
     {
         let reader = self.subscriber.create_simple_datareader_no_key(topic, None);
         let reader = reader.map_err(|e| format!("cannot listen: {e}"))?;
-        self.ears.push(Box::new(Listening {
+        self.sources.push(Box::new(TopicReader {
             reader,
             is_service,
             input,
@@ -137,13 +137,13 @@ impl Network {
         name: &str,
         kind: &str,
         qos: &QosPolicies,
-    ) -> Result<Mouth<T>, String>
+    ) -> Result<TopicPublisher<T>, String>
     where
         T: Serialize,
     {
         let topic = self.topic("rt", name, kind, qos)?;
         let writer = self.publisher.create_datawriter_no_key_cdr(&topic, None);
-        Ok(Mouth(
+        Ok(TopicPublisher(
             writer.map_err(|e| format!("cannot publish {name}: {e}"))?,
         ))
     }
@@ -163,7 +163,7 @@ impl Network {
         T: DeserializeOwned + Send + 'static,
     {
         let topic = self.topic("rt", name, kind, qos)?;
-        self.hear(&topic, false, move |_, message| input(message))
+        self.add_source(&topic, false, move |_, message| input(message))
     }
 
     /// Offers a service. `kind` is its type, as in `plansys2_msgs::srv::dds_::GetPlan`.
@@ -174,8 +174,8 @@ impl Network {
         &mut self,
         name: &str,
         kind: &str,
-        input: impl Fn(Asker, Request) -> Input + Send + 'static,
-    ) -> Result<Answers<Response>, String>
+        input: impl Fn(RequestId, Request) -> Input + Send + 'static,
+    ) -> Result<ServiceReplies<Response>, String>
     where
         Request: DeserializeOwned + Send + 'static,
         Response: Serialize,
@@ -187,7 +187,7 @@ impl Network {
             &format!("{kind}_Request_"),
             &qos,
         )?;
-        self.hear(&requests, true, input)?;
+        self.add_source(&requests, true, input)?;
         let replies = self.topic(
             "rr",
             &format!("{name}Reply"),
@@ -196,7 +196,7 @@ impl Network {
         )?;
         let writer = self.publisher.create_datawriter_no_key_cdr(&replies, None);
         let writer = writer.map_err(|e| format!("cannot serve {name}: {e}"))?;
-        Ok(Answers::new(writer))
+        Ok(ServiceReplies::new(writer))
     }
 
     /// Creates a client of a service. `kind` is its type. All answers become inputs, those to other
@@ -208,8 +208,8 @@ impl Network {
         &mut self,
         name: &str,
         kind: &str,
-        input: impl Fn(Asker, Response) -> Input + Send + 'static,
-    ) -> Result<Requests<Request>, String>
+        input: impl Fn(RequestId, Response) -> Input + Send + 'static,
+    ) -> Result<ServiceClient<Request>, String>
     where
         Request: Serialize,
         Response: DeserializeOwned + Send + 'static,
@@ -217,18 +217,18 @@ impl Network {
         let qos = reliable(10);
         let (reply, request) = (format!("{name}Reply"), format!("{name}Request"));
         let replies = self.topic("rr", &reply, &format!("{kind}_Response_"), &qos)?;
-        self.hear(&replies, true, input)?;
+        self.add_source(&replies, true, input)?;
         let requests = self.topic("rq", &request, &format!("{kind}_Request_"), &qos)?;
         let writer = self.publisher.create_datawriter_no_key_cdr(&requests, None);
         let writer: DataWriterCdr<Framed<Request>> =
             writer.map_err(|e| format!("cannot ask {name}: {e}"))?;
         let own = u128::from_le_bytes(writer.guid().to_bytes());
         let half = |it: u128| u64::try_from(it & u128::from(u64::MAX)).unwrap_or_default();
-        Ok(Requests {
+        Ok(ServiceClient {
             // Client identifier of 64 bits, derived from the GUID of the writer.
             last: (half(own) ^ half(own >> 64), 0),
             writer,
-            found: BTreeSet::new(),
+            servers: BTreeSet::new(),
         })
     }
 
@@ -239,7 +239,7 @@ impl Network {
     pub(super) fn listen(&mut self, inputs: Sender<Input>) -> Result<(), String> {
         let failed = |e: io::Error| format!("cannot listen to the network: {e}");
         let mut poll = Poll::new().map_err(failed)?;
-        let mut ears = std::mem::take(&mut self.ears);
+        let mut ears = std::mem::take(&mut self.sources);
         for (number, ear) in ears.iter_mut().enumerate() {
             ear.register(poll.registry(), Token(number))
                 .map_err(failed)?;
@@ -251,7 +251,7 @@ impl Network {
                 if let Err(error) = poll.poll(&mut events, None)
                     && error.kind() != io::ErrorKind::Interrupted
                 {
-                    let _ = inputs.send(Input::Trouble(failed(error)));
+                    let _ = inputs.send(Input::Warning(failed(error)));
                     return;
                 }
             }
@@ -282,14 +282,14 @@ pub(super) fn latched() -> QosPolicies {
 }
 
 /// Publisher of a topic.
-pub(super) struct Mouth<T: Serialize>(DataWriterCdr<T>);
+pub(super) struct TopicPublisher<T: Serialize>(DataWriterCdr<T>);
 
-impl<T: Serialize> Mouth<T> {
+impl<T: Serialize> TopicPublisher<T> {
     /// Publishes a message.
     ///
     /// # Errors
     /// It could not be sent.
-    pub(super) fn say(&self, message: T) -> Result<(), String> {
+    pub(super) fn publish_message(&self, message: T) -> Result<(), String> {
         self.0
             .write(message, None)
             .map_err(|e| format!("a message was not sent: {e}"))
@@ -297,24 +297,24 @@ impl<T: Serialize> Mouth<T> {
 }
 
 /// Client of a service.
-pub(super) struct Requests<T: Serialize> {
+pub(super) struct ServiceClient<T: Serialize> {
     writer: DataWriterCdr<Framed<T>>,
     /// Discovered servers.
-    found: BTreeSet<GUID>,
+    servers: BTreeSet<GUID>,
     /// Header of the last request to a server on Cyclone DDS.
     last: Header,
 }
 
-impl<T: Serialize> Requests<T> {
+impl<T: Serialize> ServiceClient<T> {
     /// Sends a request, and returns its identity.
     ///
     /// # Errors
     /// It could not be sent.
-    pub(super) fn say(&mut self, request: T) -> Result<Asker, String> {
+    pub(super) fn send(&mut self, request: T) -> Result<RequestId, String> {
         let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
         // The formats are incompatible. If servers of both kinds exist, the request is for those on
         // Fast DDS.
-        let (header, framed) = if self.found.iter().all(is_cyclone) {
+        let (header, framed) = if self.servers.iter().all(is_cyclone) {
             self.last.1 += 1;
             (Some(self.last), Framed::Headed(self.last, request))
         } else {
@@ -322,14 +322,14 @@ impl<T: Serialize> Requests<T> {
         };
         let written = self.writer.write_with_options(framed, options.build());
         written
-            .map(|identity| Asker { identity, header })
+            .map(|identity| RequestId { identity, header })
             .map_err(|e| format!("a request was not sent: {e}"))
     }
 
     /// Returns `true` if the service has a server. To be called a few times a second.
     pub(super) fn is_served(&mut self) -> bool {
-        note_readers(&self.writer, &mut self.found);
-        !self.found.is_empty()
+        note_readers(&self.writer, &mut self.servers);
+        !self.servers.is_empty()
     }
 }
 
@@ -350,7 +350,7 @@ fn note_readers<T: Serialize>(writer: &DataWriterCdr<T>, found: &mut BTreeSet<GU
 }
 
 /// Source of messages.
-trait Ear: Send {
+trait MessageSource: Send {
     fn register(&mut self, registry: &Registry, token: Token) -> io::Result<()>;
     /// Forwards all pending messages. Returns `false` if the receiver was dropped.
     fn forward(&self, inputs: &Sender<Input>) -> bool;
@@ -364,7 +364,7 @@ enum Framed<T> {
     Headed(Header, T),
 }
 
-struct Listening<T, F> {
+struct TopicReader<T, F> {
     reader: SimpleDataReader<Raw, RawAdapter>,
     /// `true` if messages are requests or answers.
     is_service: bool,
@@ -372,7 +372,7 @@ struct Listening<T, F> {
     message: PhantomData<fn() -> T>,
 }
 
-impl<T: DeserializeOwned + 'static, F> Listening<T, F> {
+impl<T: DeserializeOwned + 'static, F> TopicReader<T, F> {
     /// Decodes the header, if any, and the message.
     fn read(&self, raw: &Raw, writer: GUID) -> Result<(Option<Header>, T), String> {
         let wrong = |e: rustdds::cdr_encoding::Error| e.to_string();
@@ -390,10 +390,10 @@ fn is_cyclone(guid: &GUID) -> bool {
     guid.to_bytes().starts_with(&[0x01, 0x10])
 }
 
-impl<T, F> Ear for Listening<T, F>
+impl<T, F> MessageSource for TopicReader<T, F>
 where
     T: DeserializeOwned + Send + 'static,
-    F: Fn(Asker, T) -> Input + Send,
+    F: Fn(RequestId, T) -> Input + Send,
 {
     fn register(&mut self, registry: &Registry, token: Token) -> io::Result<()> {
         Source::register(&mut self.reader, registry, token, Interest::READABLE)
@@ -415,12 +415,14 @@ where
                         identity.sequence_number = own.sequence_number;
                     }
                     match self.read(&sample.into_value(), own.writer_guid) {
-                        Ok((header, message)) => (self.input)(Asker { identity, header }, message),
-                        Err(why) => Input::Trouble(format!("a message was not understood: {why}")),
+                        Ok((header, message)) => {
+                            (self.input)(RequestId { identity, header }, message)
+                        }
+                        Err(why) => Input::Warning(format!("a message was not understood: {why}")),
                     }
                 }
                 Ok(None) => return true,
-                Err(error) => Input::Trouble(format!("a message was not understood: {error}")),
+                Err(error) => Input::Warning(format!("a message was not understood: {error}")),
             };
             if inputs.send(input).is_err() {
                 return false;

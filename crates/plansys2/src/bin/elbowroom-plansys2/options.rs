@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_used_is_refused() {
+    fn invalid_options_are_refused() {
         for words in [
             ["--within", "-1"],
             ["--within", "NaN"],
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn the_network_can_be_given_behind_serve() {
+    fn network_options_are_accepted_after_serve() {
         let words = [
             "elbowroom-plansys2",
             "serve",

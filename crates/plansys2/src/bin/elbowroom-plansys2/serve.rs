@@ -18,27 +18,27 @@ use elbowroom_plansys2::interface::{
 };
 use elbowroom_plansys2::message::Stamp;
 use elbowroom_plansys2::{
-    Command, Effect, Goals, Hub, Lifecycle, Progress, Ticket, World, plan_text,
+    ActionHandle, Command, Effect, Goals, Hub, Lifecycle, Progress, World, plan_text,
 };
 
 use super::command::{Planned, Running};
 use super::expert::Expert;
-use super::network::Asker;
+use super::network::RequestId;
 use super::options::{ServeSettings, Settings};
-use super::services::{Asked, EXECUTOR, NODES, Part, Services};
+use super::services::{EXECUTOR, NODES, Part, ServiceRequest, Services};
 use super::session::now;
 use super::topics::Topics;
-use super::{Input, remark};
+use super::{Input, warn};
 use order::Order;
 
 /// Interval at which the hub checks for lost performers.
 const TICK: Duration = Duration::from_millis(200);
 /// Maximum interval between two reports of the progress of a plan.
-const TELL_EVERY: Duration = Duration::from_secs(1);
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 /// Time limit of a run for its shutdown.
-const FAREWELL: Duration = Duration::from_secs(8);
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(8);
 /// Maximum delay of the result of a run until the problem expert has its last changes.
-const TOLD_WITHIN: Duration = Duration::from_secs(2);
+const FLUSH_TIMEOUT: Duration = Duration::from_secs(2);
 /// Number of low bits of a ticket that count within a run; the bits above hold the number of the
 /// run. The hub may still wait for a cancelled action of an earlier run.
 const RUN_BITS: u32 = 32;
@@ -53,7 +53,7 @@ struct Execution {
     plan: Plan,
     progress: Progress,
     answers: Option<UnixStream>,
-    told: Option<Instant>,
+    last_report: Option<Instant>,
     order: Order,
     /// `true` if the run has closed its connection.
     is_silent: bool,
@@ -62,14 +62,14 @@ struct Execution {
 }
 
 /// Connections of the server.
-pub(super) struct Sides {
+pub(super) struct Connections {
     pub(super) topics: Topics,
     pub(super) services: Services,
     pub(super) expert: Option<Expert>,
 }
 
 /// Server of planning and execution requests.
-pub(super) struct Serving {
+pub(super) struct Server {
     settings: ServeSettings,
     speed: f64,
     topics: Topics,
@@ -78,7 +78,7 @@ pub(super) struct Serving {
     inputs: Sender<Input>,
     hub: Hub,
     nodes: [Lifecycle; NODES.len()],
-    goals: Goals<Asker>,
+    goals: Goals<RequestId>,
     /// Domain and problem of the last plan.
     texts: Option<PlanRequest>,
     planned: Option<Planned>,
@@ -90,14 +90,14 @@ pub(super) struct Serving {
     zero: Instant,
 }
 
-impl Serving {
+impl Server {
     pub(super) fn new(
         settings: &Settings,
         serving: ServeSettings,
-        sides: Sides,
+        sides: Connections,
         inputs: Sender<Input>,
     ) -> Self {
-        let Sides {
+        let Connections {
             topics,
             services,
             expert,
@@ -124,7 +124,7 @@ impl Serving {
 
     /// Serves until the user asks the program to end.
     pub(super) fn run(mut self, received: &Receiver<Input>) {
-        remark("serves planner/get_plan and execute_plan");
+        warn("serves planner/get_plan and execute_plan");
         let mut leaves: Option<Duration> = None;
         loop {
             let due = self
@@ -133,17 +133,17 @@ impl Serving {
                 .and_then(|it| it.world.due_in(self.now()));
             // The sender is kept, so the only possible error is a time-out.
             if let Ok(input) = received.recv_timeout(due.map_or(TICK, |it| it.min(TICK))) {
-                if matches!(input, Input::End) {
+                if matches!(input, Input::Stop) {
                     leaves.get_or_insert(self.now());
                     self.interrupt();
                 } else {
-                    self.take(input);
+                    self.handle_input(input);
                 }
             }
             self.hub.tick(self.now());
-            told(self.services.flush());
+            warn_on_error(self.services.flush());
             self.settle();
-            let patience = leaves.map(|at| self.now().saturating_sub(at) >= FAREWELL);
+            let patience = leaves.map(|at| self.now().saturating_sub(at) >= SHUTDOWN_TIMEOUT);
             if patience.is_some_and(|is_over| is_over || self.execution.is_none()) {
                 // Cancel messages are delivered and planners killed before the program ends.
                 self.is_over.store(true, Ordering::Relaxed);
@@ -153,24 +153,24 @@ impl Serving {
         }
     }
 
-    fn take(&mut self, input: Input) {
+    fn handle_input(&mut self, input: Input) {
         let now = self.now();
         match input {
             Input::Hub(message) => self.hub.message(&message, now),
             Input::Status(status) => self.hub.status(&status, now),
-            Input::Trouble(text) => remark(&text),
-            Input::Line(line) => self.hear(&line, now),
-            Input::Talks(stream) => {
+            Input::Warning(text) => warn(&text),
+            Input::Line(line) => self.handle_line(&line, now),
+            Input::Connected(stream) => {
                 if let Some(execution) = &mut self.execution {
                     execution.answers = Some(stream);
                 }
             }
-            Input::Asked(asked) => self.answer(*asked),
+            Input::ServiceRequest(asked) => self.answer(*asked),
             Input::Planned(who, texts, planned) => self.has_planned(who, texts, planned),
             Input::Validated(who, outcome) => {
                 self.planning -= 1;
                 let (success, error_info) = (outcome.is_ok(), outcome.err().unwrap_or_default());
-                told(self.services.validate.answer(
+                warn_on_error(self.services.validate.answer(
                     who,
                     ValidateResponse {
                         success,
@@ -178,11 +178,11 @@ impl Serving {
                     },
                 ));
             }
-            Input::Over(code) => self.over(code),
+            Input::RunEnded(code) => self.handle_run_end(code),
             Input::Ordered(number, order) => self.ordered(number, order),
             Input::Expert(heard) => {
                 if let Some(expert) = &mut self.expert {
-                    expert.hear(heard);
+                    expert.handle(heard);
                 }
             }
             Input::Closed => {
@@ -190,18 +190,18 @@ impl Serving {
                     execution.is_silent = true;
                 }
             }
-            Input::End => {}
+            Input::Stop => {}
         }
     }
 
     /// Takes a line of the run.
-    fn hear(&mut self, line: &str, now: Duration) {
+    fn handle_line(&mut self, line: &str, now: Duration) {
         let Some(execution) = &mut self.execution else {
             return;
         };
         let mut said = Vec::new();
-        let command = execution.world.hear(line, now, &mut said);
-        say(execution, &said);
+        let command = execution.world.handle_line(line, now, &mut said);
+        send_lines(execution, &said);
         match command {
             Ok(Some(Command::Begin(mut action))) => {
                 execution.progress.begin(&action);
@@ -213,32 +213,32 @@ impl Serving {
             }
             Ok(Some(Command::Believe { facts, values })) => {
                 if let Some(expert) = &mut self.expert {
-                    expert.believe(&facts, &values);
+                    expert.set_beliefs(&facts, &values);
                 }
             }
             Ok(Some(Command::Stop) | None) => {}
-            Err(error) => remark(&format!("not understood: {line}: {error}")),
+            Err(error) => warn(&format!("not understood: {line}: {error}")),
         }
     }
 
-    fn answer(&mut self, asked: Asked) {
+    fn answer(&mut self, asked: ServiceRequest) {
         let sent = match asked {
-            Asked::Plan(who, texts) => return self.plan(who, texts),
-            Asked::Executed(part, who) => {
+            ServiceRequest::Plan(who, texts) => return self.plan(who, texts),
+            ServiceRequest::Executed(part, who) => {
                 let response = self.executed(part);
                 match part {
                     Part::Whole => self.services.executed.answer(who, response),
                     Part::Rest => self.services.rest.answer(who, response),
                 }
             }
-            Asked::Order(who) => return self.tell_order(who),
-            Asked::Validate(who, request) => return self.validate(who, request.domain),
-            Asked::Goal(who, request) => {
+            ServiceRequest::Order(who) => return self.send_order(who),
+            ServiceRequest::Validate(who, request) => return self.validate(who, request.domain),
+            ServiceRequest::Goal(who, request) => {
                 let stamp = stamp();
                 let accepted = match self.begin(&request, stamp) {
                     Ok(()) => true,
                     Err(why) => {
-                        remark(&format!("a plan is not executed: {why}"));
+                        warn(&format!("a plan is not executed: {why}"));
                         false
                     }
                 };
@@ -246,25 +246,35 @@ impl Serving {
                     .services
                     .goal
                     .answer(who, GoalResponse { accepted, stamp });
-                sent.and_then(|()| self.services.statuses.say(self.goals.statuses()))
+                sent.and_then(|()| {
+                    self.services
+                        .statuses
+                        .publish_message(self.goals.statuses())
+                })
             }
-            Asked::Cancel(who, request) => {
+            ServiceRequest::Cancel(who, request) => {
                 let (is_given_up, response) = self.goals.cancel(&request);
                 if is_given_up {
                     self.interrupt();
                 }
                 let sent = self.services.cancel.answer(who, response);
-                sent.and_then(|()| self.services.statuses.say(self.goals.statuses()))
+                sent.and_then(|()| {
+                    self.services
+                        .statuses
+                        .publish_message(self.goals.statuses())
+                })
             }
-            Asked::Result(who, request) => match self.goals.ask(request.goal_id, who) {
-                Some((who, result)) => self.services.result.answer(who, result),
-                None => Ok(()),
-            },
-            Asked::State(node, who) => {
+            ServiceRequest::Result(who, request) => {
+                match self.goals.request_result(request.goal_id, who) {
+                    Some((who, result)) => self.services.result.answer(who, result),
+                    None => Ok(()),
+                }
+            }
+            ServiceRequest::State(node, who) => {
                 let current_state = self.nodes[node].state();
                 self.services.state[node].answer(who, StateResponse { current_state })
             }
-            Asked::Change(node, who, request) => {
+            ServiceRequest::Change(node, who, request) => {
                 let success = self.nodes[node].change(&request.transition);
                 if !self.nodes[EXECUTOR].serves() {
                     self.interrupt();
@@ -272,7 +282,7 @@ impl Serving {
                 self.services.change[node].answer(who, Success { success })
             }
         };
-        told(sent);
+        warn_on_error(sent);
     }
 
     /// Returns the plan that is being executed, or its remaining steps.
@@ -288,7 +298,7 @@ impl Serving {
             success: true,
             plan: match part {
                 Part::Whole => execution.plan.clone(),
-                Part::Rest => execution.progress.rest_of(&execution.plan),
+                Part::Rest => execution.progress.remaining_plan(&execution.plan),
             },
             error_info: String::new(),
         }
@@ -321,12 +331,16 @@ impl Serving {
             run.interrupt();
             return Err("there was a goal of that number".to_owned());
         }
-        told(self.services.executing.say(request.plan.clone()));
+        warn_on_error(
+            self.services
+                .executing
+                .publish_message(request.plan.clone()),
+        );
         self.runs += 1;
         let mut world = World::new("plansys2", self.speed);
         if let Some(expert) = &mut self.expert {
             expert.begin(&problem);
-            world = world.following();
+            world = world.with_beliefs();
         }
         self.execution = Some(Execution {
             goal: request.goal_id,
@@ -336,7 +350,7 @@ impl Serving {
             plan: request.plan.clone(),
             progress: Progress::new(&request.plan),
             answers: None,
-            told: None,
+            last_report: None,
             order: Order::default(),
             is_silent: false,
             ended: None,
@@ -353,7 +367,7 @@ impl Serving {
         }
     }
 
-    fn over(&mut self, code: Option<i32>) {
+    fn handle_run_end(&mut self, code: Option<i32>) {
         let Some(execution) = &mut self.execution else {
             return;
         };
@@ -365,12 +379,12 @@ impl Serving {
     }
 
     /// Reports the result of a run that has ended, once the problem expert has all of its changes.
-    fn conclude(&mut self) {
+    fn finish_execution(&mut self) {
         let is_told = self.expert.as_ref().is_none_or(Expert::is_idle);
         let is_due = |it: &mut Execution| {
             it.ended.is_some_and(|(since, _)| {
                 (it.is_silent && is_told)
-                    || super::session::now().saturating_duration_since(since) >= TOLD_WITHIN
+                    || super::session::now().saturating_duration_since(since) >= FLUSH_TIMEOUT
             })
         };
         let Some(execution) = self.execution.take_if(is_due) else {
@@ -379,15 +393,19 @@ impl Serving {
         if let Some(expert) = &mut self.expert {
             expert.end();
         }
-        for who in execution.order.asked {
+        for who in execution.order.waiting {
             self.refuse_order(who, "the run is over");
         }
         let is_reached = execution.ended.is_some_and(|(_, code)| code == Some(0));
         let infos = execution.progress.infos().to_vec();
         for (who, result) in self.goals.end(is_reached, infos) {
-            told(self.services.result.answer(who, result));
+            warn_on_error(self.services.result.answer(who, result));
         }
-        told(self.services.statuses.say(self.goals.statuses()));
+        warn_on_error(
+            self.services
+                .statuses
+                .publish_message(self.goals.statuses()),
+        );
     }
 
     /// Applies the effects of the hub, and answers the run if an answer is due.
@@ -395,44 +413,44 @@ impl Serving {
         let now = self.now();
         for effect in self.hub.effects() {
             match effect {
-                Effect::Send(message) => told(self.topics.send(message)),
-                Effect::Tell(ticket, what) => {
+                Effect::Send(message) => warn_on_error(self.topics.send(message)),
+                Effect::Report(ticket, what) => {
                     // Results for earlier runs are dropped.
-                    let (number, ticket): (u64, Ticket) =
+                    let (number, ticket): (u64, ActionHandle) =
                         (ticket >> RUN_BITS, ticket & ((1 << RUN_BITS) - 1));
                     if let Some(execution) =
                         self.execution.as_mut().filter(|it| it.number == number)
                     {
-                        execution.world.tell(ticket, &what, now);
-                        execution.progress.tell(ticket, &what, stamp());
-                        execution.told = None;
+                        execution.world.report(ticket, &what, now);
+                        execution.progress.update(ticket, &what, stamp());
+                        execution.last_report = None;
                     }
                 }
-                Effect::Remark(text) => remark(&text),
+                Effect::Remark(text) => warn(&text),
             }
         }
         let seen = self.expert.as_mut().map(|it| it.settle(now));
-        self.conclude();
+        self.finish_execution();
         let Some(execution) = &mut self.execution else {
             return;
         };
         for seen in seen.iter().flatten() {
-            execution.world.see(seen, now);
+            execution.world.report_change(seen, now);
         }
         let lines = execution.world.answer(now);
-        say(execution, &lines);
+        send_lines(execution, &lines);
         let clock = super::session::now();
         if execution
-            .told
-            .is_none_or(|at| clock.saturating_duration_since(at) >= TELL_EVERY)
+            .last_report
+            .is_none_or(|at| clock.saturating_duration_since(at) >= REPORT_INTERVAL)
         {
-            execution.told = Some(clock);
+            execution.last_report = Some(clock);
             let action_execution_status = execution.progress.infos().to_vec();
             for info in &action_execution_status {
-                told(self.services.infos.say(info.clone()));
+                warn_on_error(self.services.infos.publish_message(info.clone()));
             }
             let goal_id = execution.goal;
-            told(self.services.feedback.say(Feedback {
+            warn_on_error(self.services.feedback.publish_message(Feedback {
                 goal_id,
                 action_execution_status,
             }));
@@ -445,7 +463,7 @@ impl Serving {
 }
 
 /// Writes lines to the run.
-fn say(execution: &mut Execution, lines: &[String]) {
+fn send_lines(execution: &mut Execution, lines: &[String]) {
     if let Some(stream) = &mut execution.answers {
         for line in lines {
             // A closed connection is reported by its own event.
@@ -454,9 +472,9 @@ fn say(execution: &mut Execution, lines: &[String]) {
     }
 }
 
-fn told(sent: Result<(), String>) {
+fn warn_on_error(sent: Result<(), String>) {
     if let Err(why) = sent {
-        remark(&why);
+        warn(&why);
     }
 }
 

@@ -8,7 +8,7 @@ use elbowroom_plansys2::interface::{
 use elbowroom_plansys2::knowledge::SubGoalsResponse;
 
 use super::Input;
-use super::network::{Answers, Asker, Mouth, Network, latched, reliable};
+use super::network::{Network, RequestId, ServiceReplies, TopicPublisher, latched, reliable};
 
 /// Nodes that this program replaces.
 pub(super) const NODES: [&str; 2] = ["planner", "executor"];
@@ -17,19 +17,19 @@ pub(super) const PLANNER: usize = 0;
 pub(super) const EXECUTOR: usize = 1;
 
 /// Request of a client.
-pub(super) enum Asked {
-    Plan(Asker, PlanRequest),
+pub(super) enum ServiceRequest {
+    Plan(RequestId, PlanRequest),
     /// The executed plan, or its remaining steps.
-    Executed(Part, Asker),
+    Executed(Part, RequestId),
     /// The subgoals, in the order of their times.
-    Order(Asker),
-    Validate(Asker, ValidateRequest),
-    Goal(Asker, GoalRequest),
-    Cancel(Asker, CancelRequest),
-    Result(Asker, ResultRequest),
+    Order(RequestId),
+    Validate(RequestId, ValidateRequest),
+    Goal(RequestId, GoalRequest),
+    Cancel(RequestId, CancelRequest),
+    Result(RequestId, ResultRequest),
     /// The state of a node, by its position in [`NODES`].
-    State(usize, Asker),
-    Change(usize, Asker, ChangeRequest),
+    State(usize, RequestId),
+    Change(usize, RequestId, ChangeRequest),
 }
 
 /// Requested part of the executed plan.
@@ -41,21 +41,21 @@ pub(super) enum Part {
 
 /// Senders of answers and messages.
 pub(super) struct Services {
-    pub(super) plan: Answers<PlanResponse>,
-    pub(super) executed: Answers<PlanResponse>,
-    pub(super) rest: Answers<PlanResponse>,
-    pub(super) order: Answers<SubGoalsResponse>,
-    pub(super) validate: Answers<ValidateResponse>,
-    pub(super) goal: Answers<GoalResponse>,
-    pub(super) cancel: Answers<CancelResponse>,
-    pub(super) result: Answers<ResultResponse>,
-    pub(super) feedback: Mouth<Feedback>,
-    pub(super) statuses: Mouth<GoalStatuses>,
+    pub(super) plan: ServiceReplies<PlanResponse>,
+    pub(super) executed: ServiceReplies<PlanResponse>,
+    pub(super) rest: ServiceReplies<PlanResponse>,
+    pub(super) order: ServiceReplies<SubGoalsResponse>,
+    pub(super) validate: ServiceReplies<ValidateResponse>,
+    pub(super) goal: ServiceReplies<GoalResponse>,
+    pub(super) cancel: ServiceReplies<CancelResponse>,
+    pub(super) result: ServiceReplies<ResultResponse>,
+    pub(super) feedback: TopicPublisher<Feedback>,
+    pub(super) statuses: TopicPublisher<GoalStatuses>,
     /// For monitoring tools: the status of each action, and the executed plan.
-    pub(super) infos: Mouth<ActionExecutionInfo>,
-    pub(super) executing: Mouth<Plan>,
-    pub(super) state: Vec<Answers<StateResponse>>,
-    pub(super) change: Vec<Answers<Success>>,
+    pub(super) infos: TopicPublisher<ActionExecutionInfo>,
+    pub(super) executing: TopicPublisher<Plan>,
+    pub(super) state: Vec<ServiceReplies<StateResponse>>,
+    pub(super) change: Vec<ServiceReplies<Success>>,
 }
 
 impl Services {
@@ -64,18 +64,18 @@ impl Services {
     /// # Errors
     /// DDS refuses; the text says what.
     pub(super) fn offer(network: &mut Network) -> Result<Self, String> {
-        let ask = |asked| Input::Asked(Box::new(asked));
+        let ask = |asked| Input::ServiceRequest(Box::new(asked));
         let (mut state, mut change) = (Vec::new(), Vec::new());
         for (number, node) in NODES.iter().enumerate() {
             let kind = "lifecycle_msgs::srv::dds_::GetState";
             let name = format!("{node}/get_state");
             state.push(network.serve(&name, kind, move |asker, _: Empty| {
-                ask(Asked::State(number, asker))
+                ask(ServiceRequest::State(number, asker))
             })?);
             let kind = "lifecycle_msgs::srv::dds_::ChangeState";
             let name = format!("{node}/change_state");
             change.push(network.serve(&name, kind, move |asker, it| {
-                ask(Asked::Change(number, asker, it))
+                ask(ServiceRequest::Change(number, asker, it))
             })?);
         }
         let action = "plansys2_msgs::action::dds_::ExecutePlan";
@@ -85,40 +85,40 @@ impl Services {
             plan: network.serve(
                 "planner/get_plan",
                 "plansys2_msgs::srv::dds_::GetPlan",
-                move |asker, it| ask(Asked::Plan(asker, it)),
+                move |asker, it| ask(ServiceRequest::Plan(asker, it)),
             )?,
             executed: network.serve(
                 "executor/get_plan",
                 "plansys2_msgs::srv::dds_::GetPlan",
-                move |asker, _: PlanRequest| ask(Asked::Executed(Part::Whole, asker)),
+                move |asker, _: PlanRequest| ask(ServiceRequest::Executed(Part::Whole, asker)),
             )?,
             rest: network.serve(
                 "executor/get_remaining_plan",
                 "plansys2_msgs::srv::dds_::GetPlan",
-                move |asker, _: PlanRequest| ask(Asked::Executed(Part::Rest, asker)),
+                move |asker, _: PlanRequest| ask(ServiceRequest::Executed(Part::Rest, asker)),
             )?,
             order: network.serve(
                 "executor/get_ordered_sub_goals",
                 "plansys2_msgs::srv::dds_::GetOrderedSubGoals",
-                move |asker, _: Empty| ask(Asked::Order(asker)),
+                move |asker, _: Empty| ask(ServiceRequest::Order(asker)),
             )?,
             validate: network.serve(
                 "planner/validate_domain",
                 "plansys2_msgs::srv::dds_::ValidateDomain",
-                move |asker, it| ask(Asked::Validate(asker, it)),
+                move |asker, it| ask(ServiceRequest::Validate(asker, it)),
             )?,
             goal: network.serve(
                 &own("send_goal"),
                 &format!("{action}_SendGoal"),
-                move |asker, it| ask(Asked::Goal(asker, it)),
+                move |asker, it| ask(ServiceRequest::Goal(asker, it)),
             )?,
             cancel: network.serve(&own("cancel_goal"), cancels, move |asker, it| {
-                ask(Asked::Cancel(asker, it))
+                ask(ServiceRequest::Cancel(asker, it))
             })?,
             result: network.serve(
                 &own("get_result"),
                 &format!("{action}_GetResult"),
-                move |asker, it| ask(Asked::Result(asker, it)),
+                move |asker, it| ask(ServiceRequest::Result(asker, it)),
             )?,
             feedback: network.publish(
                 &own("feedback"),
@@ -157,7 +157,7 @@ impl Services {
         self.goal.flush()?;
         self.cancel.flush()?;
         self.result.flush()?;
-        self.state.iter_mut().try_for_each(Answers::flush)?;
-        self.change.iter_mut().try_for_each(Answers::flush)
+        self.state.iter_mut().try_for_each(ServiceReplies::flush)?;
+        self.change.iter_mut().try_for_each(ServiceReplies::flush)
     }
 }

@@ -5,20 +5,20 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use elbowroom_plansys2::{Census, Command, Effect, Hub, World};
+use elbowroom_plansys2::{Command, Effect, Hub, PerformerDiscovery, World};
 use serde_json::Value;
 
-use super::expert::{Expert, Heard};
+use super::expert::{Expert, ExpertMessage};
 use super::options::Settings;
 use super::topics::Topics;
-use super::{Input, remark};
+use super::{Input, warn};
 
 /// Interval at which the hub checks for lost performers.
 const TICK: Duration = Duration::from_millis(200);
 /// Time for the delivery of cancel messages before the program ends.
-const FAREWELL: Duration = Duration::from_millis(300);
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(300);
 /// Time limit for writing the last changes to the problem expert. Elbowroom waits at most a second.
-const TOLD_WITHIN: Duration = Duration::from_millis(600);
+const FLUSH_TIMEOUT: Duration = Duration::from_millis(600);
 
 pub(super) struct Session {
     topics: Topics,
@@ -26,7 +26,7 @@ pub(super) struct Session {
     inputs: Receiver<Input>,
     hub: Hub,
     world: World,
-    census: Census,
+    census: PerformerDiscovery,
     zero: Instant,
 }
 
@@ -42,7 +42,7 @@ impl Session {
             // The text of the problem is unknown here, so the spelling of the problem expert is
             // used.
             expert.begin("");
-            world = world.following();
+            world = world.with_beliefs();
         }
         Self {
             topics,
@@ -50,7 +50,7 @@ impl Session {
             inputs,
             hub: Hub::new("elbowroom"),
             world,
-            census: Census::new(settings.needs.clone(), settings.within),
+            census: PerformerDiscovery::new(settings.needs.clone(), settings.within),
             zero: now(),
         }
     }
@@ -61,15 +61,15 @@ impl Session {
     /// A performer is missing; the text names it.
     pub(super) fn run(mut self) -> Result<(), String> {
         let said = self.wait_for_performers()?;
-        remark(&format!("performers: {}", self.hub.listed(self.now())));
-        if !said.into_iter().any(|input| self.take(input)) {
-            self.converse();
+        warn(&format!("performers: {}", self.hub.listed(self.now())));
+        if !said.into_iter().any(|input| self.handle_input(input)) {
+            self.run_loop();
         }
-        self.leave();
+        self.shut_down();
         Ok(())
     }
 
-    fn converse(&mut self) {
+    fn run_loop(&mut self) {
         loop {
             self.settle();
             let left = self.world.due_in(self.now());
@@ -78,7 +78,7 @@ impl Session {
                 .recv_timeout(left.map_or(TICK, |it| it.min(TICK)))
             {
                 Ok(input) => {
-                    if self.take(input) {
+                    if self.handle_input(input) {
                         return;
                     }
                 }
@@ -97,15 +97,15 @@ impl Session {
             match self.inputs.recv_timeout(TICK) {
                 Ok(Input::Status(status)) => self.hub.status(&status, self.now()),
                 Ok(Input::Hub(message)) => self.hub.message(&message, self.now()),
-                Ok(Input::Trouble(text)) => remark(&text),
+                Ok(Input::Warning(text)) => warn(&text),
                 Ok(Input::Closed) => {
                     said.push(Input::Closed);
                     break;
                 }
-                Ok(Input::Expert(heard)) => self.hear(heard),
+                Ok(Input::Expert(heard)) => self.handle_expert_message(heard),
                 Ok(Input::Line(line)) => {
                     if let Some(actions) = actions_of(&line) {
-                        self.census.know(actions);
+                        self.census.set_domain_actions(actions);
                     }
                     said.push(Input::Line(line));
                 }
@@ -114,9 +114,9 @@ impl Session {
             }
             self.settle();
         }
-        let unattended = self.census.unattended(&self.hub, self.now());
+        let unattended = self.census.actions_without_performer(&self.hub, self.now());
         if !unattended.is_empty() {
-            remark(&format!(
+            warn(&format!(
                 "no performer of {} was heard: what a plan starts of it will fail",
                 unattended.join(", ")
             ));
@@ -125,40 +125,40 @@ impl Session {
     }
 
     /// Handles an input. Returns `true` if the run is over.
-    fn take(&mut self, input: Input) -> bool {
+    fn handle_input(&mut self, input: Input) -> bool {
         let now = self.now();
         match input {
             Input::Line(line) => {
                 let mut said = Vec::new();
-                let command = self.world.hear(&line, now, &mut said);
-                say(&said);
+                let command = self.world.handle_line(&line, now, &mut said);
+                print_lines(&said);
                 match command {
                     Ok(Some(Command::Begin(action))) => self.hub.begin(action, now),
                     Ok(Some(Command::Cancel(ticket))) => self.hub.cancel(ticket),
                     Ok(Some(Command::Believe { facts, values })) => {
                         if let Some(expert) = &mut self.expert {
-                            expert.believe(&facts, &values);
+                            expert.set_beliefs(&facts, &values);
                         }
                     }
                     Ok(Some(Command::Stop)) => return true,
                     Ok(None) => {}
-                    Err(error) => remark(&format!("not understood: {line}: {error}")),
+                    Err(error) => warn(&format!("not understood: {line}: {error}")),
                 }
             }
             Input::Closed => return true,
             Input::Hub(message) => self.hub.message(&message, now),
             Input::Status(status) => self.hub.status(&status, now),
-            Input::Expert(heard) => self.hear(heard),
-            Input::Trouble(text) => remark(&text),
+            Input::Expert(heard) => self.handle_expert_message(heard),
+            Input::Warning(text) => warn(&text),
             // The other inputs belong to `serve`.
             _ => {}
         }
         false
     }
 
-    fn hear(&mut self, heard: Heard) {
+    fn handle_expert_message(&mut self, heard: ExpertMessage) {
         if let Some(expert) = &mut self.expert {
-            expert.hear(heard);
+            expert.handle(heard);
         }
     }
 
@@ -169,21 +169,21 @@ impl Session {
             match effect {
                 Effect::Send(message) => {
                     if let Err(why) = self.topics.send(message) {
-                        remark(&why);
+                        warn(&why);
                     }
                 }
-                Effect::Tell(ticket, told) => self.world.tell(ticket, &told, now),
-                Effect::Remark(text) => remark(&text),
+                Effect::Report(ticket, told) => self.world.report(ticket, &told, now),
+                Effect::Remark(text) => warn(&text),
             }
         }
         for seen in self.expert.iter_mut().flat_map(|it| it.settle(now)) {
-            self.world.see(&seen, now);
+            self.world.report_change(&seen, now);
         }
-        say(&self.world.answer(now));
+        print_lines(&self.world.answer(now));
     }
 
     /// Cancels running actions, after the end of the run or the loss of Elbowroom.
-    fn leave(mut self) {
+    fn shut_down(mut self) {
         for ticket in self.world.running() {
             self.hub.cancel(ticket);
         }
@@ -194,14 +194,14 @@ impl Session {
         // The last changes of the run are written to the problem expert.
         let left = self.now();
         while self.expert.as_ref().is_some_and(|it| !it.is_idle())
-            && self.now().saturating_sub(left) < TOLD_WITHIN
+            && self.now().saturating_sub(left) < FLUSH_TIMEOUT
         {
-            if let Ok(Input::Expert(heard)) = self.inputs.recv_timeout(FAREWELL) {
-                self.hear(heard);
+            if let Ok(Input::Expert(heard)) = self.inputs.recv_timeout(SHUTDOWN_TIMEOUT) {
+                self.handle_expert_message(heard);
             }
             self.settle();
         }
-        thread::sleep(FAREWELL);
+        thread::sleep(SHUTDOWN_TIMEOUT);
     }
 
     fn now(&self) -> Duration {
@@ -219,7 +219,7 @@ pub(super) fn now() -> Instant {
 
 /// Writes lines to Elbowroom. Errors are ignored, because the end of the input reports a closed
 /// connection.
-fn say(lines: &[String]) {
+fn print_lines(lines: &[String]) {
     let mut out = io::stdout().lock();
     for line in lines {
         let _ = writeln!(out, "{line}");

@@ -3,11 +3,11 @@
 use elbowroom_plansys2::message::ActionExecution;
 
 use super::Input;
-use super::network::{Mouth, Network, reliable};
+use super::network::{Network, TopicPublisher, reliable};
 
 /// Publisher of messages to the performers. Their messages arrive as inputs.
 pub(super) struct Topics {
-    hub: Mouth<ActionExecution>,
+    hub: TopicPublisher<ActionExecution>,
 }
 
 impl Topics {
@@ -29,6 +29,6 @@ impl Topics {
     /// # Errors
     /// It could not be sent.
     pub(super) fn send(&self, message: ActionExecution) -> Result<(), String> {
-        self.hub.say(message)
+        self.hub.publish_message(message)
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use elbowroom_model::problem::{PredicateId, SchemaId};
 use toml::de::DeTable;
 
-use super::super::{PartialFlip, is_changed, names};
+use super::super::{PartialChange, is_changed, names};
 use super::Reader;
 
 impl Reader<'_> {
@@ -24,7 +24,7 @@ impl Reader<'_> {
             }
             if !is_mentioned && !is_changed(self.problem, id) {
                 // A fact that nothing changes, and that is not mentioned, never changes by itself.
-                let never = PartialFlip::NEVER;
+                let never = PartialChange::NEVER;
                 self.likelihoods.predicates.insert(id, never);
                 continue;
             }
@@ -40,7 +40,7 @@ impl Reader<'_> {
             // Stops at the first tuple that is not listed, so the time is proportional to the
             // length of the list.
             names::for_each_tuple(self.problem, &predicate.parameters, &mut |tuple| {
-                if self.likelihoods.flip_of(id, tuple).is_none() {
+                if self.likelihoods.spontaneous_change_of(id, tuple).is_none() {
                     missing = Some(self.problem.apply_name(&predicate.name, tuple));
                 }
                 missing.is_none()
@@ -65,7 +65,7 @@ impl Reader<'_> {
         section: &Range<usize>,
     ) {
         let affected = names::affected(self.problem, id);
-        if self.likelihoods.says_enough_of(id, &affected) {
+        if self.likelihoods.is_complete_for(id, &affected) {
             return;
         }
         let mut missing = None;

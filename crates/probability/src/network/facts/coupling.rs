@@ -3,8 +3,8 @@
 use elbowroom_model::ground::FactId;
 
 use super::super::cluster::Cluster;
-use super::super::outcome::{by_itself, later};
-use super::{Facts, MOST_COUPLED, Record};
+use super::super::outcome::{rate_kernel, spontaneous_kernel};
+use super::{Facts, MAX_COUPLED, Record};
 use crate::model::Model;
 
 impl Facts {
@@ -14,7 +14,7 @@ impl Facts {
         for &fact in facts {
             let is_coupled = self.records[fact].cluster.is_some();
             let is_open = is_coupled || {
-                let p = self.single(model, fact);
+                let p = self.independent_probability(model, fact);
                 p > 0.0 && p < 1.0
             };
             if is_open {
@@ -58,7 +58,7 @@ impl Facts {
             .iter()
             .map(|&slot| self.cluster(model, slot).facts.len());
         let count = in_clusters.sum::<usize>() + singles.len();
-        if count > MOST_COUPLED {
+        if count > MAX_COUPLED {
             return Err(count);
         }
         if let ([slot], []) = (slots.as_slice(), singles.as_slice()) {
@@ -73,7 +73,7 @@ impl Facts {
             self.set_cluster(slot, None);
         }
         for fact in singles {
-            let p = self.single(model, fact);
+            let p = self.independent_probability(model, fact);
             merged.extend(&[fact], &[1.0 - p, p]);
         }
         let slot = u32::try_from(self.clusters.len()).expect("few clusters");
@@ -147,7 +147,7 @@ impl Facts {
 
     /// Removes a fact from its cluster, for a fact whose value no longer depends on its past. Its
     /// probability is `p` from the layer `next` on.
-    pub(super) fn forget(&mut self, model: &Model, fact: usize, p: f64, next: u32) {
+    pub(super) fn decouple(&mut self, model: &Model, fact: usize, p: f64, next: u32) {
         if let Some(slot) = self.records[fact].cluster {
             self.cluster(model, slot);
         }
@@ -166,8 +166,8 @@ impl Facts {
                     cluster.transform(
                         place,
                         match transition {
-                            None => by_itself(model.flips[fact]),
-                            Some(seconds) => later(model.rates[fact], *seconds),
+                            None => spontaneous_kernel(model.spontaneous_changes[fact]),
+                            Some(seconds) => rate_kernel(model.rates[fact], *seconds),
                         },
                     );
                 }

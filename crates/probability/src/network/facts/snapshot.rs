@@ -30,7 +30,7 @@ impl Facts {
             }
             match self.records[fact].cluster {
                 None => {
-                    let p = self.single(model, fact);
+                    let p = self.independent_probability(model, fact);
                     snapshot.single.push((fact, p));
                 }
                 Some(slot) if !slots.contains(&slot) => slots.push(slot),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom_execution::run::KnownStart;
-use elbowroom_execution::{Ending, Guards, Measured, Ticket, UnderwayParts};
+use elbowroom_execution::{ActionHandle, Ending, Guards, Measured, RunningActionParts};
 use elbowroom_model::Task;
 use elbowroom_model::ground::Action;
 use elbowroom_num::Rational;
@@ -71,7 +71,7 @@ pub struct StartLine {
 /// A running action.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct UnderWayLine {
+pub struct RunningActionLine {
     /// Ticket of its start.
     pub ticket: u64,
     /// The start time.
@@ -97,12 +97,12 @@ pub(super) fn optional(number: Option<&Rational>) -> Option<Exact> {
     number.map(exact)
 }
 
-fn inexact(number: Option<&Exact>) -> Option<Rational> {
+fn to_rational(number: Option<&Exact>) -> Option<Rational> {
     number.map(|it| it.0.clone())
 }
 
 /// Returns the action of a start.
-pub(super) fn action_of(starts: &[KnownStart], ticket: Ticket) -> Option<&Arc<Action>> {
+pub(super) fn action_of(starts: &[KnownStart], ticket: ActionHandle) -> Option<&Arc<Action>> {
     let of = starts.iter().find(|it| it.ticket == ticket);
     of.map(|it| &it.action)
 }
@@ -123,7 +123,7 @@ impl StartLine {
             ticket: start.ticket.0,
             action: start.action.name.clone(),
             duration: optional(start.planned.as_ref()),
-            ordered: exact(&start.ordered),
+            ordered: exact(&start.commanded),
             started: optional(start.started.as_ref()),
             heard: optional(start.progress.as_ref().map(|(time, _)| time)),
             completion: optional(start.progress.as_ref().map(|(_, done)| done)),
@@ -160,18 +160,18 @@ impl StartLine {
             Some(other) => return Err(format!("nothing ends `{other}`")),
         };
         Ok(KnownStart {
-            ticket: Ticket(self.ticket),
+            ticket: ActionHandle(self.ticket),
             action: Arc::new(instantiate(&self.action, task)?),
-            planned: inexact(self.duration.as_ref()),
-            ordered: self.ordered.0.clone(),
-            started: inexact(self.started.as_ref()),
-            progress: inexact(self.heard.as_ref()).zip(inexact(self.completion.as_ref())),
-            ended: inexact(self.ended.as_ref()).zip(ending),
-            cancelled: inexact(self.cancelled.as_ref()),
-            timed_out: inexact(self.timed_out.as_ref()),
+            planned: to_rational(self.duration.as_ref()),
+            commanded: self.ordered.0.clone(),
+            started: to_rational(self.started.as_ref()),
+            progress: to_rational(self.heard.as_ref()).zip(to_rational(self.completion.as_ref())),
+            ended: to_rational(self.ended.as_ref()).zip(ending),
+            cancelled: to_rational(self.cancelled.as_ref()),
+            timed_out: to_rational(self.timed_out.as_ref()),
             is_in_doubt: self.in_doubt,
-            warned: inexact(self.warned.as_ref()),
-            warned_timeout: inexact(self.warned_timeout.as_ref()),
+            warned: to_rational(self.warned.as_ref()),
+            warned_timeout: to_rational(self.warned_timeout.as_ref()),
             measured: [
                 measured(&self.measured_at_start)?,
                 measured(&self.measured_at_end)?,
@@ -185,8 +185,8 @@ impl StartLine {
     }
 }
 
-impl UnderWayLine {
-    pub(super) fn of(ticket: Ticket, parts: &UnderwayParts) -> Self {
+impl RunningActionLine {
+    pub(super) fn of(ticket: ActionHandle, parts: &RunningActionParts) -> Self {
         Self {
             ticket: ticket.0,
             start: exact(&parts.start),
@@ -197,8 +197,8 @@ impl UnderWayLine {
         }
     }
 
-    pub(super) fn parts(&self) -> (Ticket, UnderwayParts) {
-        let parts = UnderwayParts {
+    pub(super) fn parts(&self) -> (ActionHandle, RunningActionParts) {
+        let parts = RunningActionParts {
             start: self.start.0.clone(),
             planned: self.duration.0.clone(),
             guards: Guards {
@@ -207,6 +207,6 @@ impl UnderWayLine {
             },
             broken: self.broken.iter().copied().collect(),
         };
-        (Ticket(self.ticket), parts)
+        (ActionHandle(self.ticket), parts)
     }
 }

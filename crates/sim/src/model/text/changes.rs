@@ -7,7 +7,7 @@ use super::Amount;
 
 /// Returns the reason if no matching action changes a matching fluent at its start or end; `None`
 /// if one does. Only names are compared, because objects are unknown before grounding.
-pub(super) fn is_in_vain(amount: &Amount, problem: &Problem) -> Option<String> {
+pub(super) fn ineffective_amount_reason(amount: &Amount, problem: &Problem) -> Option<String> {
     let is_meant = |function: FunctionId| {
         let function = &problem.functions[function.index()];
         amount.fluent.may_match(&function.name)

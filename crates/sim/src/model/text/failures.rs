@@ -6,41 +6,45 @@ use toml::Spanned;
 
 use super::section::{OutcomeSection, Section};
 use super::{Read, Reader};
-use crate::model::outcome::Word;
-use crate::model::{Becoming, Failing, Failure, Outcome, OutcomeChange, Template};
-use crate::pattern::{ActionPattern, Names};
+use crate::model::outcome::TemplateArgument;
+use crate::model::{FactOutcome, FailureRule, FailureTime, Outcome, OutcomeChange, Template};
+use crate::pattern::{ActionPattern, NameKind};
 
 /// Operation of a number on a fluent.
 #[derive(Clone, Copy)]
-enum How {
+enum FluentOperation {
     Assign,
     Increase,
     Decrease,
 }
 
 impl Reader<'_> {
-    pub(super) fn failing(&self, section: &Spanned<Section>) -> Read<Failing> {
+    pub(super) fn failing(&self, section: &Spanned<Section>) -> Read<FailureRule> {
         let given = section.get_ref();
         let own = ["action", "probability", "when", "undone", "outcome"];
-        if let Some((span, message)) = given.excess("[[failure]]", &own, false) {
-            return Err(self.wrong(&span, message));
+        if let Some((span, message)) = given.first_superfluous_key("[[failure]]", &own, false) {
+            return Err(self.error_at(&span, message));
         }
         let probability = given.probability.as_ref();
-        let probability =
-            probability.ok_or_else(|| self.wrong(&section.span(), "`probability` is missing"))?;
+        let probability = probability
+            .ok_or_else(|| self.error_at(&section.span(), "`probability` is missing"))?;
         let when = match &given.when {
-            None => Failure::AtEnd,
+            None => FailureTime::AtEnd,
             Some(when) => match when.get_ref().as_str() {
-                "start" => Failure::AtStart,
-                "midway" => Failure::Midway,
-                "end" => Failure::AtEnd,
-                _ => return Err(self.wrong(&when.span(), "write \"start\", \"midway\" or \"end\"")),
+                "start" => FailureTime::AtStart,
+                "midway" => FailureTime::Midway,
+                "end" => FailureTime::AtEnd,
+                _ => {
+                    return Err(
+                        self.error_at(&when.span(), "write \"start\", \"midway\" or \"end\"")
+                    );
+                }
             },
         };
-        if let (Failure::AtStart, Some(undone)) = (when, &given.undone) {
+        if let (FailureTime::AtStart, Some(undone)) = (when, &given.undone) {
             let message =
                 "an action that does not start leaves nothing to undo; leave `undone` out";
-            return Err(self.wrong(&undone.span(), message));
+            return Err(self.error_at(&undone.span(), message));
         }
         let action = self.action(section)?;
         let mut outcomes = Vec::new();
@@ -55,11 +59,13 @@ impl Reader<'_> {
                      failures, so 1 is the most"
                 );
                 let at = outcome.get_ref().probability.as_ref();
-                return Err(self.wrong(&at.map_or_else(|| outcome.span(), Spanned::span), message));
+                return Err(
+                    self.error_at(&at.map_or_else(|| outcome.span(), Spanned::span), message)
+                );
             }
             outcomes.push(found);
         }
-        Ok(Failing {
+        Ok(FailureRule {
             probability: self.probability(probability)?,
             when,
             is_undone: given.undone.as_ref().is_some_and(|it| *it.get_ref()),
@@ -72,37 +78,40 @@ impl Reader<'_> {
         let given = section.get_ref();
         let probability = given.probability.as_ref().ok_or_else(|| {
             let message = "`probability` is missing: how likely this is if the action fails";
-            self.wrong(&section.span(), message)
+            self.error_at(&section.span(), message)
         })?;
         let mut changes: Vec<OutcomeChange> = Vec::new();
         let mut add = |text: &Spanned<String>, what: Template, becomes| {
-            if changes.iter().any(|change| change.what == what) {
+            if changes.iter().any(|change| change.target == what) {
                 let message = format!("one outcome changes `{}` twice", text.get_ref());
-                return Err(self.wrong(&text.span(), message));
+                return Err(self.error_at(&text.span(), message));
             }
-            changes.push(OutcomeChange { what, becomes });
+            changes.push(OutcomeChange {
+                target: what,
+                change: becomes,
+            });
             Ok(())
         };
         for (facts, truth) in [(&given.becomes_true, true), (&given.becomes_false, false)] {
             for fact in facts {
-                let what = self.template(fact, Names::Predicates, action)?;
-                add(fact, what, Becoming::Truth(truth))?;
+                let what = self.template(fact, NameKind::Predicates, action)?;
+                add(fact, what, FactOutcome::Truth(truth))?;
             }
         }
         for (numbers, how) in [
-            (&given.assign, How::Assign),
-            (&given.increase, How::Increase),
-            (&given.decrease, How::Decrease),
+            (&given.assign, FluentOperation::Assign),
+            (&given.increase, FluentOperation::Increase),
+            (&given.decrease, FluentOperation::Decrease),
         ] {
             for (fluent, value) in numbers {
-                let what = self.template(fluent, Names::Functions, action)?;
+                let what = self.template(fluent, NameKind::Functions, action)?;
                 let number = Rational::from_f64_as_written(*value.get_ref());
-                let number =
-                    number.ok_or_else(|| self.wrong(&value.span(), "the number must be finite"))?;
+                let number = number
+                    .ok_or_else(|| self.error_at(&value.span(), "the number must be finite"))?;
                 let becomes = match how {
-                    How::Assign => Becoming::Value(number),
-                    How::Increase => Becoming::Grown(number),
-                    How::Decrease => Becoming::Grown(-number),
+                    FluentOperation::Assign => FactOutcome::Value(number),
+                    FluentOperation::Increase => FactOutcome::ChangedBy(number),
+                    FluentOperation::Decrease => FactOutcome::ChangedBy(-number),
                 };
                 add(fluent, what, becomes)?;
             }
@@ -113,14 +122,14 @@ impl Reader<'_> {
                 let seconds = Rational::from_f64_as_written(*delay.get_ref());
                 let seconds = seconds.filter(|seconds| !seconds.is_negative());
                 let message = "a delay is a number of seconds, and never negative";
-                seconds.ok_or_else(|| self.wrong(&delay.span(), message))?
+                seconds.ok_or_else(|| self.error_at(&delay.span(), message))?
             }
         };
         if changes.is_empty() && !delay.is_positive() {
             let message = "this outcome changes nothing; say what: becomes_true, becomes_false, \
                            assign, increase, decrease or delay. What the outcomes leave of 1 is the \
                            failure that changes nothing";
-            return Err(self.wrong(&section.span(), message));
+            return Err(self.error_at(&section.span(), message));
         }
         Ok(Outcome {
             probability: self.probability(probability)?,
@@ -134,10 +143,10 @@ impl Reader<'_> {
     fn template(
         &self,
         text: &Spanned<String>,
-        names: Names,
+        names: NameKind,
         action: &ActionPattern,
     ) -> Read<Template> {
-        let wrong = |message: String| Err(self.wrong(&text.span(), message));
+        let wrong = |message: String| Err(self.error_at(&text.span(), message));
         let inner = text.get_ref().trim();
         let inner = match inner.strip_prefix('(') {
             Some(rest) => rest.strip_suffix(')').unwrap_or(rest),
@@ -153,7 +162,7 @@ impl Reader<'_> {
         let blanks = vec!["_"; words.len()].join(" ");
         let pattern = format!("({name} {blanks})");
         ActionPattern::read(&pattern, names, self.problem)
-            .map_err(|problem| self.wrong(&text.span(), problem))?;
+            .map_err(|problem| self.error_at(&text.span(), problem))?;
         let parameters = self.parameters(&name, names);
         let schema = self.schema_of(action);
         let mut objects = Vec::new();
@@ -165,7 +174,7 @@ impl Reader<'_> {
                     ));
                 };
                 match self.argument(word, schema, &parameter.types) {
-                    Ok(place) => Word::Argument(place),
+                    Ok(place) => TemplateArgument::Argument(place),
                     Err(message) => return wrong(message),
                 }
             } else {
@@ -180,12 +189,12 @@ impl Reader<'_> {
                     Some(object) if !self.problem.has_type(object, &parameter.types) => {
                         return wrong(format!("`{name}` does not fit `{word}`: its type differs"));
                     }
-                    Some(_) => Word::Object(word.clone()),
+                    Some(_) => TemplateArgument::Object(word.clone()),
                 }
             });
         }
         let mut rules = self.problem.rules.iter();
-        if names == Names::Predicates
+        if names == NameKind::Predicates
             && rules.any(|rule| Some(rule.predicate) == self.problem.predicate(&name))
         {
             return wrong(format!(
@@ -195,17 +204,17 @@ impl Reader<'_> {
         Ok(Template { name, objects })
     }
 
-    fn parameters(&self, name: &str, names: Names) -> &[Variable] {
+    fn parameters(&self, name: &str, names: NameKind) -> &[Variable] {
         let found = match names {
-            Names::Predicates => self
+            NameKind::Predicates => self
                 .problem
                 .predicate(name)
                 .map(|predicate| &self.problem.predicates[predicate.index()].parameters),
-            Names::Functions => self
+            NameKind::Functions => self
                 .problem
                 .function(name)
                 .map(|function| &self.problem.functions[function.index()].parameters),
-            Names::Actions => None,
+            NameKind::Actions => None,
         };
         found.map_or(&[], Vec::as_slice)
     }

@@ -7,8 +7,8 @@ use toml::Spanned;
 use super::section::Section;
 use super::{Read, Reader};
 use crate::model::Hazard;
-use crate::model::hazard::{MOST_FACTS, count};
-use crate::pattern::Names;
+use crate::model::hazard::{MAX_FACTS, count};
+use crate::pattern::NameKind;
 
 impl Reader<'_> {
     pub(super) fn hazard(&self, section: &Spanned<Section>, resolution: &Rational) -> Read<Hazard> {
@@ -19,17 +19,17 @@ impl Reader<'_> {
             "becomes_false_per_second",
             "reported",
         ];
-        if let Some((span, message)) = given.excess("[[hazard]]", &own, false) {
-            return Err(self.wrong(&span, message));
+        if let Some((span, message)) = given.first_superfluous_key("[[hazard]]", &own, false) {
+            return Err(self.error_at(&span, message));
         }
         let fact = given.fact.as_ref();
-        let fact = fact.ok_or_else(|| self.wrong(&section.span(), "`fact` is missing"))?;
-        let pattern = self.pattern(fact, Names::Predicates)?;
+        let fact = fact.ok_or_else(|| self.error_at(&section.span(), "`fact` is missing"))?;
+        let pattern = self.pattern(fact, NameKind::Predicates)?;
         let Some(name) = pattern.name() else {
             let message = "name a predicate, `(predicate _ object)` or one fact";
-            return Err(self.wrong(&fact.span(), message));
+            return Err(self.error_at(&fact.span(), message));
         };
-        self.can_have_rates(name, &fact.span())?;
+        self.check_hazard_predicate(name, &fact.span())?;
         let (up, down) = (
             &given.becomes_true_per_second,
             &given.becomes_false_per_second,
@@ -37,7 +37,7 @@ impl Reader<'_> {
         if up.is_none() && down.is_none() {
             let message =
                 "say how often: becomes_true_per_second, becomes_false_per_second, or both";
-            return Err(self.wrong(&section.span(), message));
+            return Err(self.error_at(&section.span(), message));
         }
         let rate = |rate: &Option<Spanned<f64>>| match rate {
             Some(rate) => self.rate(rate, resolution),
@@ -52,7 +52,7 @@ impl Reader<'_> {
     }
 
     /// Checks that the facts of a predicate can change by themselves, and are not too many.
-    fn can_have_rates(&self, name: &str, at: &Span) -> Read<()> {
+    fn check_hazard_predicate(&self, name: &str, at: &Span) -> Read<()> {
         let Some(predicate) = self.problem.predicate(name) else {
             return Ok(());
         };
@@ -61,15 +61,15 @@ impl Reader<'_> {
             let message = format!(
                 "`{name}` is derived: it follows from other facts; give the rates of those"
             );
-            return Err(self.wrong(at, message));
+            return Err(self.error_at(at, message));
         }
         let facts = count(&self.problem.predicates[predicate.index()], self.problem);
-        if facts.is_none_or(|facts| facts > MOST_FACTS) {
+        if facts.is_none_or(|facts| facts > MAX_FACTS) {
             let message = format!(
-                "`{name}` has more than {MOST_FACTS} facts, which is the most that can change by \
+                "`{name}` has more than {MAX_FACTS} facts, which is the most that can change by \
                  themselves; split the predicate, or take fewer objects"
             );
-            return Err(self.wrong(at, message));
+            return Err(self.error_at(at, message));
         }
         Ok(())
     }
@@ -78,12 +78,12 @@ impl Reader<'_> {
         let value = *rate.get_ref();
         if !value.is_finite() || value < 0.0 {
             let message = "a rate is a number of changes per second: 0 or more";
-            return Err(self.wrong(&rate.span(), message));
+            return Err(self.error_at(&rate.span(), message));
         }
         if value * resolution.to_f64() > 1.0 {
             let message =
                 "that is more often than once in a step of `resolution`; give a smaller rate";
-            return Err(self.wrong(&rate.span(), message));
+            return Err(self.error_at(&rate.span(), message));
         }
         Ok(value)
     }

@@ -102,41 +102,41 @@ const DISTRIBUTION: &[&str] = &[
 
 impl Section {
     /// Returns all keys that are present, with their positions.
-    fn given(&self) -> Vec<(&'static str, Range<usize>)> {
-        fn at<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
+    fn present_keys(&self) -> Vec<(&'static str, Range<usize>)> {
+        fn span_of<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
         let all = [
-            ("action", at(self.action.as_ref())),
-            ("fluent", at(self.fluent.as_ref())),
-            ("fact", at(self.fact.as_ref())),
-            ("becomes", at(self.becomes.as_ref())),
+            ("action", span_of(self.action.as_ref())),
+            ("fluent", span_of(self.fluent.as_ref())),
+            ("fact", span_of(self.fact.as_ref())),
+            ("becomes", span_of(self.becomes.as_ref())),
             (
                 "becomes_true_per_second",
-                at(self.becomes_true_per_second.as_ref()),
+                span_of(self.becomes_true_per_second.as_ref()),
             ),
             (
                 "becomes_false_per_second",
-                at(self.becomes_false_per_second.as_ref()),
+                span_of(self.becomes_false_per_second.as_ref()),
             ),
-            ("probability", at(self.probability.as_ref())),
-            ("when", at(self.when.as_ref())),
-            ("undone", at(self.undone.as_ref())),
-            ("outcome", at(self.outcome.as_ref())),
-            ("reported", at(self.reported.as_ref())),
-            ("constant", at(self.constant.as_ref())),
-            ("normal", at(self.normal.as_ref())),
-            ("lognormal", at(self.lognormal.as_ref())),
-            ("uniform", at(self.uniform.as_ref())),
-            ("triangular", at(self.triangular.as_ref())),
-            ("values", at(self.values.as_ref())),
-            ("minimum", at(self.minimum.as_ref())),
-            ("maximum", at(self.maximum.as_ref())),
-            ("relative", at(self.relative.as_ref())),
-            ("lost", at(self.lost.as_ref())),
-            ("duplicated", at(self.duplicated.as_ref())),
-            ("late", at(self.late.as_ref())),
-            ("contradicted", at(self.contradicted.as_ref())),
+            ("probability", span_of(self.probability.as_ref())),
+            ("when", span_of(self.when.as_ref())),
+            ("undone", span_of(self.undone.as_ref())),
+            ("outcome", span_of(self.outcome.as_ref())),
+            ("reported", span_of(self.reported.as_ref())),
+            ("constant", span_of(self.constant.as_ref())),
+            ("normal", span_of(self.normal.as_ref())),
+            ("lognormal", span_of(self.lognormal.as_ref())),
+            ("uniform", span_of(self.uniform.as_ref())),
+            ("triangular", span_of(self.triangular.as_ref())),
+            ("values", span_of(self.values.as_ref())),
+            ("minimum", span_of(self.minimum.as_ref())),
+            ("maximum", span_of(self.maximum.as_ref())),
+            ("relative", span_of(self.relative.as_ref())),
+            ("lost", span_of(self.lost.as_ref())),
+            ("duplicated", span_of(self.duplicated.as_ref())),
+            ("late", span_of(self.late.as_ref())),
+            ("contradicted", span_of(self.contradicted.as_ref())),
         ];
         let given = all.into_iter();
         given
@@ -146,14 +146,14 @@ impl Section {
 
     /// Returns the first superfluous key, if any, with its position and a message. Permitted are
     /// `own` and, if `is_distributed`, the keys of distributions.
-    pub(super) fn excess(
+    pub(super) fn first_superfluous_key(
         &self,
         name: &str,
         own: &[&str],
         is_distributed: bool,
     ) -> Option<(Range<usize>, String)> {
         let extra = if is_distributed { DISTRIBUTION } else { &[] };
-        let given = self.given();
+        let given = self.present_keys();
         let is_known = |key: &&str| own.contains(key) || extra.contains(key);
         let (key, span) = given.into_iter().find(|(key, _)| !is_known(key))?;
         let known: Vec<&str> = own.iter().chain(extra).copied().collect();
@@ -164,14 +164,14 @@ impl Section {
 
     /// Returns `true` if it contains a distribution.
     pub(super) fn is_distributed(&self) -> bool {
-        let mut given = self.given().into_iter();
+        let mut given = self.present_keys().into_iter();
         given.any(|(key, _)| DISTRIBUTION.contains(&key))
     }
 
     /// Returns the position of its distribution.
-    pub(super) fn place(&self) -> Option<Range<usize>> {
+    pub(super) fn distribution_span(&self) -> Option<Range<usize>> {
         let is_limit = |key: &str| key == "minimum" || key == "maximum";
-        let mut given = self.given().into_iter();
+        let mut given = self.present_keys().into_iter();
         given
             .find(|(key, _)| DISTRIBUTION.contains(key) && !is_limit(key))
             .map(|(_, span)| span)

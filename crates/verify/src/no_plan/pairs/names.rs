@@ -2,22 +2,24 @@
 
 use super::{Atom, Claims, Earliest, Key, Structure};
 use crate::Exact;
-use crate::no_plan::{Apart, NoPlanFlaw, fact};
+use crate::no_plan::{MutexPair, NoPlanFlaw, fact};
 
 impl Structure<'_> {
     fn name(&self, atom: usize) -> String {
         let process = |number: usize| &self.processes[number];
         match self.atoms[atom] {
-            Atom::Literal((fact, true)) => self.moments.task.fact_name(fact),
-            Atom::Literal((fact, false)) => format!("(not {})", self.moments.task.fact_name(fact)),
+            Atom::Literal((fact, true)) => self.earliest_times.task.fact_name(fact),
+            Atom::Literal((fact, false)) => {
+                format!("(not {})", self.earliest_times.task.fact_name(fact))
+            }
             Atom::Running(number) => self.processes[number].title(),
             Atom::Ended(number) => format!("ended {}", process(number).name),
         }
     }
 
     /// Returns the claims in the format of the certificate.
-    pub fn written(&self, claims: &Claims) -> Vec<Apart> {
-        let mut groups: Vec<Apart> = Vec::new();
+    pub fn to_groups(&self, claims: &Claims) -> Vec<MutexPair> {
+        let mut groups: Vec<MutexPair> = Vec::new();
         let mut sorted: Vec<(&Earliest, &Key)> = claims.iter().map(|(k, t)| (t, k)).collect();
         sorted.sort();
         for (time, key) in sorted {
@@ -26,9 +28,9 @@ impl Structure<'_> {
                 Earliest::Never => None,
             };
             if groups.last().is_none_or(|last| last.from != from) {
-                groups.push(Apart {
+                groups.push(MutexPair {
                     from,
-                    ..Apart::default()
+                    ..MutexPair::default()
                 });
             }
             let Some(group) = groups.last_mut() else {
@@ -57,7 +59,7 @@ impl Structure<'_> {
     ///
     /// # Errors
     /// When a name does not exist, or a claim is repeated.
-    pub fn read(&self, groups: &[Apart]) -> Result<Claims, NoPlanFlaw> {
+    pub fn parse_groups(&self, groups: &[MutexPair]) -> Result<Claims, NoPlanFlaw> {
         let mut names = std::collections::BTreeMap::new();
         for atom in 0..self.atoms.len() {
             if !matches!(self.atoms[atom], Atom::Literal(_))
@@ -101,14 +103,14 @@ impl Structure<'_> {
         let inner = name
             .strip_prefix("(not ")
             .and_then(|rest| rest.strip_suffix(')'));
-        let (predicate, objects) = fact(self.moments.task, inner.unwrap_or(name))?;
-        let fact = self.moments.task.find_fact(predicate, &objects)?;
+        let (predicate, objects) = fact(self.earliest_times.task, inner.unwrap_or(name))?;
+        let fact = self.earliest_times.task.find_fact(predicate, &objects)?;
         let literal = Atom::Literal((fact, inner.is_none()));
         self.numbers.get(&literal).copied()
     }
 
     /// Returns a claim in words.
-    pub fn in_words(&self, key: Key) -> String {
+    pub fn describe_claim(&self, key: Key) -> String {
         match key {
             Key::Pair(one, other) if one == other => format!("`{}`", self.name(one)),
             Key::Pair(one, other) => format!("`{}` with `{}`", self.name(one), self.name(other)),
@@ -130,7 +132,7 @@ impl Structure<'_> {
     }
 
     /// Returns a happening in words.
-    pub fn happening(&self, number: usize) -> String {
+    pub fn describe_happening(&self, number: usize) -> String {
         match self.start_or_end(number) {
             [Some(action), _] => format!("`{}`", self.processes[action].name),
             [_, Some(action)] => format!("the end of `{}`", self.processes[action].name),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use elbowroom_num::Rational;
 
 use super::{Atom, Bounds, Earliest, Key, Kind, Structure};
-use crate::no_plan::moments::HeldTo;
+use crate::no_plan::earliest_times::ConditionContext;
 
 /// Claimed bounds, to be checked.
 pub type Claims = BTreeMap<Key, Earliest>;
@@ -36,20 +36,24 @@ impl Structure<'_> {
     pub fn pair<'b>(&'b self, known: &'b impl Bounds, one: usize, other: usize) -> &'b Earliest {
         let own = self.at_least(known, Key::pair(one, other));
         if one == other {
-            return own.max(&self.floor[one]);
+            return own.max(&self.relaxed_times[one]);
         }
         if self.excludes(one, other) {
             return &Earliest::Never;
         }
         let alone = [one, other].map(|atom| self.at_least(known, Key::Pair(atom, atom)));
-        let floors = [one, other].map(|atom| &self.floor[atom]);
+        let floors = [one, other].map(|atom| &self.relaxed_times[atom]);
         let floor = floors[0].max(floors[1]);
         own.max(alone[0]).max(alone[1]).max(floor)
     }
 
     /// Visits the pairs that are true together just before a happening, and the least time before
     /// it.
-    pub fn visit(&self, happening: usize, visit: &mut impl FnMut(usize, usize, &Rational)) {
+    pub fn visit_pairs_before(
+        &self,
+        happening: usize,
+        visit: &mut impl FnMut(usize, usize, &Rational),
+    ) {
         let operator = &self.operators[happening];
         for (place, &one) in operator.reads.iter().enumerate() {
             for &other in &operator.reads[place..] {
@@ -72,26 +76,26 @@ impl Structure<'_> {
         if !operator.is_possible {
             return Earliest::Never;
         }
-        let mut time = Earliest::From(self.moments.now.clone());
-        self.visit(number, &mut |one, other, delay| {
+        let mut time = Earliest::From(self.earliest_times.now.clone());
+        self.visit_pairs_before(number, &mut |one, other, delay| {
             time.raise(self.pair(known, one, other), delay);
         });
         if let Kind::End(process) = operator.kind {
-            let begun = self.begun(process, known);
+            let begun = self.earliest_start(process, known);
             time.raise(&begun, &self.processes[process].least);
         }
-        self.when_possible(number, time)
+        self.earliest_allowed_time(number, time)
     }
 
     /// Returns the earliest time of a happening without other bounds: never, if the atom `with` is
     /// not true after it.
-    pub fn earliest_alone(&self, happening: usize, with: Option<usize>) -> Earliest {
+    pub fn earliest_without_bounds(&self, happening: usize, with: Option<usize>) -> Earliest {
         let operator = &self.operators[happening];
         let is_ended = with.is_some_and(|atom| operator.ends.contains(&atom));
         if is_ended || !operator.is_possible {
             return Earliest::Never;
         }
-        self.when_possible(happening, Earliest::From(self.moments.now.clone()))
+        self.earliest_allowed_time(happening, Earliest::From(self.earliest_times.now.clone()))
     }
 
     /// Returns the least separation of interfering happenings.
@@ -100,8 +104,11 @@ impl Structure<'_> {
     }
 
     /// Returns the earliest start of an action.
-    pub fn begun(&self, process: usize, known: &impl Bounds) -> Earliest {
-        match (&self.processes[process].begun, self.start_of[process]) {
+    pub fn earliest_start(&self, process: usize, known: &impl Bounds) -> Earliest {
+        match (
+            &self.processes[process].initial_start,
+            self.start_of[process],
+        ) {
             (Some(begun), _) => Earliest::From(begun.clone()),
             (None, Some(start)) => self.earliest(start, known),
             (None, None) => Earliest::Never,
@@ -110,11 +117,16 @@ impl Structure<'_> {
 
     /// Visits the atoms that are true together with `atom` just before a happening after which
     /// `atom` is still true.
-    pub fn visit_with(&self, happening: usize, atom: usize, visit: &mut impl FnMut(usize, usize)) {
+    pub fn visit_atoms_kept_with(
+        &self,
+        happening: usize,
+        atom: usize,
+        visit: &mut impl FnMut(usize, usize),
+    ) {
         let operator = &self.operators[happening];
         for &one in operator.reads.iter().chain(&operator.holds) {
             visit(one, atom);
-            for &other in &self.company[atom] {
+            for &other in &self.implied_atoms[atom] {
                 visit(one, other);
             }
         }
@@ -137,21 +149,26 @@ impl Structure<'_> {
             return Earliest::Never;
         }
         let mut time = begin.clone();
-        self.visit_with(number, atom, &mut |one, other| {
+        self.visit_atoms_kept_with(number, atom, &mut |one, other| {
             time.raise(self.pair(known, one, other), &Rational::ZERO);
         });
         if let Kind::End(process) = operator.kind {
-            let [since_start, since] = self.while_running(process, atom, known);
+            let [since_start, since] = self.earliest_ends_with(process, atom, known);
             time = time.max(since_start.min(since));
         }
-        self.when_possible(number, time)
+        self.earliest_allowed_time(number, time)
     }
 
     /// Returns the earliest end of an action with an atom that has been true since its start, and
     /// with one that has become true since.
-    pub fn while_running(&self, process: usize, atom: usize, known: &impl Bounds) -> [Earliest; 2] {
+    pub fn earliest_ends_with(
+        &self,
+        process: usize,
+        atom: usize,
+        known: &impl Bounds,
+    ) -> [Earliest; 2] {
         let own = &self.processes[process];
-        let started = match &own.begun {
+        let started = match &own.initial_start {
             None => self.at_least(known, Key::Started(process, atom)).clone(),
             // Only one instance was running initially, so no other one is running when it ends.
             Some(begun) if self.is_initial[atom] && self.atoms[atom] != Atom::Running(process) => {
@@ -165,12 +182,12 @@ impl Structure<'_> {
 
     /// Returns the earliest time, not before `time`, at which timed initials and durations allow
     /// the happening.
-    pub fn when_possible(&self, happening: usize, time: Earliest) -> Earliest {
+    pub fn earliest_allowed_time(&self, happening: usize, time: Earliest) -> Earliest {
         let operator = &self.operators[happening];
         let Earliest::From(time) = time else {
             return Earliest::Never;
         };
-        let moments = &self.moments;
+        let moments = &self.earliest_times;
         let possible = match operator.kind {
             Kind::Timed(number) => {
                 let own = &self.times[number];
@@ -179,20 +196,27 @@ impl Structure<'_> {
             Kind::Start(_) if !operator.has_windows => Some(time),
             Kind::Start(number) => {
                 if let Some(body) = self.processes[number].durative() {
-                    let first = moments.starts(body, &time, HeldTo::Lasting, HeldTo::Lasting);
+                    let first = moments.starts(
+                        body,
+                        &time,
+                        ConditionContext::StaticOnly,
+                        ConditionContext::StaticOnly,
+                    );
                     first.map(|own| own.0)
                 } else {
                     let condition = self.processes[number].instant();
-                    moments.next(condition, &time, HeldTo::Lasting)
+                    moments.next(condition, &time, ConditionContext::StaticOnly)
                 }
             }
             Kind::End(number) => {
                 let process = &self.processes[number];
                 let end = match process.durative().filter(|_| operator.has_windows) {
-                    Some(body) => moments.end_from(body, &process.least, &time, HeldTo::Lasting),
+                    Some(body) => {
+                        moments.end_from(body, &process.least, &time, ConditionContext::StaticOnly)
+                    }
                     None => Some(time),
                 };
-                let latest = process.begun.as_ref().zip(process.most.as_ref());
+                let latest = process.initial_start.as_ref().zip(process.most.as_ref());
                 end.filter(|end| latest.is_none_or(|(begun, most)| *end <= begun + most))
             }
         };
@@ -201,7 +225,7 @@ impl Structure<'_> {
 
     /// Returns the happenings that can make a bound applicable, each with the atom that is true
     /// before and after it, if any.
-    pub fn occasions(&self, key: Key) -> Vec<(usize, Option<usize>)> {
+    pub fn enabling_happenings(&self, key: Key) -> Vec<(usize, Option<usize>)> {
         match key {
             Key::Pair(one, other) => {
                 let mut occasions = Vec::new();
@@ -232,7 +256,7 @@ impl Structure<'_> {
     }
 
     /// Returns the earliest time of an occasion.
-    pub fn occasion(
+    pub fn enabling_time(
         &self,
         (operator, with): (usize, Option<usize>),
         known: &impl Bounds,
@@ -246,7 +270,7 @@ impl Structure<'_> {
 
     /// Returns the first violated claim, with the happening that violates it; `None` for the
     /// initial state.
-    pub fn first_broken(&self, claims: &Claims) -> Option<(Key, Option<usize>)> {
+    pub fn first_violation(&self, claims: &Claims) -> Option<(Key, Option<usize>)> {
         for (&key, claimed) in claims {
             let is_from_the_start = match key {
                 Key::Pair(one, other) => self.is_initial[one] && self.is_initial[other],
@@ -262,8 +286,8 @@ impl Structure<'_> {
             {
                 continue;
             }
-            for occasion in self.occasions(key) {
-                if self.occasion(occasion, claims) < *claimed {
+            for occasion in self.enabling_happenings(key) {
+                if self.enabling_time(occasion, claims) < *claimed {
                     return Some((key, Some(occasion.0)));
                 }
             }
@@ -284,11 +308,11 @@ impl Structure<'_> {
     }
 
     /// Returns the earliest time at which two atoms can be true together, without any bounds.
-    pub fn floor(&self, one: usize, other: usize) -> &Earliest {
+    pub fn relaxed_bound(&self, one: usize, other: usize) -> &Earliest {
         if one != other && self.excludes(one, other) {
             return &Earliest::Never;
         }
-        Ord::max(&self.floor[one], &self.floor[other])
+        Ord::max(&self.relaxed_times[one], &self.relaxed_times[other])
     }
 
     /// Returns two of these atoms that are never true together.

@@ -1,16 +1,16 @@
 //! Description of the quality of the best box.
 
-use elbowroom::answers::envelope::{Best, Probability, Relax, Room, Worth};
+use elbowroom::answers::envelope::{Best, LimitedRange, Probability, Relax, ShadowPrices};
 use elbowroom::envelope::Objective;
 use elbowroom::num::Rational;
 
 use crate::number::{self, Rounding};
 
 /// Lists the bounds whose relaxation gains most, or returns `None` if there are none.
-pub(super) fn gained(best: &Best) -> Option<String> {
+pub(super) fn best_relaxations(best: &Best) -> Option<String> {
     /// Maximum number of entries of a list.
     const MOST_NAMED: usize = 3;
-    let gain = |worth: &Worth| match best.objective {
+    let gain = |worth: &ShadowPrices| match best.objective {
         Objective::LeastSlack => {
             let percent = &worth.gain * &Rational::from(100);
             format!(
@@ -40,7 +40,7 @@ pub(super) fn gained(best: &Best) -> Option<String> {
 }
 
 /// Describes the volume as the geometric mean of the widths.
-fn spacious(best: &Best, parameters: &[Room]) -> String {
+fn volume_text(best: &Best, parameters: &[LimitedRange]) -> String {
     let weights: Rational = parameters
         .iter()
         .map(|own| own.range.quantity.weight.clone())
@@ -65,7 +65,7 @@ fn spacious(best: &Best, parameters: &[Room]) -> String {
 }
 
 /// Describes the probability that all durations stay inside the box.
-fn likely(best: &Best, probability: &Probability) -> String {
+fn probability_text(best: &Best, probability: &Probability) -> String {
     let percent = |value: &Rational, rounding| {
         let percent = value * &Rational::from(100);
         format!("{} %", number::rounded(&percent, 3, rounding))
@@ -90,12 +90,12 @@ fn likely(best: &Best, probability: &Probability) -> String {
 }
 
 /// Describes the objective value of the box, and its proved upper bound.
-pub(super) fn goodness(best: &Best, parameters: &[Room]) -> String {
+pub(super) fn objective_text(best: &Best, parameters: &[LimitedRange]) -> String {
     if let Some(probability) = &best.probability {
-        return likely(best, probability);
+        return probability_text(best, probability);
     }
     if best.objective == Objective::Volume {
-        return spacious(best, parameters);
+        return volume_text(best, parameters);
     }
     let number = |value: &Rational| match best.objective {
         Objective::LeastSlack => {

@@ -7,16 +7,16 @@ use elbowroom::plan::ParametrizedPlan;
 use elbowroom::{Explanation, Shortfall, pddl};
 
 use crate::limits::push_wrapped;
-use crate::look::{Look, STRONG, styled};
 use crate::number;
+use crate::terminal::{EMPHASIS, TextLayout, styled};
 
 /// Describes the reason, and the amount of the violation.
-pub(super) fn what(explanation: &Explanation) -> String {
+pub(super) fn reason_text(explanation: &Explanation) -> String {
     let reason = &explanation.reason;
     // If a schedule is shown, the amount is stated there, for that schedule.
     let is_said = explanation.verdict.is_some();
     match &explanation.shortfall {
-        Some(Shortfall::Boundless) => {
+        Some(Shortfall::Unbounded) => {
             format!("{reason}, but nothing in the plan sees to it")
         }
         Some(Shortfall::Time(late)) if !is_said => {
@@ -34,7 +34,7 @@ pub(super) fn example(
     task: &Task,
     plan: &ParametrizedPlan,
     explanation: &Explanation,
-    look: Look,
+    look: TextLayout,
 ) -> String {
     let mut text = String::new();
     let values: Vec<String> = plan
@@ -44,19 +44,19 @@ pub(super) fn example(
         .map(|(parameter, value)| format!("{} = {}", parameter.name, number::nearest(value)))
         .collect();
     if !values.is_empty() {
-        let _ = write!(text, "\n{}\n", styled(STRONG, "For example with"));
+        let _ = write!(text, "\n{}\n", styled(EMPHASIS, "For example with"));
         push_wrapped(&mut text, &values.join(", "), 2, look.width);
     }
     let Some(schedule) = &explanation.schedule else {
         return text;
     };
     let fixed = plan.plan.at(&explanation.valuation).scheduled(schedule);
-    let _ = write!(text, "\n{}\n", styled(STRONG, "executed as"));
+    let _ = write!(text, "\n{}\n", styled(EMPHASIS, "executed as"));
     for line in pddl::write_plan(task, &fixed).lines() {
         let _ = writeln!(text, "  {line}");
     }
     if let Some(verdict) = &explanation.verdict {
-        let _ = write!(text, "\n{}\n", styled(STRONG, "this happens"));
+        let _ = write!(text, "\n{}\n", styled(EMPHASIS, "this happens"));
         push_wrapped(&mut text, verdict, 2, look.width);
     }
     text

@@ -3,17 +3,17 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use elbowroom::answers::envelope::{Chosen, QuantityKind, Room};
+use elbowroom::answers::envelope::{ChosenDuration, LimitedRange, QuantityKind};
 use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
 use crate::number;
 use crate::table::{self, Row};
-use elbowroom_executive::messages::counted;
+use elbowroom_executive::messages::count_with_noun;
 
 /// Describes the guarantee.
-pub(super) fn meaning(parameters: &[Room], rows: &[Row]) -> String {
-    let is_duration = |room: &Room| room.range.quantity.kind == QuantityKind::Duration;
+pub(super) fn guarantee_text(parameters: &[LimitedRange], rows: &[Row]) -> String {
+    let is_duration = |room: &LimitedRange| room.range.quantity.kind == QuantityKind::Duration;
     let has_timeouts = parameters.iter().any(|room| room.range.timeout.is_some());
     let before = match (parameters, has_timeouts) {
         (_, false) => "",
@@ -42,7 +42,11 @@ pub(super) fn meaning(parameters: &[Room], rows: &[Row]) -> String {
 }
 
 /// Describes the time-outs of actions, and their rule.
-pub(super) fn line(rule: &TimeoutRule, parameters: &[Room], chosen: &[Chosen]) -> Option<String> {
+pub(super) fn timeout_line(
+    rule: &TimeoutRule,
+    parameters: &[LimitedRange],
+    chosen: &[ChosenDuration],
+) -> Option<String> {
     /// Maximum number of different time-outs listed, the most frequent ones.
     const MOST_LISTED: usize = 4;
     let open = parameters.iter().filter_map(|room| {
@@ -87,7 +91,7 @@ pub(super) fn line(rule: &TimeoutRule, parameters: &[Room], chosen: &[Chosen]) -
     if groups.len() > MOST_LISTED {
         listed.push(format!(
             "{} (--json lists them)",
-            counted(groups.len() - MOST_LISTED, "other time-out")
+            count_with_noun(groups.len() - MOST_LISTED, "other time-out")
         ));
     }
     Some(format!(

@@ -21,7 +21,7 @@ pub(super) fn constraints(plan: &ParametrizedPlan, guarantee: Guarantee) -> Vec<
     };
     let all = plan.plan.constraints.iter().enumerate();
     all.map(|(index, constraint)| {
-        let told = plan.told_by(constraint).filter(|_| !is_weak);
+        let told = plan.commanded_duration(constraint).filter(|_| !is_weak);
         let told = told.map(|planned| Limit::Number(Exact(planned.clone())));
         Constraint {
             from: constraint.from.index(),

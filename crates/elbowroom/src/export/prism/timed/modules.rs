@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 use super::super::bare;
 use super::super::formula::{Formula, choice, exact};
 use super::{Bound, Happening, Owner, Process};
-use crate::timed::{Act, Ends, Facts};
+use crate::timed::{ActionModel, EndProbabilities, Facts};
 
 impl Process<'_> {
     /// Writes the module of an action: the time of its start, and its known end.
@@ -88,7 +88,7 @@ impl Process<'_> {
             deletes,
             ..
         } = happening;
-        let goes_on = self.goes_on(&self.world.acts[act], *adds, *deletes);
+        let goes_on = self.over_all_after(&self.world.acts[act], *adds, *deletes);
         match happening.owner {
             Owner::Started(own) if own == act => {
                 let begins = format!("({since}'=1)");
@@ -131,10 +131,10 @@ impl Process<'_> {
     }
 
     /// Returns the condition that an action can start and its over-all conditions hold right after the start.
-    pub(super) fn can_start(&self, act: &Act) -> Formula {
+    pub(super) fn can_start(&self, act: &ActionModel) -> Formula {
         let needs = self.holds(&act.start.needs);
         let over_all = act.rest.iter().map(|(over_all, _)| {
-            let goes_on = self.goes_on(act, act.start.adds, act.start.deletes);
+            let goes_on = self.over_all_after(act, act.start.adds, act.start.deletes);
             goes_on.unwrap_or_else(|| self.holds(over_all))
         });
         Formula::all(std::iter::once(needs).chain(over_all))
@@ -142,7 +142,7 @@ impl Process<'_> {
 
     /// Returns the over-all conditions of an action after these effects; `None` if the effects do
     /// not concern them.
-    fn goes_on(&self, act: &Act, adds: Facts, deletes: Facts) -> Option<Formula> {
+    fn over_all_after(&self, act: &ActionModel, adds: Facts, deletes: Facts) -> Option<Formula> {
         let (over_all, _) = act.rest.as_ref()?;
         (over_all.mentions() & (adds | deletes) != 0).then(|| self.after(over_all, adds, deletes))
     }
@@ -192,11 +192,11 @@ impl Process<'_> {
                 hazards[from]
             );
         }
-        if self.bound == Bound::Lower && self.has_a_beginning() {
+        if self.bound == Bound::Lower && self.has_initial_events() {
             let _ = writeln!(
                 text,
                 "  [begin] true -> {};",
-                drawn(self.chances.before[event])
+                drawn(self.chances.initial[event])
             );
             let _ = writeln!(text, "  [begun] {name}!=1 -> true;");
         }
@@ -205,8 +205,8 @@ impl Process<'_> {
 }
 
 /// Returns the possible ends of a running action, with `otherwise` for no end.
-fn ends_of(name: &str, hazard: &Ends, otherwise: &str) -> [(Rational, String); 3] {
-    let (well, badly) = (exact(hazard.well), exact(hazard.badly()));
+fn ends_of(name: &str, hazard: &EndProbabilities, otherwise: &str) -> [(Rational, String); 3] {
+    let (well, badly) = (exact(hazard.success), exact(hazard.any_failure()));
     let rest = &(&Rational::ONE - &well) - &badly;
     // The rounding error is added to the likelier end.
     let is_over = rest.to_f64() < 1e-12;

@@ -11,16 +11,16 @@ use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Footprint, Situation, TimedHappening};
 use elbowroom_num::Rational;
 
-use super::super::beginning::{Beginning, has_values_to_change, running};
 use super::super::compressibility::{compressibility, readers};
 use super::super::directions::Shifts;
 use super::super::exclusive::{self, implied_tests};
+use super::super::initial_state::{InitialState, has_values_to_change, running};
 use super::super::interference::{Access, Annotations, Separations, TimedSeparations};
 use super::super::metric::{Metric, only_grows};
 use super::super::rules::stratified;
 use super::super::times::is_symbolic;
 use super::super::{Compiled, Compressibility, NONE, Rule, Snap, Timed, completeness, compression};
-use super::{Builder, Wanted, narrow};
+use super::{Builder, CompileInput, narrow};
 use crate::embedded::formula::Literal;
 use crate::embedded::time::{Scale, Ticks};
 use crate::embedded::tuning::Technique;
@@ -30,7 +30,7 @@ use crate::embedded::windows::Windows;
 const SNAPS_PER_QUESTION: usize = 1024;
 
 /// The future timed initials, each with its separations.
-struct Coming {
+struct FutureTimed {
     happenings: Vec<TimedHappening>,
     separations: Vec<Separations>,
 }
@@ -46,7 +46,7 @@ impl Builder<'_> {
     pub(super) fn finish(
         mut self,
         grounding: &Grounding,
-        wanted: Wanted<'_>,
+        wanted: CompileInput<'_>,
         scale: Scale,
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Option<Compiled> {
@@ -54,11 +54,11 @@ impl Builder<'_> {
         let goal = self.symbols.formula(&grounding.goal);
         let (strata, derived) = self.rules(grounding);
         let is_symbolic = is_symbolic(&self.actions, situation);
-        let mut coming = self.coming(situation);
+        let mut coming = self.future_timed(situation);
         let (calendars, windows, calendars_are_exact) =
             if !is_symbolic && wanted.tuning.uses(Technique::Calendars) {
                 let rules = strata.iter().flatten().map(|rule| &rule.body);
-                self.take_out_calendars(&mut coming, situation, rules.chain([&goal]), scale)
+                self.extract_calendars(&mut coming, situation, rules.chain([&goal]), scale)
             } else {
                 (Vec::new(), Windows::default(), true)
             };
@@ -82,7 +82,7 @@ impl Builder<'_> {
         let state = &situation.state;
         let values = |fluent| state.values.get(fluent).cloned();
         let (running, running_is_exact) = running(situation, scale);
-        let beginning = Beginning {
+        let beginning = InitialState {
             time: situation.time.clone(),
             facts: facts
                 .iter()
@@ -135,7 +135,7 @@ impl Builder<'_> {
             timed_until_goal,
             strata,
             derived,
-            beginning,
+            initial: beginning,
             is_exact: scale.exactly(&Rational::ONE).is_some()
                 && timed_is_exact
                 && calendars_are_exact
@@ -164,7 +164,7 @@ impl Builder<'_> {
 
     /// Returns the timed initials after the situation that matter to some happening, condition or
     /// number.
-    fn coming(&self, situation: &Situation) -> Coming {
+    fn future_timed(&self, situation: &Situation) -> FutureTimed {
         let makes = self.separations.iter().flat_map(|s| &s.makes);
         let is_write = |access: &&Access| matches!(access, Access::Added(_) | Access::Deleted(_));
         let written: BTreeSet<Access> = makes.filter(is_write).copied().collect();
@@ -182,7 +182,7 @@ impl Builder<'_> {
             .filter(|timed| timed.time > situation.time && timed.changes.iter().any(matters))
             .cloned()
             .collect();
-        Coming {
+        FutureTimed {
             separations: self.separations_of(&happenings),
             happenings,
         }
@@ -201,7 +201,7 @@ impl Builder<'_> {
     fn annotate(
         &mut self,
         annotations: &Annotations,
-        coming: &Coming,
+        coming: &FutureTimed,
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Option<()> {
         let waiting = TimedSeparations::of(&coming.separations);
@@ -230,7 +230,7 @@ impl Builder<'_> {
                     _ => None,
                 };
                 if fact.is_some_and(|fact| !self.task.is_derived(fact)) {
-                    needs.needed_until_now(self.task, conjunct, &self.links);
+                    needs.add_over_all_end(self.task, conjunct, &self.links);
                 }
             }
             let breaking = waiting.before(&needs.makes);
@@ -242,7 +242,7 @@ impl Builder<'_> {
     /// Returns the future timed initials, and whether all their times are on the grid.
     fn timed(
         &self,
-        coming: &Coming,
+        coming: &FutureTimed,
         annotations: &Annotations,
         scale: Scale,
     ) -> (Vec<Timed>, bool) {
@@ -288,8 +288,12 @@ impl Builder<'_> {
         if has_rules {
             return;
         }
-        let ends =
-            compression::Ends::of(&self.actions, &self.snaps, timed, self.symbols.facts.len());
+        let ends = compression::PositiveFacts::of(
+            &self.actions,
+            &self.snaps,
+            timed,
+            self.symbols.facts.len(),
+        );
         for action in self.actions.iter_mut().filter(|action| action.end != NONE) {
             let makes = &self.separations[action.end as usize].makes;
             let is_plain = makes.iter().all(|&access| match access {
@@ -299,7 +303,8 @@ impl Builder<'_> {
                 Access::NeededTrue(_) | Access::NeededFalse(_) => true,
                 _ => !annotations.has(access),
             });
-            action.is_compression_safe = is_plain && ends.only_add(action, &self.snaps);
+            action.is_compression_safe =
+                is_plain && ends.only_adds_positive_facts(action, &self.snaps);
         }
     }
 
@@ -385,9 +390,9 @@ impl Builder<'_> {
     }
 
     /// Computes [`Compiled::timed_until_goal`].
-    fn timed_until_goal(&self, grounding: &Grounding, coming: &Coming) -> u32 {
+    fn timed_until_goal(&self, grounding: &Grounding, coming: &FutureTimed) -> u32 {
         let mut goal = Separations::default();
-        goal.need_from_now_on(self.task, &grounding.goal, &self.links);
+        goal.add_over_all_start(self.task, &grounding.goal, &self.links);
         let is_read = |access: &Access| goal.after.iter().any(|(read, _)| read == access);
         let mut timed = coming.separations.iter();
         let last = timed.rposition(|separations| separations.makes.iter().any(is_read));

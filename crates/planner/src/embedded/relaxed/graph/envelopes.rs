@@ -10,8 +10,8 @@
 use std::collections::BTreeMap;
 
 use super::super::super::compile::{Action, Change, Compiled, NONE};
+use super::super::super::end_windows::EndWindows;
 use super::super::super::formula::Literal;
-use super::super::super::spans::Spans;
 use super::super::super::state::State;
 use super::super::super::time::{NEVER, Ticks};
 use super::actions::{least_ticks, most_ticks};
@@ -28,7 +28,7 @@ pub(crate) struct Stay {
 
 impl Stay {
     /// Returns `true` if the fact holds, and no running action must delete it too soon.
-    pub(crate) fn holds(&self, state: &State, spans: Option<&Spans>) -> bool {
+    pub(crate) fn holds(&self, state: &State, spans: Option<&EndWindows>) -> bool {
         if !Literal::new(self.fact, true).holds(&state.facts) {
             return false;
         }

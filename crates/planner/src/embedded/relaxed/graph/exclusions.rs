@@ -9,13 +9,13 @@ impl Graph {
     /// because they contradict its over-all condition, nor afterwards, because its end permanently
     /// destroys one of their preconditions. So a dead end is detected at the start of the action:
     /// for example, if a bottle is packed that must still be filled.
-    pub(super) fn find_kept_out(&self, compiled: &Compiled) -> Vec<Vec<u32>> {
+    pub(super) fn find_excluded_operators(&self, compiled: &Compiled) -> Vec<Vec<u32>> {
         let mut is_achieved = vec![false; self.proposition_count];
         for &effect in &self.effects {
             is_achieved[effect as usize] = true;
         }
         let needing = |literal: Literal| {
-            let operators = self.needing(literal.0);
+            let operators = self.dependents(literal.0);
             self.needing_list[operators].iter().copied()
         };
         let kept_out = compiled.actions.iter().map(|action| {

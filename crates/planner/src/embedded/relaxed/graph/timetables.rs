@@ -84,7 +84,7 @@ impl Graph {
                 continue;
             }
             for truth in [true, false] {
-                let holds = compiled.beginning.facts[fact as usize] == truth;
+                let holds = compiled.initial.facts[fact as usize] == truth;
                 let spans = spans(holds, truth, &changes);
                 self.add_timetable(Literal::new(fact, truth), spans);
             }

@@ -2,10 +2,10 @@
 
 use proptest::prelude::*;
 
-use super::{MOST_RECENT, States, is_settled};
+use super::{MAX_RECENT, States, is_settled};
 use crate::embedded::apply::Stepper;
 use crate::embedded::compile::Compressibility;
-use crate::embedded::pairs::tests::{Draft, drafts, numeric_drafts};
+use crate::embedded::h2::tests::{Draft, drafts, numeric_drafts};
 use crate::embedded::relaxed::Relaxed;
 use crate::embedded::root::root;
 use crate::embedded::state::State;
@@ -38,7 +38,7 @@ fn keep_and_read(draft: &Draft, picks: &[(prop::sample::Index, prop::sample::Ind
     }
     let mut made = State::default();
     let mut facts = Vec::new();
-    for step in [1, MOST_RECENT + 1] {
+    for step in [1, MAX_RECENT + 1] {
         for place in (0..plain.len()).step_by(step) {
             let number = u32::try_from(place).expect("few");
             let expected = format!("{:?}", plain[place]);
@@ -78,12 +78,12 @@ fn picks() -> impl Strategy<Value = Vec<(prop::sample::Index, prop::sample::Inde
 
 proptest! {
     #[test]
-    fn a_kept_state_is_read_as_it_was(draft in drafts(), picks in picks()) {
+    fn stored_state_is_restored_unchanged(draft in drafts(), picks in picks()) {
         keep_and_read(&draft, &picks);
     }
 
     #[test]
-    fn so_is_one_with_numbers(draft in numeric_drafts(), picks in picks()) {
+    fn stored_numeric_state_is_restored_unchanged(draft in numeric_drafts(), picks in picks()) {
         keep_and_read(&draft, &picks);
     }
 }

@@ -22,7 +22,7 @@ fn drafts() -> impl Strategy<Value = (Draft, Vec<u8>)> {
 
 proptest! {
     #[test]
-    fn no_times_within_the_constraints_exceed_the_bound((draft, chosen) in drafts()) {
+    fn feasible_times_never_exceed_bound((draft, chosen) in drafts()) {
         let scale = Scale::of(std::iter::empty());
         let tick = |time: u8| scale.floor(&Rational::from(i64::from(time))).0;
         let (mut network, mut symbolic) = (Network::default(), Symbolic::default());

@@ -21,7 +21,7 @@ use crate::embedded::time::{NEVER, Ticks};
 #[derive(Clone, Debug)]
 struct DraftNode {
     earliest: Ticks,
-    room: Option<Ticks>,
+    width: Option<Ticks>,
     after: Vec<(usize, Ticks)>,
     before: Option<(usize, Ticks)>,
     /// The demand added with this happening: coefficients of happenings, a constant, and a
@@ -54,7 +54,7 @@ fn drafts() -> impl Strategy<Value = Vec<DraftNode>> {
     )
         .prop_map(|(earliest, room, after, before, demand)| DraftNode {
             earliest,
-            room,
+            width: room,
             after,
             before,
             demand,
@@ -62,7 +62,7 @@ fn drafts() -> impl Strategy<Value = Vec<DraftNode>> {
     prop::collection::vec(node, 2..10)
 }
 
-fn nothing() -> Compiled {
+fn trivial_problem() -> Compiled {
     let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (f))
         (:durative-action a :parameters () :duration (= ?duration 5)
           :condition (and) :effect (at end (f))))";
@@ -87,7 +87,7 @@ fn add(network: &mut Network, draft: &DraftNode) -> Option<()> {
     for &(number, distance) in &draft.after {
         after.extend(old(number).map(|old| (old, distance)));
     }
-    let latest = draft.room.map_or(NEVER, |room| draft.earliest + room);
+    let latest = draft.width.map_or(NEVER, |room| draft.earliest + room);
     let new = network.add_node(draft.earliest, latest, &after).ok()?;
     if let Some((number, most)) = draft.before
         && let Some(old) = old(number)
@@ -111,13 +111,13 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2_000, ..ProptestConfig::default() })]
 
     #[test]
-    fn few_happenings_have_times_exactly_when_all_have(
+    fn projected_times_exist_exactly_if_full_times_exist(
         drafts in drafts(),
         weights in prop::collection::vec((0..12_usize, -1..2_i64), 0..3),
         (time, most, may_equal) in (0..2_i64, -20..120_i64, any::<bool>()),
         is_limited in any::<bool>(),
     ) {
-        let compiled = nothing();
+        let compiled = trivial_problem();
         let mut network = Network::default();
         let mut symbolic = Symbolic::default();
         let bound = MetricBound { value: compiled.scale.units(most), may_equal };

@@ -8,47 +8,47 @@ use rustdds::{GUID, Timestamp, WriteOptionsBuilder};
 use serde::Serialize;
 
 use super::super::session::now;
-use super::{Asker, Framed, note_readers};
+use super::{Framed, RequestId, note_readers};
 
 /// Delay of an answer to a reader that has not been discovered. Then it is sent without waiting any longer.
-const FOUND_WITHIN: Duration = Duration::from_secs(2);
+const DISCOVERY_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Period for which an answer is kept and sent again once its reader is discovered, because the first one did not reach
 /// it. Fast DDS repeats a lost announcement after three seconds, and a repetition can be lost as well.
-const KEPT_FOR: Duration = Duration::from_secs(30);
+const RETENTION: Duration = Duration::from_secs(30);
 
 /// Answer to a client whose reader may not have been discovered.
 struct Waiting<T> {
-    asker: Asker,
+    asker: RequestId,
     response: T,
     since: Instant,
     is_sent: bool,
 }
 
 /// Answers of a service.
-pub(crate) struct Answers<T: Serialize> {
+pub(crate) struct ServiceReplies<T: Serialize> {
     writer: DataWriterCdr<Framed<T>>,
     /// Discovered readers. An answer to another one is lost.
-    found: BTreeSet<GUID>,
+    readers: BTreeSet<GUID>,
     waiting: Vec<Waiting<T>>,
 }
 
-impl<T: Serialize> Answers<T> {
+impl<T: Serialize> ServiceReplies<T> {
     pub(super) fn new(writer: DataWriterCdr<Framed<T>>) -> Self {
         Self {
             writer,
-            found: BTreeSet::new(),
+            readers: BTreeSet::new(),
             waiting: Vec::new(),
         }
     }
 }
 
-impl<T: Serialize + Clone> Answers<T> {
+impl<T: Serialize + Clone> ServiceReplies<T> {
     /// Answers a request, at once or when the reader of the client is discovered.
     ///
     /// # Errors
     /// It could not be sent.
-    pub(crate) fn answer(&mut self, asker: Asker, response: T) -> Result<(), String> {
+    pub(crate) fn answer(&mut self, asker: RequestId, response: T) -> Result<(), String> {
         self.waiting.push(Waiting {
             asker,
             response,
@@ -63,28 +63,28 @@ impl<T: Serialize + Clone> Answers<T> {
     /// # Errors
     /// One could not be sent.
     pub(crate) fn flush(&mut self) -> Result<(), String> {
-        note_readers(&self.writer, &mut self.found);
+        note_readers(&self.writer, &mut self.readers);
         let clock = now();
         let mut outcome = Ok(());
-        let (writer, found) = (&self.writer, &self.found);
+        let (writer, found) = (&self.writer, &self.readers);
         self.waiting.retain_mut(|it| {
             let age = clock.saturating_duration_since(it.since);
             let is_found = is_found(&it.asker, found);
-            if is_found || (!it.is_sent && age >= FOUND_WITHIN) {
+            if is_found || (!it.is_sent && age >= DISCOVERY_TIMEOUT) {
                 it.is_sent = true;
                 let sent = send(writer, &it.asker, it.response.clone());
                 if sent.is_err() {
                     outcome = sent;
                 }
             }
-            !is_found && age < KEPT_FOR
+            !is_found && age < RETENTION
         });
         outcome
     }
 }
 
 /// Returns `true` if the reader of a client is discovered.
-fn is_found(asker: &Asker, found: &BTreeSet<GUID>) -> bool {
+fn is_found(asker: &RequestId, found: &BTreeSet<GUID>) -> bool {
     let who = asker.identity.writer_guid;
     if who.entity_id.entity_kind.is_reader() {
         return found.contains(&who);
@@ -95,7 +95,7 @@ fn is_found(asker: &Asker, found: &BTreeSet<GUID>) -> bool {
 
 fn send<T: Serialize>(
     writer: &DataWriterCdr<Framed<T>>,
-    asker: &Asker,
+    asker: &RequestId,
     response: T,
 ) -> Result<(), String> {
     let options = WriteOptionsBuilder::new()

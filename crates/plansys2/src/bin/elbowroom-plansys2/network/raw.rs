@@ -32,9 +32,9 @@ impl DeserializerAdapter<Raw> for RawAdapter {
 
 /// Decoder that copies the bytes.
 #[derive(Clone)]
-pub(super) struct AsItIs;
+pub(super) struct RawDecoder;
 
-impl Decode<'_, Raw> for AsItIs {
+impl Decode<'_, Raw> for RawDecoder {
     type Error = Infallible;
 
     fn decode_bytes(
@@ -48,6 +48,6 @@ impl Decode<'_, Raw> for AsItIs {
 }
 
 impl DefaultDecoder<Raw> for RawAdapter {
-    type Decoder = AsItIs;
-    const DECODER: AsItIs = AsItIs;
+    type Decoder = RawDecoder;
+    const DECODER: RawDecoder = RawDecoder;
 }

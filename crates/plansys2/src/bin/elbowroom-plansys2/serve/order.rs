@@ -6,19 +6,19 @@ use std::thread;
 use elbowroom_plansys2::knowledge::{SubGoalsResponse, Tree};
 
 use super::super::Input;
-use super::super::command::{self, Patience};
-use super::super::network::Asker;
-use super::{Serving, told};
+use super::super::command::{self, ChildLimits};
+use super::super::network::RequestId;
+use super::{Server, warn_on_error};
 
 /// Order of the subgoals, and the clients that wait for it.
 #[derive(Default)]
 pub(super) struct Order {
     known: Option<Result<Vec<Tree>, String>>,
     /// Clients that have asked before the order was known.
-    pub(super) asked: Vec<Asker>,
+    pub(super) waiting: Vec<RequestId>,
 }
 
-impl Serving {
+impl Server {
     /// Starts a process that computes the order. The result is an input.
     pub(super) fn find_order(&mut self, plan: String) {
         let Some(texts) = self.texts.clone() else {
@@ -26,7 +26,7 @@ impl Serving {
         };
         let (number, inputs) = (self.runs, self.inputs.clone());
         let elbowroom = self.settings.elbowroom.clone();
-        let patience = Patience {
+        let patience = ChildLimits {
             within: self.settings.plan_within,
             is_over: Arc::clone(&self.is_over),
         };
@@ -44,20 +44,20 @@ impl Serving {
             return;
         };
         execution.order.known = Some(order);
-        for who in std::mem::take(&mut execution.order.asked) {
-            self.tell_order(who);
+        for who in std::mem::take(&mut execution.order.waiting) {
+            self.send_order(who);
         }
     }
 
     /// Answers now if the order is known, and later otherwise.
-    pub(super) fn tell_order(&mut self, who: Asker) {
+    pub(super) fn send_order(&mut self, who: RequestId) {
         let Some(execution) = &mut self.execution else {
             return self.refuse_order(who, "no plan is being executed");
         };
         match execution.order.known.clone() {
-            None => execution.order.asked.push(who),
+            None => execution.order.waiting.push(who),
             Some(Err(why)) => self.refuse_order(who, &why),
-            Some(Ok(sub_goals)) => told(self.services.order.answer(
+            Some(Ok(sub_goals)) => warn_on_error(self.services.order.answer(
                 who,
                 SubGoalsResponse {
                     success: true,
@@ -68,11 +68,11 @@ impl Serving {
         }
     }
 
-    pub(super) fn refuse_order(&mut self, who: Asker, why: &str) {
+    pub(super) fn refuse_order(&mut self, who: RequestId, why: &str) {
         let response = SubGoalsResponse {
             error_info: why.to_owned(),
             ..SubGoalsResponse::default()
         };
-        told(self.services.order.answer(who, response));
+        warn_on_error(self.services.order.answer(who, response));
     }
 }

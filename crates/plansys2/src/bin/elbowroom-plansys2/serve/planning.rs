@@ -6,24 +6,24 @@ use std::thread;
 use elbowroom_plansys2::interface::{Plan, PlanRequest, PlanResponse};
 
 use super::super::Input;
-use super::super::command::{self, Patience, Planned};
-use super::super::network::Asker;
+use super::super::command::{self, ChildLimits, Planned};
+use super::super::network::RequestId;
 use super::super::services::PLANNER;
-use super::{Serving, told};
+use super::{Server, warn_on_error};
 
 /// Maximum number of concurrent planners.
 const MOST_PLANNERS: usize = 4;
 
-impl Serving {
+impl Server {
     /// Starts a planner, unless the request is rejected. The result is an input.
-    pub(super) fn plan(&mut self, who: Asker, texts: PlanRequest) {
+    pub(super) fn plan(&mut self, who: RequestId, texts: PlanRequest) {
         self.work(move |elbowroom, refused, patience| {
             let planned = refused.and_then(|()| command::plan(elbowroom, &texts, patience));
             Input::Planned(who, texts, planned)
         });
     }
 
-    pub(super) fn validate(&mut self, who: Asker, domain: String) {
+    pub(super) fn validate(&mut self, who: RequestId, domain: String) {
         self.work(move |elbowroom, refused, patience| {
             Input::Validated(
                 who,
@@ -34,7 +34,7 @@ impl Serving {
 
     fn work(
         &mut self,
-        work: impl FnOnce(&str, Result<(), String>, &Patience) -> Input + Send + 'static,
+        work: impl FnOnce(&str, Result<(), String>, &ChildLimits) -> Input + Send + 'static,
     ) {
         let refused = if !self.nodes[PLANNER].serves() {
             Err("the planner is not active".to_owned())
@@ -48,13 +48,13 @@ impl Serving {
         let (within, is_over) = (self.settings.plan_within, Arc::clone(&self.is_over));
         thread::spawn(move || {
             // The receiver is dropped when the program ends.
-            let _ = inputs.send(work(&elbowroom, refused, &Patience { within, is_over }));
+            let _ = inputs.send(work(&elbowroom, refused, &ChildLimits { within, is_over }));
         });
     }
 
     pub(super) fn has_planned(
         &mut self,
-        who: Asker,
+        who: RequestId,
         texts: PlanRequest,
         planned: Result<Planned, String>,
     ) {
@@ -75,6 +75,6 @@ impl Serving {
                 error_info,
             },
         };
-        told(self.services.plan.answer(who, response));
+        warn_on_error(self.services.plan.answer(who, response));
     }
 }

@@ -6,10 +6,10 @@ use elbowroom_model::Situation;
 use elbowroom_model::ground::{Change, FactId};
 
 use super::super::super::Calendar;
-use super::super::super::calendars::{DatedFact, nested_reads, take_out};
+use super::super::super::calendars::{DatedFact, extract_conditions, nested_reads};
 use super::super::super::interference::Access;
 use super::super::Builder;
-use super::Coming;
+use super::FutureTimed;
 use crate::embedded::formula::Formula;
 use crate::embedded::time::Scale;
 use crate::embedded::windows::Windows;
@@ -18,9 +18,9 @@ impl Builder<'_> {
     /// Removes the conditions on calendars from all happenings, and their timed initials from the
     /// future ones. `others` are the formulas that must not read a calendar. Also returns `true` if
     /// all times are on the grid.
-    pub(super) fn take_out_calendars<'f>(
+    pub(super) fn extract_calendars<'f>(
         &mut self,
-        coming: &mut Coming,
+        coming: &mut FutureTimed,
         situation: &Situation,
         others: impl Iterator<Item = &'f Formula>,
         scale: Scale,
@@ -58,7 +58,7 @@ impl Builder<'_> {
             .retain(|happening| !happening.changes.is_empty());
         coming.separations = self.separations_of(&coming.happenings);
         let (calendars, windows) =
-            take_out(&dated, self.epsilon, &mut self.actions, &mut self.snaps);
+            extract_conditions(&dated, self.epsilon, &mut self.actions, &mut self.snaps);
         (calendars, windows, are_exact)
     }
 
@@ -66,7 +66,7 @@ impl Builder<'_> {
     /// conditions of actions.
     fn calendar_facts<'f>(
         &self,
-        coming: &Coming,
+        coming: &FutureTimed,
         others: impl Iterator<Item = &'f Formula>,
     ) -> BTreeSet<FactId> {
         let nested = nested_reads(&self.actions, &self.snaps, others);

@@ -9,7 +9,7 @@ use super::super::{Graph, Kind};
 use crate::embedded::apply::{Step, Stepper};
 use crate::embedded::compile::{Action, Compiled, Compressibility, Macro, NONE};
 use crate::embedded::formula::{Literal, set};
-use crate::embedded::pairs::tests::{Draft, drafts};
+use crate::embedded::h2::tests::{Draft, drafts};
 use crate::embedded::root::root;
 use crate::embedded::state::State;
 use crate::embedded::testing::{choices, compiled};
@@ -127,7 +127,7 @@ fn walk(draft: &Draft, path: &[prop::sample::Index]) -> (usize, usize) {
 }
 
 #[test]
-fn macro_operators_are_the_steps_that_they_are_made_of() {
+fn macro_operator_equals_sequence_of_its_steps() {
     let config = ProptestConfig {
         cases: 2_000,
         failure_persistence: None,

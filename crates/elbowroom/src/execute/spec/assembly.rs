@@ -1,0 +1,504 @@
+//! Construction of a run from its specification.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom_envelope::Objective;
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::run::PlanningTime;
+use elbowroom_execution::{
+    ActionValues, NoPlanner, PlanComparator, PlanForm, Planner, PrepareError, Preparer, World,
+};
+use elbowroom_external::{self as external, PlannerError};
+use elbowroom_model::problem::Problem;
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::{Rational, work};
+use elbowroom_planner::embedded;
+use elbowroom_probability::Likelihoods;
+use elbowroom_sim::{ControlledWorld, SimWorld, WorldModel};
+use elbowroom_text::Diagnostics;
+
+use super::{EMBEDDED, NO_PLANNER, RunSpec};
+use crate::answers::envelope::unknown_action;
+use crate::execute::{
+    ActionSets, AdversarialWorld, Embedded, Execution, External, FirstPlan, MostProbablePlanner,
+    PlanPreparer, PlanSelector, Replanning, RolloutPolicy, Rollouts, SelectingPlanner,
+    SharedRolloutPolicy, WorldKnowledge, planning_work,
+};
+use crate::timed::{Policy, Settings};
+use crate::{BoxTextError, DistributionError, parse_box, pipeline};
+
+/// The time limit of another planner for its first plan.
+const FIRST_PLAN_TIME_LIMIT: Duration = Duration::from_secs(60);
+
+/// A specification that cannot be run.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SpecError {
+    /// The world file cannot be read.
+    #[error("{0}")]
+    World(Diagnostics),
+    /// Another planner is unknown, or cannot be used with these settings.
+    #[error(transparent)]
+    Planner(#[from] PlannerError),
+    /// The likelihood file cannot be read.
+    #[error("{0}")]
+    Likelihoods(Diagnostics),
+    /// The problem has a part that executors do not support.
+    #[error(
+        "plans cannot be executed here: executors do not support {0} yet, which the domain has"
+    )]
+    UnsupportedFeature(&'static str),
+    /// The time-outs name an action that the problem does not have.
+    #[error("{0}")]
+    Timeout(String),
+    /// The executor compares plans in the world of a world file, but there is none.
+    #[error("`{0}` must know how the world behaves")]
+    NeedsWorld(ExecutorSpec),
+    /// The executor compares plans of the embedded planner, but another planner is given.
+    #[error("`{0}` chooses among plans of the embedded planner")]
+    NeedsEmbedded(ExecutorSpec),
+    /// Self-overlap was allowed, but the plans come from another planner, or there is no planner.
+    #[error("self-overlap can be allowed in plans of the embedded planner only, not of `{0}`")]
+    SelfOverlap(String),
+    /// The likeliest first plan was requested, but it cannot be chosen.
+    #[error("the likeliest first plan cannot be chosen: {0}")]
+    FirstPlan(FirstPlanError),
+    /// A time limit was set for a planner that has none.
+    #[error("`{0}` has no time limit for better plans; the embedded planner is limited by states")]
+    NoTimeLimit(String),
+    /// The most likely box was requested, but there is no model of the world.
+    #[error(transparent)]
+    Distribution(#[from] DistributionError),
+    /// A simulation was requested, but the world is a process.
+    #[error("the world is a process; it cannot be simulated")]
+    Process,
+    /// The adversarial world cannot be created.
+    #[error(transparent)]
+    Adversary(#[from] AdversaryError),
+}
+
+/// Reasons why the first plan cannot be chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FirstPlanError {
+    /// A plan was given.
+    #[error("a plan is given")]
+    Given,
+    /// Another planner was named, whose plan is used without a choice.
+    #[error("it is one of the embedded planner's")]
+    ExternalPlanner,
+    /// There is no world file, and there are no likelihoods.
+    #[error("nothing is known of the world")]
+    NoWorldKnowledge,
+    /// Goals are given later.
+    #[error("the goals are still to come")]
+    Persistent,
+}
+
+/// Reasons why an adversarial world cannot be created.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AdversaryError {
+    /// There is no plan.
+    #[error("there is no plan to spoil")]
+    NoPlan,
+    /// The plan cannot be prepared.
+    #[error(transparent)]
+    Unprepared(#[from] PrepareError),
+    /// The box is not one of this plan.
+    #[error(transparent)]
+    Box(#[from] BoxTextError),
+    /// The plan has no envelope, and no box was given.
+    #[error("the plan has no envelope to spoil it in")]
+    NoEnvelope,
+    /// The plan's constraints are inconsistent.
+    #[error("in this box nothing satisfies the plan's constraints")]
+    Empty,
+}
+
+impl RunSpec {
+    /// Returns the world of the specification, unless it is a process: a simulation of `model`, or
+    /// an adversary of `plan`.
+    ///
+    /// # Errors
+    /// When there is no plan for the adversary, or the plan does not match the box.
+    pub fn world<'m>(
+        &self,
+        model: &'m WorldModel,
+        task: &Arc<Task>,
+        plan: Option<&TimeTriggeredPlan>,
+    ) -> Result<Box<dyn World + 'm>, AdversaryError> {
+        let Some(spoiler) = &self.spoiler else {
+            return Ok(model.world(task, self.seed));
+        };
+        let plan = plan.ok_or(AdversaryError::NoPlan)?;
+        let mut settings = self.envelopes();
+        settings.world = Some(Arc::new(model.clone()));
+        let mut analyst = PlanPreparer::new(settings);
+        let prepared = analyst.prepare(task, plan, PlanForm::OpenNetwork)?;
+        let envelope = match (&spoiler.inside, prepared.envelope) {
+            (Some(text), _) => parse_box(text, &prepared.plan)?,
+            (None, Some(envelope)) => envelope,
+            (None, None) => return Err(AdversaryError::NoEnvelope),
+        };
+        let network = prepared.plan.uncertain_network(&envelope);
+        let network = network.map_err(|_| AdversaryError::Empty)?;
+        let spoiling = AdversarialWorld::new(
+            &prepared.plan.plan,
+            &network,
+            &prepared.nominal,
+            &self.timeout,
+        );
+        let sim = SimWorld::new(Arc::clone(task), model, self.seed);
+        Ok(Box::new(ControlledWorld::new(sim, spoiling)))
+    }
+
+    /// Returns the planner that [`Self::planner`] names, with the limits of the run, and with
+    /// `clock` and `goes_on` as in [`Embedded`]. For executors that search for likelier plans, it
+    /// returns the likeliest plan in the world of `model`. The embedded planner's first plan is
+    /// chosen by [`Self::first_plan`]; other planners return their only plan.
+    ///
+    /// # Errors
+    /// When the planner is unknown, or has no such limit, or the likelihood file cannot be read.
+    pub fn planner_for<'a>(
+        &self,
+        task: &Task,
+        model: Option<&WorldModel>,
+        clock: &'a (dyn Fn() -> Rational + Sync),
+        goes_on: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Box<dyn Planner + 'a>, SpecError> {
+        let embedded = Embedded {
+            clock: Some(clock),
+            may_continue: Some(goes_on),
+            ..self.embedded()
+        };
+        let planner: Box<dyn Planner + 'a> = match self.planner_choice()? {
+            PlannerChoice::Disabled => return Ok(Box::new(NoPlanner)),
+            PlannerChoice::Embedded => match model.filter(|_| self.executor.needs_comparator()) {
+                None => Box::new(embedded),
+                Some(model) => {
+                    let time = self.expected_planning_time();
+                    Box::new(MostProbablePlanner::new(model.clone(), embedded, time))
+                }
+            },
+            PlannerChoice::External(planner) => {
+                let given = self.planner_time.as_ref();
+                let limit = given.map(|time| Duration::from_secs_f64(time.to_f64().min(1e9)));
+                return Ok(Box::new(External {
+                    planner: *planner,
+                    domain: self.domain.source(),
+                    problem: self.problem.source(),
+                    settings: external::Settings {
+                        time_limit: Some(limit.unwrap_or(FIRST_PLAN_TIME_LIMIT)),
+                        ..external::Settings::default()
+                    },
+                    stops_at_first_plan: limit.is_none(),
+                    may_continue: goes_on,
+                }));
+            }
+        };
+        let Some(known) = self.first_plan_knowledge(task, model)? else {
+            return Ok(planner);
+        };
+        let chooser = PlanSelector {
+            settings: self.embedded().settings,
+            most_states: self.planner_states,
+            improve_states: self.improve_states,
+            work: self
+                .planning_budget
+                .as_ref()
+                .map_or(u64::MAX, planning_work),
+            knowledge: known,
+            may_continue: goes_on,
+        };
+        Ok(Box::new(SelectingPlanner {
+            inner: planner,
+            chooser: Some(chooser),
+            latest_start: self.expected_planning_time(),
+            clock,
+        }))
+    }
+
+    /// Returns the knowledge for the choice of the first plan. `None` if the planner's own plan is
+    /// used: if it was requested, there is no knowledge, or goals are given later.
+    fn first_plan_knowledge(
+        &self,
+        task: &Task,
+        model: Option<&WorldModel>,
+    ) -> Result<Option<WorldKnowledge>, SpecError> {
+        if self.first_plan.is_shortest() || self.has_plan || self.is_persistent {
+            return Ok(None);
+        }
+        let likelihoods = self.likelihoods(task)?;
+        if let Some(world) = model.filter(|_| self.believed_world().is_some()) {
+            return Ok(Some(WorldKnowledge::World(
+                self.rollouts(world, likelihoods),
+            )));
+        }
+        Ok(self
+            .likelihoods
+            .is_some()
+            .then(|| WorldKnowledge::Likelihoods {
+                reorders: self.executor.chooses_order(),
+                likelihoods,
+            }))
+    }
+
+    /// Returns the settings of rollouts of this run in samples of its world.
+    fn rollouts(&self, world: &WorldModel, likelihoods: Arc<Likelihoods>) -> Rollouts {
+        let world = Arc::new(world.clone());
+        let mut flow = self.envelopes();
+        flow.world = Some(Arc::clone(&world));
+        Rollouts {
+            world,
+            executor: self.executor.clone(),
+            settings: self.settings(),
+            flow,
+            likelihoods,
+            replanning: Some(Replanning::within(&self.embedded())),
+            is_ready: false,
+        }
+    }
+
+    /// Returns the rollouts of executors that evaluate moves, which replace a table of moves.
+    /// `None` if there is no believed world.
+    fn rollout_policy(
+        &self,
+        task: &Task,
+        model: Option<&WorldModel>,
+    ) -> Result<Option<SharedRolloutPolicy>, SpecError> {
+        if self.believed_world().is_none() || !self.executor.needs_action_values() {
+            return Ok(None);
+        }
+        let Some(world) = model else {
+            return Ok(None);
+        };
+        let rollouts = self.rollouts(world, self.likelihoods(task)?);
+        let rehearse = RolloutPolicy::new(rollouts, self.embedded());
+        Ok(Some(SharedRolloutPolicy::new(rehearse)))
+    }
+
+    /// Returns the default criterion for a first plan: its probability, if the embedded planner
+    /// makes it and there is a model of the world or of likelihoods; otherwise, its makespan or
+    /// metric.
+    pub fn usual_first_plan(&self) -> FirstPlan {
+        let is_known = self.believed_world().is_some() || self.likelihoods.is_some();
+        let is_embedded = self.planner.eq_ignore_ascii_case(EMBEDDED);
+        if is_known && is_embedded && !self.has_plan && !self.is_persistent {
+            FirstPlan::Likeliest
+        } else {
+            FirstPlan::Shortest
+        }
+    }
+
+    /// Returns the planner that [`Self::planner`] names.
+    fn planner_choice(&self) -> Result<PlannerChoice, SpecError> {
+        let name = &self.planner;
+        let own = match name {
+            name if name.eq_ignore_ascii_case(EMBEDDED) => PlannerChoice::Embedded,
+            name if name.eq_ignore_ascii_case(NO_PLANNER) => PlannerChoice::Disabled,
+            name => {
+                return Ok(PlannerChoice::External(Box::new(external::Planner::named(
+                    name,
+                )?)));
+            }
+        };
+        match self.planner_time {
+            Some(_) => Err(SpecError::NoTimeLimit(name.clone())),
+            None => Ok(own),
+        }
+    }
+
+    /// Checks that the planner is known, and supports its settings.
+    ///
+    /// # Errors
+    /// When it is unknown, or does not support them.
+    pub fn check_planner(&self) -> Result<(), SpecError> {
+        match self.planner_choice()? {
+            PlannerChoice::Disabled | PlannerChoice::External(_) if self.self_overlap => {
+                Err(SpecError::SelfOverlap(self.planner.clone()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks the consistency of the members before files are read: the planner is known, and the
+    /// executor supports the planner and the model of the world.
+    ///
+    /// # Errors
+    /// When they are inconsistent.
+    pub fn check(&self) -> Result<(), SpecError> {
+        self.check_planner()?;
+        let whom = self.planner_choice()?;
+        if !self.first_plan.is_shortest() {
+            let is_known = self.believed_world().is_some() || self.likelihoods.is_some();
+            let wrong = match whom {
+                _ if self.has_plan => Some(FirstPlanError::Given),
+                _ if self.is_persistent => Some(FirstPlanError::Persistent),
+                PlannerChoice::Embedded if is_known => None,
+                PlannerChoice::Embedded => Some(FirstPlanError::NoWorldKnowledge),
+                PlannerChoice::Disabled | PlannerChoice::External(_) => {
+                    Some(FirstPlanError::ExternalPlanner)
+                }
+            };
+            if let Some(wrong) = wrong {
+                return Err(SpecError::FirstPlan(wrong));
+            }
+        }
+        if self.objective == Some(Objective::Probability) && self.believed_world().is_none() {
+            return Err(SpecError::Distribution(DistributionError::NoWorld));
+        }
+        // Executors that evaluate moves follow the plan if there is no model.
+        if !self.executor.needs_comparator() || self.executor.needs_action_values() {
+            return Ok(());
+        }
+        if self.believed_world().is_none() && self.spoiler.is_none() {
+            return Err(SpecError::NeedsWorld(self.executor.clone()));
+        }
+        match whom {
+            PlannerChoice::Embedded => Ok(()),
+            _ => Err(SpecError::NeedsEmbedded(self.executor.clone())),
+        }
+    }
+
+    /// Returns the embedded planner, with the limits of the run and without a clock.
+    pub fn embedded(&self) -> Embedded<'static> {
+        Embedded {
+            settings: embedded::Settings {
+                self_overlap: self.self_overlap,
+                threads: self.threads,
+                ..embedded::Settings::default()
+            },
+            most_states: self.planner_states,
+            improve_states: self.improve_states,
+            work: self
+                .planning_budget
+                .as_ref()
+                .map_or(u64::MAX, planning_work),
+            // Requests have to wait for plans that are made in the thread of the run.
+            first_plan_factor: if self.is_persistent && self.executor.needs_comparator() {
+                1
+            } else {
+                Embedded::default().first_plan_factor
+            },
+            ..Embedded::default()
+        }
+    }
+
+    /// Returns the expected planning time in the world; 0 if it is measured, because it is not
+    /// known in advance.
+    fn expected_planning_time(&self) -> Rational {
+        match &self.planning_time {
+            PlanningTime::Seconds(seconds) => seconds.clone(),
+            PlanningTime::Measured => Rational::ZERO,
+        }
+    }
+
+    /// Returns the preparer of plans of this problem.
+    ///
+    /// # Errors
+    /// When the world file cannot be read.
+    pub fn analyst(&self, problem: &Problem) -> Result<PlanPreparer, SpecError> {
+        let model = self.beliefs(problem).map_err(SpecError::World)?;
+        Ok(PlanPreparer::new(self.envelopes_in(model.as_ref())))
+    }
+
+    fn envelopes_in(&self, model: Option<&WorldModel>) -> pipeline::Settings {
+        let mut envelopes = self.envelopes();
+        if self.believed_world().is_some() {
+            envelopes.world = model.cloned().map(Arc::new);
+        }
+        envelopes
+    }
+
+    /// Returns the execution of the specification. The caller adds the planner, the initial plan
+    /// and the world. Tables and likelihoods for the executor are computed within limits that do
+    /// not depend on the machine.
+    ///
+    /// # Errors
+    /// When its files cannot be read, or its members are inconsistent.
+    pub fn execution(&self, task: &Arc<Task>) -> Result<Execution<'static>, SpecError> {
+        self.check()?;
+        if let Some(feature) = task.validator_only_feature() {
+            return Err(SpecError::UnsupportedFeature(feature));
+        }
+        if let Some(mistake) = unknown_action(&self.timeout, task.problem()) {
+            return Err(SpecError::Timeout(mistake));
+        }
+        let model = self.beliefs(task.problem()).map_err(SpecError::World)?;
+        let envelopes = self.envelopes_in(model.as_ref());
+        let model = model.filter(|_| self.executor.needs_comparator());
+        let is_embedded = matches!(self.planner_choice()?, PlannerChoice::Embedded);
+        // A table of moves has a fixed goal.
+        let has_table = self.executor.needs_action_values() && !self.is_persistent;
+        let tabulated = model.as_ref().filter(|_| has_table);
+        let tabulated = tabulated.map(|model| self.action_values(task, model, is_embedded));
+        let (outlook, no_table) = match tabulated.transpose() {
+            Ok(outlook) => (outlook, None),
+            Err(why) => (None, Some(why)),
+        };
+        let model = model.filter(|_| is_embedded);
+        let rehearsal = match &outlook {
+            Some(_) => None,
+            None => self.rollout_policy(task, model.as_ref())?,
+        };
+        let odds = model.map(|model| {
+            let time = self.expected_planning_time();
+            Box::new(MostProbablePlanner::new(model, self.embedded(), time))
+                as Box<dyn PlanComparator>
+        });
+        Ok(Execution::of(task)
+            .by(self.executor.clone())
+            .with_settings(self.settings())
+            .persistent(self.is_persistent)
+            .interactive(self.is_interactive)
+            .with_envelopes(envelopes)
+            .with_likelihoods(self.likelihoods(task)?)
+            .with_plan_comparator(odds)
+            .with_action_values(outlook)
+            .with_missing_table_reason(no_table)
+            .with_rollouts(rehearsal))
+    }
+
+    /// Computes the table of moves of `policy` for the world of `model`.
+    ///
+    /// # Errors
+    /// The reason for a missing table, for users.
+    fn action_values(
+        &self,
+        task: &Arc<Task>,
+        model: &WorldModel,
+        is_embedded: bool,
+    ) -> Result<Arc<dyn ActionValues>, String> {
+        let embedded = self.embedded();
+        let budget = work::Budget::new(embedded.work);
+        let goes_on = || !budget.is_spent();
+        let sets = if is_embedded {
+            ActionSets::for_policy(task, model, embedded, &goes_on)
+        } else {
+            ActionSets::default()
+        };
+        let settings = Settings {
+            plans: sets.plans,
+            fallbacks: sets.fallbacks,
+            ..Settings::default()
+        };
+        let policy = Policy::if_near_optimal(task, model, &settings, &goes_on);
+        match policy.map_err(|error| error.what)? {
+            Some(policy) => Ok(Arc::new(policy)),
+            None if goes_on() => Err(
+                "it would have too many states, or its bounds would stay more than two points apart"
+                    .to_owned(),
+            ),
+            None => Err("the planning budget is spent (`--planning-budget`)".to_owned()),
+        }
+    }
+}
+
+/// The planner of a run.
+enum PlannerChoice {
+    Embedded,
+    Disabled,
+    External(Box<external::Planner>),
+}

@@ -1,0 +1,536 @@
+//! Pursuit of goals that can be reached together.
+//!
+//! At first, an executive pursues all open goals together. If there is no plan for all of them,
+//! some are selected ([`Selection`]) and the other goals are set aside. These are pursued when the
+//! selected ones are achieved, or when the goals change. Goals that are added while a plan is
+//! executed are added to those of the plan; if no plan reaches all of them, the new goals are set
+//! aside and the plan continues. If there are several goals, each is closed as soon as it is
+//! achieved.
+
+use std::collections::BTreeSet;
+
+use elbowroom_num::Rational;
+
+use super::background_search::SearchResults;
+use super::dead_end::unreachable_conditions;
+use super::goals::OpenGoal;
+use super::selection::{GoalSet, Selection, SelectionStep};
+use super::shortfall::Conflict;
+use super::{Run, Verdict};
+use crate::record::{Entry, GoalChange};
+
+/// Maximum number of goals that are listed in a reason.
+const MAX_LISTED_GOALS: usize = 5;
+
+/// A selection among the open goals.
+pub(super) struct GoalSelection {
+    /// The names of the goals, in order of preference.
+    names: Vec<String>,
+    selection: Selection,
+    /// The goals that are pursued during the selection.
+    tried: GoalSet,
+}
+
+impl GoalSelection {
+    /// Creates a selection that tries all these goals.
+    fn trying_all(names: Vec<String>, selection: Selection) -> Self {
+        Self {
+            selection,
+            tried: (0..names.len()).collect(),
+            names,
+        }
+    }
+
+    /// Creates a selection among these goals that tries all of them. Goals of greater value are
+    /// preferred, then earlier ones.
+    fn among_goals(mut goals: Vec<(String, Rational)>) -> Self {
+        goals.sort_by(|(_, value), (_, other)| other.cmp(value));
+        let (names, values) = goals.into_iter().unzip();
+        Self::trying_all(names, Selection::among(values))
+    }
+
+    fn position(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|it| it == name)
+    }
+
+    /// Records that no plan reaches all goals of a conflict.
+    fn note_conflicts(&mut self, conflicts: &[Conflict]) {
+        for conflict in conflicts {
+            let members = conflict.goals.iter().map(|name| self.position(name));
+            if let Some(set) = members.collect::<Option<GoalSet>>() {
+                self.selection.exclude(set);
+            }
+        }
+    }
+
+    /// Returns the names of those goals of the set that are open.
+    fn open(&self, set: &GoalSet, goals: &[OpenGoal]) -> BTreeSet<String> {
+        let names = set.iter().map(|it| &self.names[*it]);
+        let is_open = |name: &&String| goals.iter().any(|goal| goal.name == **name);
+        names.filter(is_open).cloned().collect()
+    }
+}
+
+impl Run<'_> {
+    /// Returns `true` while goals are selected.
+    pub(super) fn is_selecting_goals(&self) -> bool {
+        let lasting = self.goal_manager.as_ref();
+        lasting.is_some_and(|lasting| lasting.selection.is_some())
+    }
+
+    /// Closes the goals that are achieved while others are still pursued.
+    pub(super) fn close_achieved_goals(&mut self) {
+        let Some(lasting) = self.goal_manager.as_mut().filter(|it| it.goals.len() > 1) else {
+            return;
+        };
+        let belief = &self.belief;
+        let is_achieved = |goal: &OpenGoal| belief.is_certain(&goal.ground) == Ok(true);
+        let is_left = |goal: &OpenGoal| goal.is_pursued() && !is_achieved(goal);
+        if !lasting.goals.iter().any(is_left) || !lasting.goals.iter().any(is_achieved) {
+            return;
+        }
+        let (achieved, left): (Vec<_>, Vec<_>) = lasting.goals.drain(..).partition(is_achieved);
+        lasting.goals = left;
+        self.continue_without(&achieved);
+    }
+
+    /// Continues with the other goals after these were achieved.
+    fn continue_without(&mut self, achieved: &[OpenGoal]) {
+        self.search_results.has_closed_goals = self.search.is_some();
+        self.record_achieved(achieved);
+        self.set_goal();
+        if self.search.is_none() && self.is_selecting_goals() {
+            // Without the closed goals, more sets may have a plan.
+            self.restart_selection(false);
+        }
+    }
+
+    /// Returns the next coming deadline of an open goal.
+    pub(super) fn next_deadline_of_a_goal(&self) -> Option<Rational> {
+        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
+        let deadlines = goals.filter_map(|goal| goal.terms.deadline.as_ref());
+        deadlines.filter(|it| **it > self.now).min().cloned()
+    }
+
+    /// Closes the goals whose deadlines are before this time, in their order. All events up to the
+    /// deadlines must be known.
+    pub(super) fn close_goals_due_before(&mut self, time: &Rational) {
+        let goals = self.goal_manager.iter().flat_map(|it| &it.goals);
+        let deadlines = goals.filter_map(|goal| goal.terms.deadline.clone());
+        let due: BTreeSet<Rational> = deadlines.filter(|it| it < time).collect();
+        for deadline in due {
+            let _ = self.belief.advance(&deadline);
+            self.close_goals_due(&deadline);
+        }
+    }
+
+    /// Closes achieved goals with deadlines, because they need not stay true, and goals whose
+    /// deadlines are now.
+    pub(super) fn close_momentary_goals(&mut self) {
+        let Some(lasting) = &mut self.goal_manager else {
+            return;
+        };
+        let belief = &self.belief;
+        let is_achieved = |goal: &mut OpenGoal| {
+            goal.terms.deadline.is_some() && belief.is_certain(&goal.ground) == Ok(true)
+        };
+        let achieved: Vec<OpenGoal> = lasting.goals.extract_if(.., is_achieved).collect();
+        let is_any_left = lasting.goals.iter().any(OpenGoal::is_pursued);
+        match names_of(&achieved) {
+            Some(_) if is_any_left => self.continue_without(&achieved),
+            Some(names) => {
+                self.record_achieved(&achieved);
+                self.pursue_all();
+                self.record_goal_change(format!("{names} is reached"), false);
+            }
+            None => {}
+        }
+        self.close_goals_due(&self.now.clone());
+    }
+
+    /// Closes the goals with deadlines up to this time. The others are pursued without them.
+    fn close_goals_due(&mut self, time: &Rational) {
+        let Some(lasting) = &mut self.goal_manager else {
+            return;
+        };
+        let is_due =
+            |goal: &mut OpenGoal| goal.terms.deadline.as_ref().is_some_and(|it| it <= time);
+        let due: Vec<OpenGoal> = lasting.goals.extract_if(.., is_due).collect();
+        // A goal may have been achieved exactly at its deadline.
+        let is_achieved = |goal: &OpenGoal| self.belief.is_certain(&goal.ground) == Ok(true);
+        let (achieved, late): (Vec<_>, Vec<_>) = due.into_iter().partition(is_achieved);
+        self.record_achieved(&achieved);
+        for goal in &late {
+            let why = match &goal.set_aside {
+                Some(aside) => format!("its deadline has passed; it was set aside: {aside}"),
+                None => match &goal.missed_deadline {
+                    Some(late) => format!("its deadline has passed; it would have been {late}"),
+                    None => "its deadline has passed".to_owned(),
+                },
+            };
+            self.ports.recorder.record(&Entry::Goal {
+                now: &self.now,
+                name: &goal.name,
+                change: GoalChange::Failed { why: &why },
+            });
+        }
+        let words = match (names_of(&late), names_of(&achieved)) {
+            (Some(late), _) => format!("too late for {late}"),
+            (None, Some(achieved)) => format!("{achieved} is reached"),
+            (None, None) => return,
+        };
+        self.pursue_all();
+        self.record_goal_change(words, false);
+    }
+
+    fn record_achieved(&mut self, goals: &[OpenGoal]) {
+        for goal in goals {
+            self.ports.recorder.record(&Entry::Goal {
+                now: &self.now,
+                name: &goal.name,
+                change: GoalChange::Achieved,
+            });
+        }
+    }
+
+    /// Pursues all open goals again, from the next plan on.
+    pub(super) fn pursue_all(&mut self) {
+        let Some(lasting) = &mut self.goal_manager else {
+            return;
+        };
+        lasting.selection = None;
+        let mut is_changed = false;
+        for goal in &mut lasting.goals {
+            is_changed |= goal.set_aside.take().is_some();
+            goal.unreachable = None;
+        }
+        if is_changed {
+            self.set_goal();
+        }
+    }
+
+    /// Adds new goals to the selection. If no plan also reaches these, the present plan continues.
+    pub(super) fn add_goals_to_selection(&mut self) {
+        let Some(lasting) = &mut self.goal_manager else {
+            return;
+        };
+        if lasting.planned_goals.is_empty() {
+            if lasting.selection.is_some() {
+                self.restart_selection(true);
+            }
+            return;
+        }
+        let choosing = lasting.selection.take();
+        let candidates = choosing.map(|choosing| choosing.names);
+        let candidates = candidates.unwrap_or_default();
+        let (mut planned, mut new) = (Vec::new(), Vec::new());
+        for goal in &mut lasting.goals {
+            let known = (goal.name.clone(), goal.terms.value.clone());
+            if lasting.planned_goals.contains(&goal.name) {
+                planned.push(known);
+            } else if goal.is_pursued() || candidates.contains(&goal.name) {
+                goal.set_aside = None;
+                new.push(known);
+            }
+        }
+        let greatest = new.iter().map(|(_, value)| value).max();
+        let least = planned.iter().map(|(_, value)| value).min();
+        lasting.selection = match (least, greatest) {
+            (None, _) => None,
+            // Goals of the plan may be set aside for more valuable ones.
+            (Some(least), Some(greatest)) if greatest > least => {
+                Some(GoalSelection::among_goals([planned, new].concat()))
+            }
+            _ => {
+                let count = planned.len();
+                let names: Vec<String> =
+                    [planned, new].concat().into_iter().map(|it| it.0).collect();
+                let selection = Selection::growing(count, names.len());
+                Some(GoalSelection::trying_all(names, selection))
+            }
+        };
+    }
+
+    /// Continues with other goals where the run would otherwise become idle with this verdict.
+    /// Returns `false` if there are none.
+    pub(super) fn select_goals_after(&mut self, verdict: &Verdict) -> bool {
+        match verdict {
+            Verdict::GoalReached => self.pursue_goals_set_aside(),
+            Verdict::Unsolvable | Verdict::NoPlan { .. } => {
+                self.select_after_closing() || self.select_after_failure()
+            }
+            _ => {
+                self.pursue_all();
+                false
+            }
+        }
+    }
+
+    /// Closes the pursued goals, which are achieved, and pursues those that were set aside. Returns
+    /// `false` if there are none.
+    fn pursue_goals_set_aside(&mut self) -> bool {
+        let Some(lasting) = &mut self.goal_manager else {
+            return false;
+        };
+        lasting.selection = None;
+        if lasting.goals.iter().all(OpenGoal::is_pursued) {
+            return false;
+        }
+        let (achieved, left) = lasting.goals.drain(..).partition(OpenGoal::is_pursued);
+        lasting.goals = left;
+        self.record_achieved(&achieved);
+        self.pursue_all();
+        self.announce_goals();
+        self.set_goal();
+        self.drop_plan();
+        self.history.clear();
+        self.initial_belief = self.belief.clone();
+        self.reasons.clear();
+        self.replans = 0;
+        self.search_results = SearchResults::default();
+        self.record_goal_change("the others are reached".to_owned(), true);
+        true
+    }
+
+    /// Tries again if goals were closed since the plan was requested, because the others may have a
+    /// plan.
+    fn select_after_closing(&mut self) -> bool {
+        let has_closed = std::mem::take(&mut self.search_results.has_closed_goals);
+        if has_closed && !(self.is_selecting_goals() && self.restart_selection(false)) {
+            self.record_goal_change("some are reached".to_owned(), true);
+        }
+        has_closed
+    }
+
+    /// Begins a selection among all open goals that can become true. `is_tried` is `true` if no
+    /// plan was found for all of them; if there are many goals, all of them are not tried together.
+    /// Returns `false` if no goal can become true.
+    fn restart_selection(&mut self, is_tried: bool) -> bool {
+        let mut choosing = GoalSelection::among_goals(self.set_unreachable_goals_aside());
+        let all = choosing.tried.clone();
+        let is_tried = is_tried || matches!(choosing.selection, Selection::Growth(_));
+        let step = if is_tried {
+            choosing.selection.after_failure(all)
+        } else {
+            SelectionStep::Try(all)
+        };
+        self.pursue_selection_step(choosing, step, true)
+    }
+
+    /// Selects among all goals if no plan was found and goals were added since the request.
+    pub(super) fn select_after_added_goals(&mut self) {
+        if self.has_abandoned_goals() == Some(false) && !self.is_selecting_goals() {
+            self.select_after_failure();
+        }
+    }
+
+    /// Selects other goals after no plan was found for the pursued ones.
+    fn select_after_failure(&mut self) -> bool {
+        let Some(lasting) = &mut self.goal_manager else {
+            return false;
+        };
+        if let Some(mut choosing) = lasting.selection.take() {
+            self.record_unreachable_goals();
+            choosing.note_conflicts(&self.conflicts());
+            let step = choosing.selection.after_failure(choosing.tried.clone());
+            return self.pursue_selection_step(choosing, step, true);
+        }
+        if lasting.goals.len() < 2 {
+            return false;
+        }
+        let tried = lasting.goals.iter().filter(|goal| goal.is_pursued());
+        let tried: BTreeSet<String> = tried.map(|goal| goal.name.clone()).collect();
+        let mut choosing = GoalSelection::among_goals(self.set_unreachable_goals_aside());
+        choosing.note_conflicts(&self.conflicts());
+        let positions = tried.iter().map(|name| choosing.position(name));
+        let step = match positions.collect::<Option<GoalSet>>() {
+            Some(tried) => choosing.selection.after_failure(tried),
+            // Some goals can never become true.
+            None => SelectionStep::Try(choosing.tried.clone()),
+        };
+        self.pursue_selection_step(choosing, step, true)
+    }
+
+    /// Sets aside the open goals that can never become true. Returns the names and values of the
+    /// others; those with deadlines come first, in the order of their deadlines.
+    fn set_unreachable_goals_aside(&mut self) -> Vec<(String, Rational)> {
+        self.pursue_all();
+        self.record_unreachable_goals();
+        let mut others = Vec::new();
+        for goal in self.goal_manager.iter_mut().flat_map(|it| &mut it.goals) {
+            goal.set_aside.clone_from(&goal.unreachable);
+            if goal.is_pursued() {
+                others.push(&*goal);
+            }
+        }
+        others.sort_by_key(|goal| (goal.terms.deadline.is_none(), goal.terms.deadline.as_ref()));
+        let others = others.iter();
+        others
+            .map(|goal| (goal.name.clone(), goal.terms.value.clone()))
+            .collect()
+    }
+
+    /// Records the pursued goals that can never become true.
+    fn record_unreachable_goals(&mut self) {
+        let hopeless = unreachable_conditions(&self.belief);
+        let goals = self.goal_manager.iter_mut().flat_map(|it| &mut it.goals);
+        for goal in goals.filter(|goal| goal.is_pursued()) {
+            let parts = goal.ground.conjuncts().into_iter();
+            let lost = parts.filter(|part| hopeless.contains(part));
+            let lost: Vec<String> = lost.map(|it| self.task.describe_condition(it)).collect();
+            let why = || format!("{} can never become true", lost.join(", "));
+            goal.unreachable = (!lost.is_empty()).then(why);
+        }
+    }
+
+    /// Continues a selection that was waiting for a plan to begin.
+    pub(super) fn select_after_success(&mut self) {
+        let Some(lasting) = &mut self.goal_manager else {
+            return;
+        };
+        let (goals, planned) = (&lasting.goals, &lasting.planned_goals);
+        let is_tried = |choosing: &mut GoalSelection| {
+            let tried = choosing.open(&choosing.tried, goals);
+            let open = goals.iter().map(|goal| &goal.name);
+            tried
+                .iter()
+                .eq(planned.intersection(&open.cloned().collect()))
+        };
+        if let Some(mut choosing) = lasting.selection.take_if(is_tried) {
+            let step = choosing.selection.after_success(choosing.tried.clone());
+            self.pursue_selection_step(choosing, step, false);
+        } else if lasting.selection.is_none() {
+            self.announce_goals();
+        }
+    }
+
+    /// Leaves out the new goals if no plan reaches them in addition to those of the present plan,
+    /// which continues. Returns `false` if the failure has another reason.
+    pub(super) fn exclude_new_goals(&mut self) -> bool {
+        if self.select_after_closing() {
+            return true;
+        }
+        let Some(lasting) = &mut self.goal_manager else {
+            return false;
+        };
+        let has_plan = lasting.plan.is_some();
+        let Some(mut choosing) = lasting.selection.take_if(|_| has_plan) else {
+            return false;
+        };
+        self.record_unreachable_goals();
+        let step = choosing.selection.after_failure(choosing.tried.clone());
+        self.pursue_selection_step(choosing, step, false)
+    }
+
+    /// Pursues the goals of the next step. Returns `false` if there is no plan for any goal. A plan
+    /// is requested or kept if the step tries goals, or if `is_to_plan` for the selected ones.
+    fn pursue_selection_step(
+        &mut self,
+        mut choosing: GoalSelection,
+        mut step: SelectionStep,
+        is_to_plan: bool,
+    ) -> bool {
+        let conflicts = self.conflicts();
+        let Some(lasting) = &mut self.goal_manager else {
+            return false;
+        };
+        let (set, pursued, is_last) = loop {
+            let (set, is_last) = match step {
+                SelectionStep::Try(set) => (set, false),
+                SelectionStep::Select(set) => (set, true),
+            };
+            let pursued = choosing.open(&set, &lasting.goals);
+            if is_last || !pursued.is_empty() {
+                break (set, pursued, is_last);
+            }
+            // All of these goals were closed meanwhile.
+            step = choosing.selection.after_failure(set);
+        };
+        if pursued.is_empty() {
+            // Goals that can never become true keep their own reasons in the idle state.
+            self.set_unreachable_goals_aside();
+            return false;
+        }
+        let list = self::list(&choosing, &set, &pursued);
+        let candidates = lasting.goals.iter_mut();
+        for goal in candidates.filter(|goal| choosing.names.contains(&goal.name)) {
+            let is_aside = !pursued.contains(&goal.name);
+            let position = choosing.position(&goal.name).unwrap_or_default();
+            let why = || match &goal.unreachable {
+                Some(why) => why.clone(),
+                None if choosing.selection.is_excluded(position) => match goal.terms.deadline {
+                    Some(_) => match &goal.missed_deadline {
+                        Some(late) => {
+                            format!("no plan reaches it by its deadline; it would be {late}")
+                        }
+                        None => "no plan reaches it by its deadline".to_owned(),
+                    },
+                    None => "no plan reaches it".to_owned(),
+                },
+                None if choosing.selection.is_untried(position) => {
+                    format!("a plan for {list} is found first")
+                }
+                None => match conflicts
+                    .iter()
+                    .find(|it| it.is_excluding(&goal.name, &pursued))
+                {
+                    Some(conflict) => format!("{} exclude each other", conflict.in_words()),
+                    None => format!("no plan reaches it together with {list}"),
+                },
+            };
+            goal.set_aside = is_aside.then(why);
+        }
+        choosing.tried = set;
+        let is_lengthy = matches!(choosing.selection, Selection::Growth(_));
+        lasting.selection = (!is_last).then_some(choosing);
+        if is_last || is_lengthy {
+            self.announce_goals();
+        }
+        if is_last && !is_to_plan {
+            self.set_goal();
+        } else {
+            self.record_goal_change(format!("now pursued: {list}"), true);
+        }
+        true
+    }
+
+    /// Records the goals that are set aside, and those that are pursued again.
+    pub(super) fn announce_goals(&mut self) {
+        let Some(lasting) = &mut self.goal_manager else {
+            return;
+        };
+        for goal in &mut lasting.goals {
+            if goal.is_announced == goal.set_aside.is_some() {
+                continue;
+            }
+            goal.is_announced = goal.set_aside.is_some();
+            let change = match &goal.set_aside {
+                Some(why) => GoalChange::SetAside { why },
+                None => GoalChange::Pursued,
+            };
+            self.ports.recorder.record(&Entry::Goal {
+                now: &self.now,
+                name: &goal.name,
+                change,
+            });
+        }
+    }
+}
+
+/// Returns the names of goals, if there are any.
+fn names_of(goals: &[OpenGoal]) -> Option<String> {
+    let names: Vec<String> = goals.iter().map(|it| format!("`{}`", it.name)).collect();
+    (!names.is_empty()).then(|| names.join(", "))
+}
+
+/// Formats the names of goals.
+fn list(choosing: &GoalSelection, set: &GoalSet, open: &BTreeSet<String>) -> String {
+    let names = set.iter().map(|it| &choosing.names[*it]);
+    let names = names.filter(|name| open.contains(*name));
+    let listed = names.take(MAX_LISTED_GOALS).map(|name| format!("`{name}`"));
+    let listed: Vec<String> = listed.collect();
+    match open.len() - listed.len() {
+        0 => listed.join(", "),
+        more => format!("{} and {more} others", listed.join(", ")),
+    }
+}
