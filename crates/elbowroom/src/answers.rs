@@ -4,7 +4,7 @@
 //! `docs/formats` describes and that the command line prints. The front ends (the command, other
 //! languages, reports) differ only in how they show it.
 //!
-//! A request that can take long is given a [`Watcher`], which receives progress events and can end
+//! A request that can take long is given an [`Observer`], which receives progress events and can end
 //! the work early. The result found so far is the answer; for an envelope, it is sound at any time.
 //!
 //! | question | request | answer |

@@ -124,12 +124,12 @@
 //! JSON is the document that `docs/formats` describes.
 //!
 //! - [`answers`]: the questions of the command line as requests, with progress and cancelling.
-//! - [`flow`]: from a plan to its envelope in one call or step by step.
+//! - [`pipeline`]: from a plan to its envelope in one call or step by step.
 //! - [`execute`](mod@execute): executes plans.
 //! - [`export`]: what other programs can check: a plan's network as an STNU, a box or the region as
 //!   SMT-LIB.
 //! - [`no_plan`]: certificates that no plan exists.
-//! - [`graph`]: networks as graphs for Graphviz.
+//! - [`dot`]: networks as graphs for Graphviz.
 //! - [`timed`]: what the best of all executors could reach on a clock, and the policy that reaches
 //!   it.
 //! - [`Explainer`]: explains what limits an envelope, and why a plan fails ([`Explanation`],

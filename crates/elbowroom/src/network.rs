@@ -1,7 +1,7 @@
 //! Temporal networks from files in the formats of the field: controllability checks and simulated
 //! dispatch.
 //!
-//! [`read()`] reads a file in any known format. [`examine`] answers a [`Request`] about it with an
+//! [`read()`] reads a file in any known format. [`analyze`] answers a [`Request`] about it with an
 //! [`Answer`], which can be serialized as JSON (`docs/formats/network.md`).
 //!
 //! ```

@@ -66,7 +66,7 @@ pub enum Objective {
     /// counts as best if no other is better by more than a millionth.
     Volume,
     /// The probability that independent durations, each with its distribution
-    /// ([`BestSettings::chances`]), all stay inside. The value is the logarithm; [`NEVER`] replaces
+    /// ([`BestSettings::distributions`]), all stay inside. The value is the logarithm; [`LOG_OF_ZERO`] replaces
     /// the logarithm of 0. A box counts as best if no other is better by more than a millionth.
     Probability,
 }

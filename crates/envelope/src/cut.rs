@@ -34,7 +34,7 @@ pub enum Ground {
     Box(DecoupledEnvelope),
 }
 
-/// Sequence of parts: [`elbowroom_stn::uncertain::Way`], in terms of a plan.
+/// Sequence of parts: [`elbowroom_stn::uncertain::RefutationPath`], in terms of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProofPath {
     /// The parts; each begins where the previous one ends.

@@ -11,7 +11,7 @@
 //! - [`best()`]: the largest box by an objective, approached from outside, with a proof.
 //! - [`exact()`]: all values for which a plan works, as a union of polyhedra.
 //! - [`repair()`]: the cheapest change of quantities that makes a plan work.
-//! - [`balance()`]: the deviation that all quantities tolerate at once.
+//! - [`max_uniform_slack()`]: the deviation that all quantities tolerate at once.
 //! - [`Objection`]: the reason why a box is not inside, with values and a schedule that show it.
 //!
 //! Linear programs and minimum cost flows are solved here. `elbowroom-execution` does not depend on

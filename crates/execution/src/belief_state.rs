@@ -407,9 +407,9 @@ impl BeliefState {
     }
 
     /// Returns the first running action whose over-all condition has failed at some past moment
-    /// since its start; [`Underway::violated_conjuncts`] has the conjuncts. A condition that fails at the
+    /// since its start; [`RunningActionState::violated_conjuncts`] has the conjuncts. A condition that fails at the
     /// present moment does not count yet, as long as more can happen at this moment: see
-    /// [`BeliefState::breaking`].
+    /// [`BeliefState::failing_actions`].
     pub fn violated_action(&self) -> Option<(ActionHandle, &RunningActionState)> {
         let mut running = self.running.iter();
         running

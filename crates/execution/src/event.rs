@@ -105,7 +105,7 @@ pub enum Event {
 }
 
 /// Request from an operator to an executive ([`Run::lasting`](crate::run::Run::lasting)).
-/// [Attended](crate::run::Run::attended) runs do not accept goals; other runs ignore all requests.
+/// [Attended](crate::run::Run::interactive) runs do not accept goals; other runs ignore all requests.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Add a goal. It replaces an open goal of the same name.

@@ -32,8 +32,8 @@ pub enum PlanForm {
 
 /// Identifier of an action of the present plan, chosen by the executor.
 ///
-/// An action that is running when a plan is adopted ([`Mission::running`]) has the number of its
-/// instance in [`Mission::plan`]. Executors that execute that plan number all steps this way.
+/// An action that is running when a plan is adopted ([`PreparedPlan::running`]) has the number of its
+/// instance in [`PreparedPlan::plan`]. Executors that execute that plan number all steps this way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StepId(pub u32);
 
@@ -146,7 +146,7 @@ pub struct PreparedPlan {
     /// Cache of the dispatchable forms of the plan's networks.
     pub dispatchable_cache: DispatchableCache,
     /// The partial order of the plan's happenings, for executors that need it
-    /// ([`Need::PartialOrder`]).
+    /// ([`PlanForm::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
     /// The running actions, which continue in the plan: see [`StepId`].
     pub running: BTreeMap<StepId, ActionHandle>,

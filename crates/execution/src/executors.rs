@@ -1,6 +1,6 @@
 //! The executors: one file each, and the list of all.
 //!
-//! To add one, write a file with its [`Executor`] and its [`Registered`] entry, and add a line to
+//! To add one, write a file with its [`Executor`] and its [`ExecutorEntry`] entry, and add a line to
 //! [`EXECUTORS`]. The command line, its help, `docs/executors.md` and the captions of reports are
 //! generated from that list.
 
@@ -74,17 +74,17 @@ pub struct ExecutorServices {
     pub region: Box<dyn RegionOracle>,
     /// The likelihoods of failures and spontaneous changes.
     pub likelihoods: Arc<Likelihoods>,
-    /// For executors that search for more likely plans ([`ExecutorSpec::asks_odds`]). Without it,
+    /// For executors that search for more likely plans ([`ExecutorSpec::needs_comparator`]). Without it,
     /// they do not search.
     pub comparator: Option<Box<dyn PlanComparator>>,
     /// For `lookahead`: results for the same problem and likelihoods from other runs.
     pub policy_cache: PolicyTableCache,
     /// For `adaptable`: results for the same plans from other samples of the same scene.
     pub order_cache: Option<OrderCache>,
-    /// For executors that evaluate each move ([`ExecutorSpec::asks_outlook`]). Without it, they
+    /// For executors that evaluate each move ([`ExecutorSpec::needs_action_values`]). Without it, they
     /// follow their plan.
     pub action_values: Option<Arc<dyn ActionValues>>,
-    /// For executors that evaluate each move, if there is no [`Outlook`]: simulates the possible
+    /// For executors that evaluate each move, if there is no [`ActionValues`]: simulates the possible
     /// moves.
     pub rollout: Option<Box<dyn RolloutEvaluator>>,
 }
@@ -161,7 +161,7 @@ impl ExecutorSpec {
         [adaptable::REGISTERED.name, lookahead::REGISTERED.name].contains(&self.registered.name)
     }
 
-    /// Returns `true` if the executor evaluates each move with an [`Outlook`], where there is one.
+    /// Returns `true` if the executor evaluates each move with an [`ActionValues`], where there is one.
     pub fn needs_action_values(&self) -> bool {
         self.registered.name == policy::REGISTERED.name
     }

@@ -11,8 +11,8 @@
 //! - [`Recorder`]: records a run.
 //!
 //! External services are ports, that is, traits of this crate: [`World`] (a simulation, a robot),
-//! [`Planner`], [`Preparer`], [`Region`] (the deviations that a plan tolerates), [`Odds`] (success
-//! probabilities of plans) and [`Outlook`] (success probabilities of moves). This crate does not
+//! [`Planner`], [`Preparer`], [`RegionOracle`] (the deviations that a plan tolerates), [`PlanComparator`] (success
+//! probabilities of plans) and [`ActionValues`] (success probabilities of moves). This crate does not
 //! depend on their implementations; in particular, it cannot call a solver.
 //!
 //! ```

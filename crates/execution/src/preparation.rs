@@ -32,7 +32,7 @@ pub struct PreparationResult {
     pub envelope: Option<DecoupledEnvelope>,
     /// Cache of the dispatchable forms of the plan's networks.
     pub forms: DispatchableCache,
-    /// The partial order of its happenings, if it was requested ([`Need::PartialOrder`]).
+    /// The partial order of its happenings, if it was requested ([`PlanForm::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
 }
 

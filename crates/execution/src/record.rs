@@ -96,7 +96,7 @@ impl Recorder for NoRecord {
 /// One entry of a run's record. All times are on the world's clock unless stated otherwise.
 #[derive(Clone, Copy, Debug)]
 pub enum Entry<'a> {
-    /// A plan is adopted; its times are relative to [`Mission::origin`].
+    /// A plan is adopted; its times are relative to [`PreparedPlan::origin`].
     PlanAdopted(&'a PreparedPlan),
     /// A decision of the executor.
     Decided {

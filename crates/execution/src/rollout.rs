@@ -18,7 +18,7 @@ use crate::executor::{Executor, PlanEvent, PreparedPlan, StepId};
 /// The result depends on the scene alone: no clock is read, and the random numbers are determined
 /// by the scene.
 pub trait RolloutEvaluator: Send {
-    /// Returns the facts whose changes are to be recorded for [`Scene::seen`].
+    /// Returns the facts whose changes are to be recorded for [`DecisionPoint::observed_changes`].
     fn watched_facts(&self, task: &Task) -> Vec<FactId>;
 
     /// Returns the events of a successful action that carry information about the world. By default
@@ -53,7 +53,7 @@ pub struct Informativeness {
 pub struct DecisionPoint<'a> {
     /// The believed state, at the present time.
     pub belief: &'a BeliefState,
-    /// Changes of the [watched](Rehearsal::watched) facts until now.
+    /// Changes of the [watched](RolloutEvaluator::watched_facts) facts until now.
     pub observed_changes: &'a [ObservedChange],
     /// The present executor, before it receives the news.
     pub executor: &'a dyn Executor,

@@ -1,10 +1,10 @@
 //! Execution of a plan in a world, with monitoring and replanning.
 //!
 //! A [`Run`] is a state machine. [`Run::next`] returns its next request to the driver. Requests to
-//! the world are commands, waits and looks: [`Run::observe`] and [`Run::see`] take the answers.
+//! the world are commands, waits and looks: [`Run::observe`] and [`Run::observe_requested`] take the answers.
 //! Other requests are for plans, and for plans prepared for the executor: [`Run::planned`] and
 //! [`Run::prepared`] take these answers, at once or while the run continues. The driver implements
-//! waiting and planning, as an event loop or otherwise. [`Run::go`] is the loop for a [`World`]
+//! waiting and planning, as an event loop or otherwise. [`Run::run_to_end`] is the loop for a [`World`]
 //! that blocks, with [`Workers`] that plan and prepare.
 //!
 //! The run handles incorrect reports, so executors do not have to:
@@ -23,7 +23,7 @@
 //! | feedback | if the completion has grown, the time-out counts from then on |
 //! | a report that cannot be read, or names an object that the problem does not have | recorded and ignored |
 //! | endless answers while the clock stands still or hardly advances | the world is broken ([`Verdict::WorldFailed`]) |
-//! | no report at all | a warning ([`Entry::Warning`]), and at its time-out ([`TimeoutRule`]) the action is cancelled and counts as failed. If the slack of running actions is monitored ([`RunSettings::watches_room`]), the same applies to an action whose delay no plan tolerates any more |
+//! | no report at all | a warning ([`Entry::Warning`]), and at its time-out ([`TimeoutRule`]) the action is cancelled and counts as failed. If the slack of running actions is monitored ([`RunSettings::monitors_slack`]), the same applies to an action whose delay no plan tolerates any more |
 //! | a fact or value other than believed | believed; the executor is notified, and simulates the remaining plan |
 //!
 //! A run can also continue after its goal is reached ([`Run::lasting`]): goals are added and
@@ -41,7 +41,7 @@
 //! its delay. If the validator rejects the result, the plan is *outdated*, and another one is made.
 //! During the second search in a row, the present plan continues only until that search is expected
 //! to end; during further searches, nothing is started. Each outdated plan counts as a new plan
-//! ([`RunSettings::most_replans`]).
+//! ([`RunSettings::max_replans`]).
 //!
 //! Goals that are added during a search wait for its end. When a goal is abandoned, the search ends
 //! at once, three times in a row. The next search may then continue for a limited time, which grows
@@ -51,7 +51,7 @@
 //! The expected state is computed with the network of the present plan: an overdue action is
 //! assumed to take a quarter longer than it has taken so far, its successors are delayed
 //! accordingly, and actions that could not be started are left out. If a delay will make a new plan
-//! necessary ([`RunSettings::watches_room`]), the planner is notified in advance, of the situation
+//! necessary ([`RunSettings::monitors_slack`]), the planner is notified in advance, of the situation
 //! in which everything else has started and ended as planned. It is notified again when events
 //! deviate from that.
 //!
@@ -68,7 +68,7 @@
 //!
 //! If the remaining plan is kept for added goals, it is prepared in the same way.
 //!
-//! At the end of a run, running actions are cancelled and have [`FAREWELL`] seconds to stop. Only a
+//! At the end of a run, running actions are cancelled and have [`SHUTDOWN_GRACE`] seconds to stop. Only a
 //! world that cannot be reached any more receives no commands.
 //!
 //! The goal counts as reached only when no action is running, nothing is in doubt, the last timed

@@ -12,7 +12,7 @@
 //! - if there is no plan, all remaining rounds are lost, because nothing changes between rounds.
 //!
 //! One rule is not from the paper, and applies only if dead ends are detected
-//! ([`Game::dead_ends`]): a step that ends where there is no plan uses up a round, as a planning
+//! ([`TrialSetup::dead_ends`]): a step that ends where there is no plan uses up a round, as a planning
 //! request would do there. Without this rule, an executor could repeat arbitrary steps until a
 //! broken thing repairs itself, and the success rate would depend on its persistence.
 //!

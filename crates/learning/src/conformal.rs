@@ -62,7 +62,7 @@ impl Band {
 
 /// Returns the stretching factor that makes a band contain the next value with probability `1 -
 /// miss`: the ⌈(n + 1)(1 − miss)⌉-th smallest score of the calibration samples. Infinite if there
-/// are fewer than [`fewest`].
+/// are fewer than [`min_samples`].
 pub fn factor(band: Band, calibration: &[Sample], miss: f64) -> f64 {
     let mut scores: Vec<f64> = calibration
         .iter()

@@ -227,10 +227,10 @@ pub struct DurativeBody {
     pub end: Arc<SnapAction>,
     /// Continuous changes while the action runs.
     pub continuous: Vec<ContinuousEffect>,
-    /// `true` for the rest of an action that began before time 0 ([`RunningAction::rest`]). Its
+    /// `true` for the rest of an action that began before time 0 ([`RunningAction::remaining_action`]). Its
     /// start is then fixed at time 0.
     ///
-    /// [`RunningAction::rest`]: crate::RunningAction::rest
+    /// [`RunningAction::remaining_action`]: crate::RunningAction::remaining_action
     pub is_running: bool,
 }
 

@@ -22,7 +22,7 @@ const CONSTRAINTS: &str = "trajectory constraints (`:constraints`)";
 ///
 /// Facts and fluents enter a table on first mention, so that a plan can be validated without
 /// grounding the whole problem. The table only grows, and clones share it, as do
-/// [`Task::starting_from`] and [`Situation::remaining_task`](crate::Situation::rest_of_task): a fact
+/// [`Task::starting_from`] and [`Situation::remaining_task`](crate::Situation::remaining_task): a fact
 /// has the same number in all of them. Numbers follow the order of first mention. If threads
 /// mention facts in no fixed order, each thread needs a table of its own ([`Task::with_own_table`])
 /// for reproducible results.

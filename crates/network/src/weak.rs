@@ -3,12 +3,12 @@
 //! For each choice of durations of the contingent links there are times for the other points (Vidal
 //! & Fargier 1999). They may depend on durations that are not known yet. The durations with a
 //! schedule form a convex set, so it is enough to check the corners, where each link has its least
-//! or its greatest duration. The relevant corners are found by [`branching`].
+//! or its greatest duration. The relevant corners are found by [`corner_search`].
 //!
 //! A link without an upper bound needs no branching: if any constraint limits its end from above,
 //! some duration is too long.
 //!
-//! [`branching`]: elbowroom_stn::branching
+//! [`corner_search`]: elbowroom_stn::corner_search
 
 use std::collections::BTreeMap;
 
@@ -65,7 +65,7 @@ pub enum StepGround {
 }
 
 /// Decides weak controllability: for all durations within their bounds there is a schedule. Returns
-/// [`Weak::Undecided`] after `most_branches` branches.
+/// [`WeakControllability::Undecided`] after `most_branches` branches.
 pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> WeakControllability {
     if let Some(conflict) =
         unbounded_link_conflict(network).or_else(|| own_requirement_conflict(network))

@@ -7,10 +7,10 @@
 //! - [`Rational`]: an exact fraction.
 //! - [`Delta`]: a rational plus a multiple of an infinitesimal, to treat `<` like `<=`.
 //! - [`CommonDenominator`]: the unit that makes given fractions whole numbers.
-//! - [`Total`]: a sum of many products.
+//! - [`Accumulator`]: a sum of many products.
 //! - [`Interval`]: a set of rationals between two ends, each closed, open or infinite.
-//! - [`enclosed`]: logarithms, powers of e and the normal distribution, between two fractions.
-//! - [`chance`]: the probability that a random number lies in an interval, and linear bounds on its
+//! - [`enclosures`]: logarithms, powers of e and the normal distribution, between two fractions.
+//! - [`log_concave`]: the probability that a random number lies in an interval, and linear bounds on its
 //!   logarithm.
 //! - [`simplex`]: systems of linear inequalities, decided and optimised exactly, with proofs.
 //! - [`work`]: deterministic count of the work done, the same on every machine.

@@ -1,9 +1,9 @@
 //! Bounds on the probability that a random number lies in an interval, as fractions.
 //!
-//! A [`Chance`] is a user-stated distribution: either a density whose logarithm is concave, cut at
+//! A [`LogConcaveDistribution`] is a user-stated distribution: either a density whose logarithm is concave, cut at
 //! both sides (values beyond a cut are moved to the cut), or a list of values. A [`Reach`] is an
 //! interval around a point, given by the distances of its ends from the point. A [`Cell`] is a
-//! rectangle of reaches. [`Chance::height`] bounds how far the logarithm of the probability rises
+//! rectangle of reaches. [`LogConcaveDistribution::gap`] bounds how far the logarithm of the probability rises
 //! above a linear function for all intervals of a cell. Branch and bound uses that bound to prove
 //! an interval optimal.
 //!
@@ -82,7 +82,7 @@ impl LogConcaveDistribution {
     /// multiples of `resolution`. Cuts without any mass are dropped. If a cut has all the mass, the
     /// result is a single value.
     ///
-    /// `None` if the density is invalid ([`Density::is_sound`]).
+    /// `None` if the density is invalid ([`Density::is_valid`]).
     pub fn dense(
         density: Density,
         minimum: Option<Rational>,

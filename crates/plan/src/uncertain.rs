@@ -55,7 +55,7 @@ pub struct PlanNetwork {
     pub links: Vec<usize>,
 }
 
-/// A constraint that cannot be satisfied ([`Reading::Impossible`]), by position in the plan.
+/// A constraint that cannot be satisfied ([`ConstraintRole::Impossible`]), by position in the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Impossible(pub usize);
 
@@ -148,7 +148,7 @@ impl StnPlan {
 impl ParametrizedPlan {
     /// Returns the interpretation of a constraint for an executor. The executor knows that each
     /// parameter is in its interval. It commands the planned duration at an action's start if the
-    /// duration is not uncertain ([`told`](Self::told)). It observes the value of a duration when
+    /// duration is not uncertain ([`commanded_durations`](Self::commanded_durations)). It observes the value of a duration when
     /// the action ends, the time of a timed initial when it happens, and other bounds never.
     ///
     /// A parameter that bounds several differences may have a different value in each. This is
@@ -203,7 +203,7 @@ impl ParametrizedPlan {
     }
 
     /// Returns the plan's network for an executor that relies on a box; see
-    /// [`ParametrizedPlan::reading`].
+    /// [`ParametrizedPlan::role`].
     ///
     /// # Errors
     /// A constraint that cannot be satisfied for all values in the box.

@@ -35,7 +35,7 @@ pub enum Choice {
     /// The next happening.
     Next(NextHappening),
     /// Abandon this action, because its end is not worth waiting for. Only a
-    /// [`Table`](crate::optimum::Table) returns this.
+    /// [`PolicyTable`](crate::optimum::PolicyTable) returns this.
     Abandon(InstanceId),
     /// No order of the plan leads to the goal from here.
     Replan,

@@ -10,10 +10,10 @@
 //! 3. [`PrunedNetwork`]: P(A) and P(A ∩ G) of an order, happening by happening.
 //! 4. [`OrderSearch`] (`PGen`): the best order, from [`SearchState`].
 //! 5. [`LayerDispatch`] (`PExec`): the next happening, in the present state.
-//! 6. [`account`]: where an order's probability is lost, and the gains of certainty and retrying;
+//! 6. [`loss_analysis`]: where an order's probability is lost, and the gains of certainty and retrying;
 //!    [`search::Lattice`]: all orders of a short plan at once.
 //! 7. [`optimum`]: the best that any executor can reach in a small world, and its
-//!    [`optimum::Table`].
+//!    [`optimum::PolicyTable`].
 //!
 //! `docs/probability.md` defines the computed values and explains why they are exact. The crate uses
 //! no random numbers and no clock: time limits are callbacks, and the same input gives the same

@@ -129,12 +129,12 @@ pub struct Defaults {
     pub failing: FailureModel,
 }
 
-/// Parts of a [`Flip`] and of a [`Rate`] that an entry contains.
+/// Parts of a [`SpontaneousChange`] and of a [`Rate`] that an entry contains.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PartialChange {
-    /// See [`Flip::becomes_true`].
+    /// See [`SpontaneousChange::becomes_true`].
     pub becomes_true: Option<f64>,
-    /// See [`Flip::becomes_false`].
+    /// See [`SpontaneousChange::becomes_false`].
     pub becomes_false: Option<f64>,
     /// See [`Rate::becomes_true`].
     pub becomes_true_per_second: Option<f64>,

@@ -1,4 +1,4 @@
-//! Analysis of an order's success probability: [`Account`].
+//! Analysis of an order's success probability: [`LossAnalysis`].
 //!
 //! It answers three questions about an order with a known P(A ∩ G):
 //!

@@ -8,7 +8,7 @@
 //!   probability, deletions first. Otherwise nothing happens.
 //! - *End* a running action whose end condition holds. With the probability of its end, its end
 //!   effects take place likewise. Otherwise it has failed, none of them takes place, and facts
-//!   change by one of the outcomes of its failure ([`FailureOutcome`](crate::likelihoods::Aftermath)).
+//!   change by one of the outcomes of its failure ([`FailureOutcome`](crate::likelihoods::FailureOutcome)).
 //!   In both cases, it is no longer running. Instantaneous actions are tried like starts, and are
 //!   not running afterwards.
 //! - *Abandon* a running action: its end effects will not take place. This is not a step.

@@ -9,7 +9,7 @@
 //! - [`statistics`]: proportions with Wilson's intervals, means.
 //! - [`table`]: tables as Markdown, CSV, or text for a terminal.
 //! - [`plot`]: what plots show, and, with the feature `plots`, plots as SVG.
-//! - [`short`]: exact numbers as short decimals.
+//! - [`decimal`]: exact numbers as decimals.
 //! - [`lattice`]: a picture of the orders of a plan, as SVG.
 //! - [`plane`]: a picture of areas and boxes over two quantities, as SVG.
 //!

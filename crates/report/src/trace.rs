@@ -3,7 +3,7 @@
 //! A trace contains all external input of the run: the reports of the world and the plans of the
 //! planner. They determine everything else, and a [`Replay`] checks that.
 //!
-//! [`Stored::read`] parses a trace into typed lines ([`mod@line`]).
+//! [`Stored::read`] parses a trace into typed lines ([`schema`]).
 
 mod encode;
 mod replay;

@@ -16,12 +16,12 @@ pub trait DurationController: Send {
     /// Called when an action has started.
     fn on_start(&mut self, now: &Rational, begun: &StartedAction<'_>);
 
-    /// Called when an action has ended: because of [`ends_now`](Self::ends_now), by a failure, or
+    /// Called when an action has ended: because of [`due_ends`](Self::due_ends), by a failure, or
     /// by a cancellation.
     fn on_end(&mut self, now: &Rational, ticket: ActionHandle);
 
     /// Returns the actions that end now. Called after each event, and at each
-    /// [look](Self::next_look).
+    /// [look](Self::next_check).
     fn due_ends(&mut self, now: &Rational) -> Vec<ActionHandle>;
 
     /// Returns the time of the next look if no event comes before; later than `now`.
@@ -39,12 +39,12 @@ pub struct StartedAction<'a> {
     pub occurrence: u64,
     /// The planned duration; `None` if it is instantaneous.
     pub planned: Option<&'a Rational>,
-    /// `true` if it ends when the [`Pace`] says; if `false`, it is instantaneous or is going to
+    /// `true` if it ends when the [`DurationController`] says; if `false`, it is instantaneous or is going to
     /// fail.
     pub is_open: bool,
 }
 
-/// A simulated world whose action durations are decided by a [`Pace`].
+/// A simulated world whose action durations are decided by a [`DurationController`].
 ///
 /// The world decides everything else: conditions, failures, delays, reports.
 #[derive(Debug)]

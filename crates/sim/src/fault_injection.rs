@@ -43,7 +43,7 @@ impl WorldModel {
 }
 
 impl WorldModel {
-    /// Creates a sample of the world that continues from a belief: [`SimWorld::amid`], with the
+    /// Creates a sample of the world that continues from a belief: [`SimWorld::mid_execution`], with the
     /// model's reliability of reports.
     pub fn world_amid(
         &self,

@@ -148,7 +148,7 @@ impl<W: Weight> ConsistentNetwork<W> {
         self.resize();
     }
 
-    /// Records the times of nodes from now on, so that [`restore`](Self::go_back_to) can restore
+    /// Records the times of nodes from now on, so that [`restore`](Self::restore) can restore
     /// them. All earlier checkpoints become invalid.
     pub fn record_times(&mut self) {
         self.previous_times = Some(Vec::new());
@@ -160,7 +160,7 @@ impl<W: Weight> ConsistentNetwork<W> {
     }
 
     /// Like [`undo_to`](Self::undo_to), but also restores the times that nodes had at `checkpoint`,
-    /// if they were [remembered](Self::remember_times). Takes time in proportion to the moves since
+    /// if they were [remembered](Self::record_times). Takes time in proportion to the moves since
     /// then.
     ///
     /// Without this call, times only ever decrease, a little with each constraint that is tried.

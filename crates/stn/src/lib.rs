@@ -21,7 +21,7 @@
 //! - [`IncrementalWindows`]: windows that are updated as times become known.
 //!
 //! [`uncertain`] has networks with uncertainty (STNUs), their controllability and dispatch;
-//! [`branching`] decides whether there is a schedule for all values of quantities in the bounds
+//! [`corner_search`] decides whether there is a schedule for all values of quantities in the bounds
 //! (weak controllability).
 //!
 //! Bounds are [`Rational`](elbowroom_num::Rational) by default. With

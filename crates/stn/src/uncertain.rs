@@ -16,7 +16,7 @@
 //!
 //! The check of dynamic controllability returns the [`Dispatchable`] form. A [`Dispatcher`]
 //! executes it by propagating each event to neighbours only. If the network is not dynamically
-//! controllable, a [`Conflict`] is the proof, and a [`Spoiler`] chooses durations that make every
+//! controllable, a [`Conflict`] is the proof, and a [`Adversary`] chooses durations that make every
 //! executor fail.
 
 mod adversary;

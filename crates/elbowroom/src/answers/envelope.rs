@@ -64,7 +64,7 @@ pub struct EnvelopeRequest {
     /// The guarantee inside the envelope.
     pub guarantee: Guarantee,
     /// `true` if the dispatcher enforces the obligations that are bounds on differences of times
-    /// ([`elbowroom_envelope::enforced`]).
+    /// ([`elbowroom_envelope::with_obligations`]).
     pub enforce: bool,
     /// The rule that sets the time-out of each action. The plan works as long as each quantity
     /// stays inside its interval *and* each action ends before its time-out. A box to check must

@@ -14,7 +14,7 @@ use super::RunProgress;
 /// Receives progress events of a request, and decides when it has to end.
 ///
 /// The library reads no clock. A caller that wants a time limit or measured times implements
-/// [`elapsed`](Watcher::elapsed).
+/// [`elapsed`](Observer::elapsed).
 pub trait Observer {
     /// Returns the time since a fixed moment. Only differences are used.
     fn elapsed(&mut self) -> Duration {

@@ -28,7 +28,7 @@ pub struct RunRequest<'a> {
     /// Replacement for the planner of the specification: a replay, or a planner with another clock
     /// than the watcher's.
     pub planner: Option<Box<dyn Planner + 'a>>,
-    /// Replacement for the synchronous [`PlanPreparer`](crate::execute::Analyst), which prepares plans.
+    /// Replacement for the synchronous [`PlanPreparer`](crate::execute::PlanPreparer), which prepares plans.
     pub preparer: Option<Box<dyn Preparer + 'a>>,
     /// The recorder.
     pub recorder: Box<dyn Recorder + 'a>,
@@ -142,7 +142,7 @@ impl<'a> RunRequest<'a> {
         Self { preparer, ..self }
     }
 
-    /// Reports the belief state, as [`Execution::told_to`](crate::execute::Execution::told_to).
+    /// Reports the belief state, as [`Execution::on_belief`](crate::execute::Execution::on_belief).
     #[must_use]
     pub fn on_belief(self, listener: impl FnMut(&BeliefState) + Send + 'a) -> Self {
         let listener: Option<Listener<'a>> = Some(Box::new(listener));

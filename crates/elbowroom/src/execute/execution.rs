@@ -132,7 +132,7 @@ pub struct Execution<'a> {
     listener: Option<Listener<'a>>,
 }
 
-/// Callback for the belief state of a run ([`Run::told_to`]).
+/// Callback for the belief state of a run ([`Run::on_belief`]).
 pub type Listener<'a> = Box<dyn FnMut(&BeliefState) + Send + 'a>;
 
 /// The executor of a run: a registered one, or the caller's own.
@@ -184,7 +184,7 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Sets the number of times that the run was continued after its end: see [`Run::reopened`].
+    /// Sets the number of times that the run was continued after its end: see [`Run::with_restarts`].
     pub fn with_restarts(self, times: usize) -> Self {
         Self {
             restarts: times,
@@ -227,7 +227,7 @@ impl<'a> Execution<'a> {
         Self { foresight, ..self }
     }
 
-    /// Sets the odds, for executors that search for likelier plans ([`ExecutorSpec::asks_odds`]).
+    /// Sets the odds, for executors that search for likelier plans ([`ExecutorSpec::needs_comparator`]).
     pub fn with_plan_comparator(self, odds: Option<Box<dyn PlanComparator>>) -> Self {
         Self {
             plan_comparator: odds,
@@ -235,7 +235,7 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Sets the outlook, for executors that evaluate each move ([`ExecutorSpec::asks_outlook`]).
+    /// Sets the outlook, for executors that evaluate each move ([`ExecutorSpec::needs_action_values`]).
     pub fn with_action_values(self, outlook: Option<Arc<dyn ActionValues>>) -> Self {
         Self {
             action_values: outlook,
@@ -310,7 +310,7 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Makes the run accept pauses and the abandonment of its goal: see [`Run::attended`].
+    /// Makes the run accept pauses and the abandonment of its goal: see [`Run::interactive`].
     pub fn interactive(self, is_attended: bool) -> Self {
         Self {
             is_interactive: is_attended,
@@ -318,7 +318,7 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// See [`Run::told_to`].
+    /// See [`Run::on_belief`].
     pub fn on_belief(self, listener: impl FnMut(&BeliefState) + Send + 'a) -> Self {
         let listener: Option<Listener<'a>> = Some(Box::new(listener));
         Self { listener, ..self }

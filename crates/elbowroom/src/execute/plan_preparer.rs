@@ -39,7 +39,7 @@ impl From<PipelineError> for PrepareError {
     }
 }
 
-/// Prepares plans with [`flow`].
+/// Prepares plans with [`pipeline`](crate::pipeline).
 #[derive(Clone)]
 pub struct PlanPreparer {
     settings: pipeline::Settings,

@@ -175,7 +175,7 @@ pub struct PlanSelector<'a> {
     pub improve_states: u64,
     /// Work limit of the choice, in units of [`elbowroom_num::work`]. If it is spent, the plan is
     /// the best so far. The search for a first plan may take
-    /// [`PATIENCE`](super::Embedded::patience) times as much.
+    /// [`PATIENCE`](super::Embedded::first_plan_factor) times as much.
     pub work: u64,
     /// Knowledge of the world.
     pub knowledge: WorldKnowledge,
@@ -383,7 +383,7 @@ pub(crate) fn renumbered(task: &Task, plan: &TimeTriggeredPlan) -> Option<TimeTr
     Some(TimeTriggeredPlan { steps })
 }
 
-/// A planner whose first plan is [chosen](Chooser).
+/// A planner whose first plan is [chosen](PlanSelector).
 pub struct SelectingPlanner<'a> {
     /// Planner of all later plans.
     pub inner: Box<dyn Planner + 'a>,

@@ -98,7 +98,7 @@ impl PlanComparator for MostProbablePlanner<'_> {
     }
 }
 
-/// A shared [`Likeliest`] that implements both ports.
+/// A shared [`MostProbablePlanner`] that implements both ports.
 #[derive(Clone)]
 pub struct SharedMostProbablePlanner(Arc<Mutex<MostProbablePlanner<'static>>>);
 

@@ -35,7 +35,7 @@ pub struct BeliefStateParts {
     pub running: BTreeMap<ActionHandle, RunningActionParts>,
 }
 
-/// An [`Underway`] without its action.
+/// A [`RunningActionState`] without its action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningActionParts {
     /// The time at which it started.

@@ -65,7 +65,7 @@ pub enum RunningRule {
     /// They continue, and are part of the plan. They are assumed to take as long as planned or, if
     /// they are overdue, a quarter longer than so far. Actions whose over-all condition has failed
     /// are cancelled, because no plan can continue with them. If slack is monitored
-    /// ([`RunSettings::watches_room`]), overdue actions are also cancelled if no plan is found even
+    /// ([`RunSettings::monitors_slack`]), overdue actions are also cancelled if no plan is found even
     /// for the case that they end at once.
     #[default]
     Keep,
@@ -266,7 +266,7 @@ pub struct Report {
     pub reasons: Vec<Reason>,
     /// If no plan reaches the goal any more: the parts of the goal that can never become true
     /// again, and since when, as far as that is known
-    /// ([`Run::with_explanations`](super::Run::explaining)).
+    /// ([`Run::with_explanations`](super::Run::with_explanations)).
     pub dead_end: Vec<Reason>,
     /// The number of actions started.
     pub starts: usize,

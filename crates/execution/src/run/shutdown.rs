@@ -164,7 +164,7 @@ impl Run<'_> {
 impl<'a> Run<'a> {
     /// Makes the run continue up to `times` times after it was over without its goal
     /// ([`Verdict::NoPlan`], [`Verdict::PlannerFailed`]): another plan is searched for, from the
-    /// situation at its end. [`Run::go`] does that by itself.
+    /// situation at its end. [`Run::run_to_end`] does that by itself.
     #[must_use]
     pub fn with_restarts(self, times: usize) -> Run<'a> {
         Self {

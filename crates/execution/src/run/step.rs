@@ -24,7 +24,7 @@ pub enum Next {
         /// On the world's clock.
         until: Rational,
     },
-    /// Look at these facts and fluents in the world, if possible; then [`Run::see`].
+    /// Look at these facts and fluents in the world, if possible; then [`Run::observe_requested`].
     Look {
         /// Facts.
         facts: Vec<FactId>,
@@ -43,7 +43,7 @@ pub enum Next {
     Over(Report),
 }
 
-/// Error: the answer was not requested. [`Run::observe`] answers [`Next::Wait`], and [`Run::see`]
+/// Error: the answer was not requested. [`Run::observe`] answers [`Next::Wait`], and [`Run::observe_requested`]
 /// answers [`Next::Look`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the run has not asked for {what}; call `Run::next` first")]

@@ -24,7 +24,7 @@ pub struct LineReader {
 pub enum ReadResult {
     /// A line; invalid UTF-8 is replaced.
     Line(String),
-    /// More than [`LONGEST_LINE`] bytes without a line feed.
+    /// More than [`MAX_LINE`] bytes without a line feed.
     LineTooLong,
     /// More than [`MAX_ANSWER`] unread bytes.
     AnswerTooLong,

@@ -5,7 +5,7 @@ use elbowroom_execution::ActionHandle;
 use super::{ComingEvent, SimWorld};
 
 impl SimWorld<'_> {
-    /// Keeps a running action from ending by itself; it ends when it is [let go](Self::let_go).
+    /// Keeps a running action from ending by itself; it ends when it is [let go](Self::release).
     /// Returns `true` if the action is running and was going to end. An action that is going to
     /// fail is not affected.
     pub fn hold(&mut self, ticket: ActionHandle) -> bool {

@@ -65,7 +65,7 @@ pub struct Missed<W = Rational> {
     /// Path that implies that end, from the event that it is relative to.
     pub implying_path: Vec<Step<W>>,
     /// `true` if the time violates only the bounds of the link that ends at the node, and no other
-    /// constraint. The remaining network may then still be executable: see [`Dispatcher::bears`].
+    /// constraint. The remaining network may then still be executable: see [`Dispatcher::stays_executable`].
     pub is_only_link: bool,
 }
 

@@ -16,7 +16,7 @@ pub struct IntegerNetwork {
     pub unit: Unit,
 }
 
-/// The unit of the whole numbers of a [`WholeNetwork`].
+/// The unit of the whole numbers of a [`IntegerNetwork`].
 #[derive(Clone, Copy, Debug)]
 pub struct Unit {
     denominator: CommonDenominator,

@@ -112,7 +112,7 @@ impl<W: Weight> Dispatcher<W> {
         true
     }
 
-    /// Returns the latest time, `until` at most, that [`prolong`](Self::prolong) accepts as the
+    /// Returns the latest time, `until` at most, that [`extend_link`](Self::extend_link) accepts as the
     /// latest end of a running link; `None` if there is none.
     pub fn extendable_until(&self, id: LinkId, until: &W, now: &W) -> Option<W> {
         let mut last = until.clone();
