@@ -39,13 +39,12 @@
   (:durative-action dock
     :parameters (?r - robot ?p - place)
     :duration (= ?duration 6)
-    :condition (and (at start (bay ?p)) (at start (bay-free ?p)) (over all (at ?r ?p)))
-    :effect (and (at start (not (bay-free ?p))) (at end (docked ?r ?p))))
+    :condition (and (at start (bay ?p)) (at start (bay-free ?p)) (at start (at ?r ?p)))
+    :effect (and (at start (not (bay-free ?p))) (at start (not (at ?r ?p))) (at end (docked ?r ?p))))
 
   (:durative-action place
     :parameters (?r - robot ?c - crate ?p - place)
     :duration (= ?duration 5)
-    :condition (and (at start (docked ?r ?p)) (at start (holding ?r ?c)) (over all (at ?r ?p))
-                    (over all (truck-at ?p)))
-    :effect (and (at start (not (docked ?r ?p))) (at end (bay-free ?p)) (at end (not (holding ?r ?c)))
-                 (at end (empty ?r)) (at end (loaded ?c)))))
+    :condition (and (at start (docked ?r ?p)) (at start (holding ?r ?c)) (over all (truck-at ?p)))
+    :effect (and (at start (not (docked ?r ?p))) (at end (bay-free ?p)) (at end (at ?r ?p))
+                 (at end (not (holding ?r ?c))) (at end (empty ?r)) (at end (loaded ?c)))))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 WIDTH = 80
@@ -20,9 +20,11 @@ class Series:
     deadline: float
     promises: list[str]
     predicted: float
-    """Predicted probability of success."""
-    predictions: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Probability of success by the model in use."""
+    predictions: dict[str, dict[str, Any]]
     """For each action, the predicted and the observed durations and failures."""
+    predicted_learnt: float = 0.0
+    """Probability of success by the learnt model."""
 
     @property
     def observed(self) -> float:
@@ -49,7 +51,7 @@ class Series:
         """Share of durations within the central 90 % of the predictions."""
         durations = sum(it["durations"] for it in self.predictions.values())
         within = sum(it["within"] for it in self.predictions.values())
-        return f"{percent(within / durations)} of {durations}" if durations else "-"
+        return percent(within / durations) if durations else "-"
 
     def mean_error(self) -> str:
         """Mean of |predicted mean - observed mean| per action, weighted by the number of durations."""
@@ -85,15 +87,16 @@ def rows(series: list[Series]) -> list[tuple[str, list[str]]]:
     return [
         row("days", lambda it: str(len(it.successes))),
         row("all crates on the truck", lambda it: f"{sum(it.successes)} ({percent(it.observed)})"),
-        row("  predicted", lambda it: percent(it.predicted)),
-        row("  95 % interval of observed", lambda it: "{} .. {}".format(*map(percent, it.wilson()))),
-        row("  Brier score (0 is best)", lambda it: f"{it.brier():.3f}"),
+        row("  predicted by its model", lambda it: percent(it.predicted)),
+        row("  predicted by learnt model", lambda it: percent(it.predicted_learnt)),
+        row("  95 % interval", lambda it: "{:.0f}-{:.0f} %".format(*(100 * end for end in it.wilson()))),
+        row("  Brier score", lambda it: f"{it.brier():.3f}"),
         row("last crate loaded, mean", lambda it: mean(it.loaded_at)),
         row("  mean lateness if late", lambda it: mean(it.lateness)),
         row("  greatest lateness", lambda it: f"{max(it.lateness):.1f} s" if it.lateness else "-"),
         row("durations in central 90 %", Series.within),
         row("  mean error of the means", Series.mean_error),
-        row("failures predicted / seen", Series.failures),
+        row("failures, predicted / seen", Series.failures),
         row("days inside the envelope", lambda it: str(sum(p != "outside" for p in it.promises))),
         row("  promise broken on", lambda it: str(it.promises.count("broken"))),
     ]
@@ -101,7 +104,7 @@ def rows(series: list[Series]) -> list[tuple[str, list[str]]]:
 
 def table(series: list[Series]) -> str:
     """The figures as a table of at most 80 columns."""
-    first = 27
+    first = 28
     width = (WIDTH - first) // len(series)
     titles = [it.title.split("\n") for it in series]
     lines = [" " * first + "".join(f"{title[i]:>{width}}" for title in titles) for i in range(2)]

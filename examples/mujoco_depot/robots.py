@@ -79,7 +79,10 @@ class Robot:
             for part in (1.2, length - 1.2):
                 x = a[0] + part * along[0] + along[1] * LANE_OFFSET
                 y = a[1] + part * along[1] - along[0] * LANE_OFFSET
-                yield from self._go((x, y), 0.4, corner=True)
+                while _progress(a, along, self.position) < part - 0.3:
+                    self.path.append(self.position)
+                    # A target beyond the point keeps the robot from braking for it.
+                    yield (x + 3 * along[0], y + 3 * along[1]) if part > 2 else (x + along[0], y + along[1]), RATED_SPEED
         yield from self._go(self.slot(end), 0.08)
 
     def charge(self) -> Drive:
@@ -121,14 +124,10 @@ class Robot:
         self.load(0.0)
         yield from self._go(self.slot(place), 0.08)
 
-    def _go(self, target: Vector, tolerance: float, limit: float = RATED_SPEED, corner: bool = False) -> Drive:
-        # A target beyond a corner keeps the robot from braking for it.
+    def _go(self, target: Vector, tolerance: float, limit: float = RATED_SPEED) -> Drive:
         while distance(self.position, target) > tolerance:
             self.path.append(self.position)
-            if corner:
-                yield _beyond(self.position, target), limit
-            else:
-                yield target, limit
+            yield target, limit
 
     def _wait(self, seconds: float) -> Drive:
         for _ in range(round(seconds * 10)):
@@ -141,10 +140,9 @@ def standing_place(place: str, side: float) -> Vector:
     return (x + side, y - 0.5) if place != "gate" else (x + side, y)
 
 
-def _beyond(at: Vector, target: Vector) -> Vector:
-    left = distance(at, target)
-    scale = (left + 3.0) / left
-    return at[0] + (target[0] - at[0]) * scale, at[1] + (target[1] - at[1]) * scale
+def _progress(start: Vector, along: Vector, at: Vector) -> float:
+    """Way along a lane, in metres."""
+    return (at[0] - start[0]) * along[0] + (at[1] - start[1]) * along[1]
 
 
 def _blocks(at: Vector, ahead: Vector, other: Vector, reach: float, width: float) -> bool:

@@ -120,6 +120,7 @@ def _start_effects(words: list[str]) -> Iterator[tuple[str, bool]]:
         yield f"(stored {rest[0]} {rest[1]})", False
     elif name == "dock":
         yield f"(bay-free {rest[0]})", False
+        yield f"(at {robot} {rest[0]})", False
     elif name == "place":
         yield f"(docked {robot} {rest[1]})", False
 
@@ -142,6 +143,7 @@ def _end_effects(words: list[str]) -> Iterator[tuple[str, bool]]:
         yield f"(docked {robot} {rest[0]})", True
     elif name == "place":
         yield f"(bay-free {rest[1]})", True
+        yield f"(at {robot} {rest[1]})", True
         yield f"(holding {robot} {rest[0]})", False
         yield f"(empty {robot})", True
         yield f"(loaded {rest[0]})", True
