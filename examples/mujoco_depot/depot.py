@@ -159,7 +159,7 @@ def way(plan: elbowroom.Plan) -> str:
     """How a plan brings crates from the rack to the gate, in words."""
     aisle = sum(step.action.startswith("(cross ") for step in plan.steps)
     road = sum(step.action.startswith("(drive ") and "gate" in step.action for step in plan.steps)
-    return f"{aisle} times through the aisle, {road} times along the road; planned end {float(plan.makespan):.0f} s"
+    return f"aisle {aisle} times, road {road} times; planned end {float(plan.makespan):.0f} s"
 
 
 def work(week: Week, options: argparse.Namespace, scratch: Path) -> None:
@@ -186,7 +186,7 @@ def work(week: Week, options: argparse.Namespace, scratch: Path) -> None:
     print(f"\n{table(series)}")
     broken = sum(it.promises.count("broken") for it in series)
     inside = sum(len(it.promises) - it.promises.count("outside") for it in series)
-    print(f"\nDays with all durations inside the envelope: {inside}; the goal was missed on {broken} of them.")
+    print(f"\nDays inside the envelope: {inside}; promise broken on {broken} of them.")
     save(options, outcomes[-1], log[-1], scratch)
     if broken:
         sys.exit(1)

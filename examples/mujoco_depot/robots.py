@@ -15,6 +15,8 @@ STOPPING_DISTANCE = 0.2
 LIFT_POWER = 100.0
 LIFT_HEIGHT = 0.6
 DOCK_TOLERANCE = 0.04
+BACK_OFF_STEPS = 25
+"""Control steps for which a robot makes way."""
 SIDES = (0.7, -0.7)
 """Where robots stand beside a place, in metres."""
 
@@ -32,6 +34,9 @@ class Robot:
     def __init__(self, name: str, index: int, engine: Engine, day: Day) -> None:
         self.name, self._engine, self._day = name, engine, day
         self._side = SIDES[index % 2]
+        # Different robots have different patience, so that one makes way and the other drives on.
+        self._patience = 20 + 20 * index
+        self._stuck = self._steps_back = 0
         self.payload = 0.0
         self.attempts = 0
         self.battery = day.battery
@@ -63,11 +68,25 @@ class Robot:
             speed = min(speed, 0.4)
         if any(_blocks(at, ahead, other, 0.9, 0.55) for other in others):
             ahead = (0.6 * ahead[0] + 0.8 * ahead[1], 0.6 * ahead[1] - 0.8 * ahead[0])
+        if self._backs_off(math.hypot(*velocity), speed):
+            nearest = min(others, key=lambda other: distance(at, other))
+            apart = distance(at, nearest)
+            ahead = ((at[0] - nearest[0]) / apart, (at[1] - nearest[1]) / apart)
         mass = ROBOT_MASS + self.payload
         wanted = [mass * (speed * ahead[axis] - velocity[axis]) / 0.3 for axis in (0, 1)]
         size, most = math.hypot(*wanted), min(MOTOR_FORCE, grip * mass)
         scale = most / size if size > most else 1.0
         return wanted[0] * scale, wanted[1] * scale
+
+    def _backs_off(self, speed: float, wanted: float) -> bool:
+        """Whether the robot has pushed against another one for too long, and makes way for a while."""
+        if self._steps_back > 0:
+            self._steps_back -= 1
+            return True
+        self._stuck = self._stuck + 1 if speed < 0.05 and wanted > 0.1 else 0
+        if self._stuck > self._patience:
+            self._steps_back = BACK_OFF_STEPS
+        return False
 
     def drive(self, name: str, start: str, end: str) -> Drive:
         """Drives along the right-hand lane from a place to another one, on a road or through the aisle."""
