@@ -57,11 +57,10 @@ class Week:
         initial = re.sub(r"\(= \([^)]*\) \d+\)|\(at \d.*", "", initial)
         self._facts = set(re.findall(r"\([a-z-]+(?: [a-z]+)+\)", initial))
 
-    def day(self, number: int, plan: elbowroom.Plan, believed: Path, objective: str) -> Outcome:
+    def day(self, number: int, plan: elbowroom.Plan, believed: Path) -> Outcome:
         """Executes a plan on one day. If the truck leaves without a crate, the work continues for a courier."""
         world = Depot(draw_day(self._seed, number, CRATES), self._new_engine, ROBOTS, self._facts)
-        # The envelope is as likely as possible by the model; without distributions it is the widest in proportion.
-        run = self.problem.run(plan, world=world, believed=believed, objective=objective, planning_time=0)
+        run = self.problem.run(plan, world=world, believed=believed, planning_time=0)
         loaded_at = world.seconds
         if not run:
             loaded_at = self._finish(world)
@@ -139,8 +138,7 @@ def work_series(
     week: Week, days: range, plan: elbowroom.Plan, model: Path, samples: int, scratch: Path
 ) -> tuple[Series, list[Outcome]]:
     """Works some days with a plan, and compares them with the predictions of a model."""
-    objective = "least-slack" if model.stem == AS_PLANNED else "probability"
-    outcomes = [week.day(number, plan, model, objective) for number in days]
+    outcomes = [week.day(number, plan, model) for number in days]
     folder = scratch / f"{model.stem} {days.start}"
     folder.mkdir()
     series = Series(

@@ -44,7 +44,7 @@
 
   (:durative-action place
     :parameters (?r - robot ?c - crate ?p - place)
-    :duration (= ?duration 5)
+    :duration (= ?duration 6)
     :condition (and (at start (docked ?r ?p)) (at start (holding ?r ?c)) (over all (truck-at ?p)))
     :effect (and (at start (not (docked ?r ?p))) (at end (bay-free ?p)) (at end (at ?r ?p))
                  (at end (not (holding ?r ?c))) (at end (empty ?r)) (at end (loaded ?c)))))

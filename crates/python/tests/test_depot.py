@@ -51,9 +51,9 @@ def test_day_has_the_same_trace_again(tmp_path: Path) -> None:
     model.write_text('format = "elbowroom-world"\nversion = 1\n')
     week = Week(PlainEngine, seed=5)
     plan = shortest_plan(week)
-    first, again = (week.day(1, plan, model, "least-slack") for _ in range(2))
+    first, again = (week.day(1, plan, model) for _ in range(2))
     assert first.run.trace_text == again.run.trace_text
-    assert week.day(2, plan, model, "least-slack").run.trace_text != first.run.trace_text
+    assert week.day(2, plan, model).run.trace_text != first.run.trace_text
 
 
 def trace(duration: float, verdict: str, *, outcome: str = "succeeded", plans: int = 1) -> list[dict[str, Any]]:
