@@ -75,9 +75,10 @@ class Week:
         goal = self.text[self.text.index("(:goal") :]
         facts = " ".join(sorted(world.facts | {"(truck-at gate)"}))
         rest = elbowroom.read(self.domain, f"{self.text[:init]}(:init {facts} {' '.join(functions)}) {goal}")
-        run = rest.run(rest.plan(), world=world, planning_time=0)
+        plan = rest.plan()
+        run = rest.run(plan, world=world, planning_time=0) if isinstance(plan, elbowroom.Plan) else plan
         if not run:
-            raise RuntimeError(f"the crates could not be loaded without a deadline: {run}, {sorted(world.facts)}, {run.reasons}")
+            raise RuntimeError(f"the crates could not be loaded without a deadline: {run}")
         return world.seconds
 
 

@@ -119,8 +119,8 @@ def _depot_model(robots: dict[str, Vector], people: int) -> str:
 
 _GRIP_STEP = 0.002
 _FINGER = '<geom type="box" size="0.02 0.1 0.1" mass="1"/>'
-_GRIPPER = f"""<mujoco><option timestep="{_GRIP_STEP}" integrator="implicitfast" cone="elliptic" impratio="10"/><worldbody>
-<geom type="box" size="1 1 0.05" pos="0 0 0.3"/>
+_GRIPPER = f"""<mujoco><option timestep="{_GRIP_STEP}" integrator="implicitfast" cone="elliptic" impratio="10"/>
+<worldbody><geom type="box" size="1 1 0.05" pos="0 0 0.3"/>
 <body name="hand" pos="0 0 0.5"><joint name="lift" type="slide" axis="0 0 1"/>
 <geom type="box" size="0.02 0.02 0.02" pos="0 0 0.4" mass="5" contype="0" conaffinity="0"/>
 <body pos="-0.25 0 0"><joint name="left" type="slide" axis="1 0 0"/>{_FINGER}</body>

@@ -101,7 +101,8 @@ class Robot:
                 while _progress(a, along, self.position) < part - 0.3:
                     self.path.append(self.position)
                     # A target beyond the point keeps the robot from braking for it.
-                    yield (x + 3 * along[0], y + 3 * along[1]) if part > 2 else (x + along[0], y + along[1]), RATED_SPEED
+                    beyond = 3.0 if part > 2 else 1.0
+                    yield (x + beyond * along[0], y + beyond * along[1]), RATED_SPEED
         yield from self._go(self.slot(end), 0.08)
 
     def charge(self) -> Drive:
