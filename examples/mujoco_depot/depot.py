@@ -31,8 +31,6 @@ CRATES = ["red", "green", "blue"]
 DEADLINE = 120
 """When the truck leaves, in seconds; as in problem.pddl."""
 AS_PLANNED = "as planned"
-PLANNING_BUDGET = 10
-"""Work for the choice of a plan, in seconds of one processor."""
 
 
 @dataclass
@@ -110,13 +108,13 @@ def shortest_plan(week: Week) -> elbowroom.Plan:
     return plan
 
 
-def likeliest_plan(week: Week, model: Path) -> elbowroom.Plan:
+def likeliest_plan(week: Week, model: Path, budget: str) -> elbowroom.Plan:
     """The plan that an executor begins with if it believes a model: the likeliest of several.
 
     Each morning has the same problem, so that the choice is made once, in a simulated run.
     """
     run = week.problem.run(
-        world=model.read_text(), first_plan="likeliest", planning_budget=PLANNING_BUDGET, planning_time=0
+        world=model.read_text(), first_plan="likeliest", planning_budget=budget, planning_time=0
     )
     first = next(entry for entry in run.trace() if entry["event"] == "plan")
     return week.problem.read_plan([elbowroom.Step(**step) for step in first["steps"]])
@@ -176,7 +174,7 @@ def work(week: Week, options: argparse.Namespace, scratch: Path) -> None:
         model = learn(log, scratch / f"{name}.toml")
         if name == "learnt":
             before.predicted_learnt = control.predicted_learnt = predicted(week, plan, model, samples)
-        plan = likeliest_plan(week, model)
+        plan = likeliest_plan(week, model, options.planning_budget)
         print(f"{name + ':':<13} {way(plan)}", flush=True)
         figures, outcomes_then = work_series(week, days, plan, model, samples, scratch)
         figures.predicted_learnt = figures.predicted
@@ -209,6 +207,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--days", type=positive, default=50, help="days before learning, and as many after it, twice")
     parser.add_argument("--seed", type=int, default=0, help="random seed of the conditions of all days")
     parser.add_argument("--samples", type=positive, default=100, help="simulated runs for each predicted probability")
+    parser.add_argument(
+        "--planning-budget", metavar="S", default="10", help="work for choosing a plan, in seconds of a processor"
+    )
     parser.add_argument("--engine", choices=["mujoco", "plain"], help="physics; MuJoCo where it is installed")
     parser.add_argument("--report", type=Path, metavar="PAGE.html", help="page about the run of the last day")
     parser.add_argument("--mcap", type=Path, metavar="FILE", help="that run for Foxglove")

@@ -66,7 +66,8 @@ class PlainEngine:
         others = [self.position(it) for it in self._position if it != robot]
         push = _push(self.position(robot), others + people)
         for axis in (0, 1):
-            velocity[axis] += (force[axis] + push[axis]) / mass * STEP
+            wall = _wall(self.position(robot)) if axis == 0 else 0.0
+            velocity[axis] += (force[axis] + push[axis] + wall) / mass * STEP
         speed = math.hypot(*velocity)
         slowed = max(0.0, speed - ROLLING_RESISTANCE * GRAVITY * STEP)
         for axis in (0, 1):
@@ -88,6 +89,13 @@ def _push(at: Vector, others: list[Vector]) -> Vector:
             x += 4000 * overlap * away[0] / apart
             y += 4000 * overlap * away[1] / apart
     return x, y
+
+
+def _wall(at: Vector) -> float:
+    """Force of the shelves beside the aisle."""
+    aside = at[0] - PLACES["rack"][0]
+    overlap = abs(aside) + ROBOT_RADIUS - (AISLE_HALF_WIDTH + 0.3)
+    return -math.copysign(4000 * overlap, aside) if WET[0] < at[1] < WET[1] and 0 < overlap < 0.6 else 0.0
 
 
 def _depot_model(robots: dict[str, Vector], people: int) -> str:

@@ -37,7 +37,7 @@ def run_depot(*options: str) -> str:
 
 def test_two_days_keep_the_promise(tmp_path: Path) -> None:
     files = ["--picture", str(tmp_path / "depot.svg"), "--report", str(tmp_path / "depot.html")]
-    options = ["--days", "2", "--samples", "5", "--engine", "plain", "--seed", "3"]
+    options = ["--days", "2", "--samples", "2", "--planning-budget", "1", "--engine", "plain", "--seed", "3"]
     output = run_depot(*options, *files)
     assert "engine: plain Python" in output
     assert "promise broken on 0 of them" in output
