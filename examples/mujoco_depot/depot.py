@@ -108,7 +108,7 @@ def shortest_plan(week: Week) -> elbowroom.Plan:
     return plan
 
 
-def likeliest_plan(week: Week, model: Path, budget: str) -> elbowroom.Plan:
+def likeliest_plan(week: Week, model: Path, budget: int) -> elbowroom.Plan:
     """The plan that an executor begins with if it believes a model: the likeliest of several.
 
     Each morning has the same problem, so that the choice is made once, in a simulated run.
@@ -208,7 +208,11 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="random seed of the conditions of all days")
     parser.add_argument("--samples", type=positive, default=100, help="simulated runs for each predicted probability")
     parser.add_argument(
-        "--planning-budget", metavar="S", default="10", help="work for choosing a plan, in seconds of a processor"
+        "--planning-budget",
+        type=positive,
+        metavar="S",
+        default=10,
+        help="work for choosing a plan, in seconds of a processor",
     )
     parser.add_argument("--engine", choices=["mujoco", "plain"], help="physics; MuJoCo where it is installed")
     parser.add_argument("--report", type=Path, metavar="PAGE.html", help="page about the run of the last day")
