@@ -1,0 +1,17 @@
+; The truck leaves at a fixed time. `bruno` has to charge before it may drive.
+(define (problem morning)
+  (:domain depot)
+  (:objects alba bruno - robot base rack gate - place red green blue - crate)
+  (:init
+    (at alba base) (at bruno base) (charged alba) (empty alba) (empty bruno)
+    (stored red rack) (stored green rack) (stored blue rack)
+    (charger base) (charger-free base) (bay gate) (bay-free gate)
+    (road base rack) (road rack base) (road rack gate) (road gate rack)
+    (aisle rack gate) (aisle gate rack)
+    (= (drive-time base rack) 10) (= (drive-time rack base) 10)
+    (= (drive-time rack gate) 20) (= (drive-time gate rack) 20)
+    (= (cross-time rack gate) 12) (= (cross-time gate rack) 12)
+    (= (charge-time alba) 15) (= (charge-time bruno) 15)
+    (truck-at gate)
+    (at 120 (not (truck-at gate))))
+  (:goal (and (loaded red) (loaded green) (loaded blue))))
