@@ -92,10 +92,12 @@ mod goals;
 mod replanning;
 pub mod situation;
 mod observations;
+mod kept_goals;
 mod persistent;
 mod history_pruning;
 mod pending;
 mod clock_watchdog;
+mod queued_goals;
 mod refusal_backoff;
 mod slack_monitor;
 mod background_search;
@@ -117,6 +119,7 @@ pub use mid_execution::{MidExecutionStart, EntryPoint};
 pub use step::{Next, UnexpectedAnswer};
 pub use shutdown::SHUTDOWN_GRACE;
 pub use observations::is_correction;
+pub use kept_goals::Wait;
 pub use persistent::{PROBLEM_GOAL_NAME, GoalReader};
 pub use refusal_backoff::RefusalBackoff;
 pub use settings::{
@@ -330,6 +333,7 @@ impl<'a> Run<'a> {
         self.check_stop_request()?;
         self.close_momentary_goals();
         self.close_achieved_goals();
+        self.tend_kept_goals();
         if self.poll_planner()? || self.handle_requests()? {
             return Ok(());
         }

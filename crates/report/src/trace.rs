@@ -20,7 +20,8 @@ pub use replay::{
     Difference, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored, TraceError,
 };
 pub use snapshot::{
-    GoalLine, NewsLine, SituationActionLine, SnapshotLine, StartLine, PlanAdoptionLine, PendingGoalChangeLine, RunningActionLine,
+    ClosedGoalLine, GoalLine, NewsLine, SituationActionLine, SnapshotLine, StartLine, PlanAdoptionLine,
+    PendingGoalChangeLine, RunningActionLine, WaitLine,
 };
 
 /// The value of `format` in the first line of a trace.

@@ -7,5 +7,7 @@ mod interactive;
 mod changes;
 mod goal_selection;
 mod goals;
+mod kept;
 mod pauses;
+mod queued;
 pub(crate) mod scripted;
